@@ -1,0 +1,67 @@
+# Two commands matter: `make run` and `make test`. Everything else is here for those who work on it.
+PYTHON ?= python3
+VENV   ?= .venv
+ARGS   ?=
+
+bin     := $(VENV)/bin
+run_ok  := $(VENV)/.run-ready
+dev_ok  := $(VENV)/.dev-ready
+install := $(bin)/python -m pip --disable-pip-version-check --quiet install
+editable := $(install) --no-deps --no-build-isolation --editable .
+
+.PHONY: run test check lint types contracts tests browser robot bench-drag lock clean
+
+run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
+	@exec $(bin)/katana450 serve $(ARGS)
+
+test: check browser tests     ## set up and pass every check and test
+
+check: lint types contracts
+
+lint: $(dev_ok)
+	$(bin)/ruff check .
+	$(bin)/ruff format --check .
+
+types: $(dev_ok)
+	$(bin)/mypy
+
+contracts: $(dev_ok)
+	$(bin)/lint-imports
+
+browser: $(dev_ok)            ## find a Chromium, or install one
+	$(bin)/python tests/browser/chromium.py
+
+tests: $(dev_ok)
+	$(bin)/python -m pytest $(ARGS)
+
+robot: $(dev_ok)              ## rebuild robot_description/meshes from the numbers in robot_description/cad
+	$(bin)/python -m robot_description.cad
+
+bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
+	$(bin)/python benchmarks/drag_to_frame.py $(ARGS)
+
+lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
+	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
+	  --no-header pyproject.toml --group build --output-file requirements.lock
+	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
+	  --no-header pyproject.toml --group dev --constraint requirements.lock \
+	  --output-file requirements-dev.lock
+
+clean:
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis test-artefacts
+
+$(bin)/python:
+	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else f"katana450 needs Python 3.11 or newer; $(PYTHON) is {v[0]}.{v[1]}. Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)")'
+	$(PYTHON) -m venv $(VENV)
+
+$(run_ok): requirements.lock pyproject.toml | $(bin)/python
+	@echo "Installing the locked dependencies into $(VENV) ..."
+	$(install) --require-hashes --requirement requirements.lock
+	$(editable)
+	@touch $@
+
+$(dev_ok): requirements-dev.lock pyproject.toml | $(bin)/python
+	@echo "Installing the locked development dependencies into $(VENV) ..."
+	$(install) --require-hashes --requirement requirements-dev.lock
+	$(editable)
+	@touch $(run_ok) $@

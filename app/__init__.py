@@ -1,0 +1,1 @@
+"""Browser teleoperation and interactive simulation of the Katana450 arm."""

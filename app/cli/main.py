@@ -1,0 +1,87 @@
+"""What ``katana450`` understands, and which part of the program does it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+
+from app.errors import KatanaError
+from app.settings import Settings
+
+FRAMES = ("shoulder", "base")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status: 0 done, 1 could not, 2 not understood."""
+    options = _parser().parse_args(arguments)
+    try:
+        # Imported when wanted: fk and ik answer without waiting for the view's libraries.
+        if options.command == "serve":
+            from app.cli.serve import serve
+
+            return serve(Settings(host=options.host, port=options.port))
+        from app.cli.lines import Kinematics, answer_lines
+
+        kinematics = Kinematics(in_base_frame=options.frame == "base")
+        answer_lines(kinematics.fk if options.command == "fk" else kinematics.ik)
+        return 0
+    except KatanaError as error:
+        print(f"katana450: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # The reader has heard enough; say nothing more, not even at exit.
+        sys.stderr.close()
+        return 0
+    except KeyboardInterrupt:
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="katana450", description="Teleoperate and simulate the Katana450 arm in a browser."
+    )
+    parser.add_argument("--version", action="version", version=f"katana450 {_version()}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    serve = commands.add_parser("serve", help="start the app and print its address")
+    serve.add_argument(
+        "--host",
+        default=Settings.host,
+        help="address to listen on; anything but the default lets the network drive the arm "
+        "(default: %(default)s)",
+    )
+    serve.add_argument(
+        "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
+    )
+    for name, what in (
+        ("fk", 'joints to poses: {"q": [5 angles, rad], "tool": "tcp"} a line'),
+        ("ik", 'poses to joints: {"T": [[4x4, m]], "tool": "tcp"} a line'),
+    ):
+        lines = commands.add_parser(name, help=f"JSON lines from stdin to stdout, {what}")
+        lines.add_argument(
+            "--frame",
+            choices=FRAMES,
+            default=FRAMES[0],
+            help="coordinates of T: the paper's frame {S} at the shoulder, or the base on the "
+            "table (default: %(default)s)",
+        )
+    return parser
+
+
+def _port(text: str) -> int:
+    try:
+        port = int(text)
+    except ValueError:
+        port = -1
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError(f"a port is a number from 0 to 65535, not {text!r}")
+    return port
+
+
+def _version() -> str:
+    try:
+        return version("katana450")
+    except PackageNotFoundError:
+        return "(not installed)"

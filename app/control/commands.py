@@ -1,0 +1,145 @@
+"""Everything a person, a script or a program can ask of the arm.
+
+A command is a value. It is checked when it is made, so whatever reaches the session is finite and
+of the right shape; whether the arm can do it is the session's to judge.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.errors import InputError
+from app.geometry import se3
+from app.geometry.arrays import FloatArray, frozen
+
+
+@dataclass(frozen=True)
+class SetJoint:
+    """Drive one joint to ``value`` [rad]; ``axis`` counts from 0."""
+
+    axis: int
+    value: float
+
+    def __post_init__(self) -> None:
+        if isinstance(self.axis, bool) or not isinstance(self.axis, int) or self.axis < 0:
+            raise InputError(f"An axis is a whole number from 0, not {self.axis!r}.")
+        _check_finite(f"The angle of axis {self.axis + 1}", self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class SetJoints:
+    """Drive all joints to ``q``, (n,) [rad]."""
+
+    q: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", _vector("The joint vector", self.q, None))
+
+
+@dataclass(frozen=True, eq=False)
+class MoveTool:
+    """Bring the tool point to ``position``, (3,) [m] in {S}; pitch and roll stay as wished."""
+
+    position: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", _vector("The tool position", self.position, 3))
+
+
+@dataclass(frozen=True)
+class TurnTool:
+    """Give the tool a pitch and a roll [rad]; its position stays as wished.
+
+    ``pitch`` is the angle of the tool below the horizontal, theta2 + theta3 + theta4, and ``roll``
+    the turn about the tool's own axis, theta5: the two rotations a 5-axis arm is free to choose.
+    """
+
+    pitch: float
+    roll: float
+
+    def __post_init__(self) -> None:
+        _check_finite("The pitch", self.pitch)
+        _check_finite("The roll", self.roll)
+
+
+@dataclass(frozen=True, eq=False)
+class SetPose:
+    """Bring the tool to the pose ``T``, (4, 4) in {S}, as near as five axes can."""
+
+    T: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T", frozen(se3.validated(self.T)))
+
+
+@dataclass(frozen=True)
+class SetGripper:
+    """Drive the finger joint to ``angle`` [rad]."""
+
+    angle: float
+
+    def __post_init__(self) -> None:
+        _check_finite("The finger angle", self.angle)
+
+
+@dataclass(frozen=True)
+class SetTool:
+    """From now on targets and read-outs are of the tool frame ``name``; nothing moves."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Settle:
+    """The hand lets go: what the arm can do becomes what is wished."""
+
+
+@dataclass(frozen=True)
+class Home:
+    """Drive to the ready posture."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Drive to the zero posture, the arm stretched along x (paper, Fig. 2)."""
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Forget the target: the arm holds where it is, and the gripper too."""
+
+
+Command = (
+    SetJoint
+    | SetJoints
+    | MoveTool
+    | TurnTool
+    | SetPose
+    | SetGripper
+    | SetTool
+    | Settle
+    | Home
+    | Stretch
+    | Reset
+)
+
+
+def _check_finite(what: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{what} has to be a finite number, not {value!r}.")
+
+
+def _vector(what: str, value: object, size: int | None) -> FloatArray:
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} has to be a list of numbers, not {value!r}.") from None
+    if array.ndim != 1 or array.size == 0 or (size is not None and array.size != size):
+        wanted = "a flat list" if size is None else f"{size} numbers"
+        raise InputError(f"{what} has to be {wanted}, not an array of shape {array.shape}.")
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} has to be finite: {array.tolist()}.")
+    return frozen(array)

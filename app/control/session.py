@@ -1,0 +1,185 @@
+"""The session decides: commands and time in, the next state out. Nothing else happens here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from app.control import commands as cmd
+from app.control.arm import Arm
+from app.control.findings import of_joints, of_projection
+from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.branch import branch_of
+from app.kinematics.forward import forward
+from app.kinematics.projection import project
+from app.motion.approach import approach
+
+LONGEST_STEP = 0.05
+"""[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
+must not turn into a leap."""
+
+
+class Session:
+    """The rules of one arm. Holds no state of its own: ``step`` is a pure function."""
+
+    def __init__(self, arm: Arm, ready: FloatArray) -> None:
+        """``ready``: (n,) the posture [rad] that Home drives to, inside the limits."""
+        self.arm = arm
+        self.ready = frozen(arm.chain.check_q(ready))
+        if not arm.chain.within_limits(self.ready):
+            raise InputError("The ready posture lies outside the joint limits.")
+
+    def begin(self, q: FloatArray, gripper: float, t: float) -> State:
+        """The state of an arm that stands at ``q`` (n,) [rad] and holds."""
+        q = frozen(q)
+        return State(
+            t=t,
+            q=q,
+            gripper=gripper,
+            setpoint=q,
+            gripper_setpoint=gripper,
+            goal=q,
+            gripper_goal=gripper,
+            tool=self.arm.default_tool,
+            target=JointTarget(q),
+            branch=branch_of(self.arm.chain, q),
+        )
+
+    def check(self, command: cmd.Command) -> None:
+        """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
+        n = self.arm.chain.n
+        match command:
+            case cmd.SetJoint(axis=axis) if axis >= n:
+                raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
+            case cmd.SetJoints(q=q) if q.shape != (n,):
+                raise InputError(f"This arm has {n} joints, the command {q.size}.")
+            case cmd.SetTool(name=name):
+                self.arm.chain_to(name)
+
+    def step(self, state: State, commands: Iterable[cmd.Command], t: float) -> State:
+        """Take the commands in order, then move the setpoints on by the time that has passed.
+
+        Args:
+            state: the state after the last tick.
+            commands: each one passed by ``check``; an InputError leaves ``state`` as it was.
+            t: now [s], on the clock of ``state.t``.
+        """
+        for command in commands:
+            self.check(command)
+            state = self._take(state, command)
+        dt = min(t - state.t, LONGEST_STEP)
+        gripper = self.arm.gripper
+        reach = gripper.speed * max(dt, 0.0)
+        return replace(
+            state,
+            t=max(t, state.t),
+            setpoint=approach(state.setpoint, state.goal, self.arm.chain.speed, dt),
+            gripper_setpoint=state.gripper_setpoint
+            + min(max(state.gripper_goal - state.gripper_setpoint, -reach), reach),
+        )
+
+    @staticmethod
+    def observe(state: State, q: FloatArray, gripper: float) -> State:
+        """Where the driver says the arm really is."""
+        return replace(state, q=q, gripper=gripper)
+
+    @staticmethod
+    def fail(state: State) -> State:
+        """Hold after an error of our own: no target survives it."""
+        held = replace(
+            state,
+            goal=state.setpoint,
+            gripper_goal=state.gripper_setpoint,
+            target=JointTarget(state.setpoint),
+        )
+        return replace(held, findings=(Finding(Reason.INTERNAL),))
+
+    def _take(self, state: State, command: cmd.Command) -> State:
+        match command:
+            case cmd.SetJoint(axis=axis, value=value):
+                q = np.array(state.goal)
+                q[axis] = value
+                return self._aim(state, JointTarget(frozen(q)))
+            case cmd.SetJoints(q=q):
+                return self._aim(state, JointTarget(q))
+            case cmd.Home():
+                return self._aim(state, JointTarget(self.ready))
+            case cmd.Stretch():
+                return self._aim(state, JointTarget(frozen(np.zeros(self.arm.chain.n))))
+            case cmd.Reset():
+                held = replace(state, gripper_goal=state.gripper_setpoint)
+                return self._aim(held, JointTarget(state.setpoint))
+            case cmd.MoveTool(position=position):
+                return self._aim(state, replace(self._wish(state), position=position))
+            case cmd.TurnTool(pitch=pitch, roll=roll):
+                return self._aim(state, replace(self._wish(state), pitch=pitch, roll=roll))
+            case cmd.SetPose(T=T):
+                return self._aim(state, PoseTarget(T))
+            case cmd.Settle():
+                # The findings stay: they say why the handle springs back.
+                return replace(state, target=JointTarget(state.goal))
+            case cmd.SetTool(name=name):
+                return self._aim(replace(state, tool=name), JointTarget(state.goal))
+            case cmd.SetGripper(angle=angle):
+                return self._grip(state, angle)
+
+    def _wish(self, state: State) -> ToolTarget:
+        """The tool target that a drag starts from: the last one wished, else where the goal is."""
+        if isinstance(state.target, ToolTarget):
+            return state.target
+        T = forward(self.arm.chain_to(state.tool), state.goal)
+        return ToolTarget(frozen(T[:3, 3]), *pitch_and_roll(state.goal))
+
+    def _aim(self, state: State, target: Target) -> State:
+        """Make ``target`` the target, and the nearest the arm can do the goal."""
+        chain = self.arm.chain_to(state.tool)
+        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
+        if isinstance(target, JointTarget):
+            goal = frozen(chain.clamp(target.q))
+            return replace(
+                state,
+                target=target,
+                goal=goal,
+                branch=branch_of(chain, goal),
+                findings=of_joints(chain, target.q) + gripper,
+            )
+        T = target.T if isinstance(target, PoseTarget) else self._pose(state, target)
+        best = project(chain, T, branch=state.branch, q_hint=state.goal)
+        yaw_was_wished = isinstance(target, PoseTarget)
+        return replace(
+            state,
+            target=target,
+            goal=frozen(best.q),
+            findings=of_projection(chain, best, yaw_was_wished=yaw_was_wished) + gripper,
+        )
+
+    def _pose(self, state: State, target: ToolTarget) -> FloatArray:
+        """The pose in {S} that five numbers mean: the tool lies in the plane through axis 1."""
+        x, y, _ = target.position
+        if math.hypot(x, y) < self._ON_AXIS:
+            azimuth = float(state.goal[0])
+        else:
+            azimuth = math.atan2(y, x) + (0.0 if state.branch.shoulder == "front" else math.pi)
+        R = so3.rotation_z(azimuth) @ so3.rotation_y(target.pitch) @ so3.rotation_x(target.roll)
+        return se3.from_rotation_translation(R, target.position)
+
+    _ON_AXIS = 1e-9
+    """[m] Nearer to axis 1 than this the direction to the tool point means nothing."""
+
+    def _grip(self, state: State, angle: float) -> State:
+        limits = self.arm.gripper
+        goal = min(max(angle, limits.lower), limits.upper)
+        others = tuple(f for f in state.findings if f.reason is not Reason.GRIPPER_LIMIT)
+        held = (Finding(Reason.GRIPPER_LIMIT, goal),) if goal != angle else ()
+        return replace(state, gripper_goal=goal, findings=others + held)
+
+
+def pitch_and_roll(q: FloatArray) -> tuple[float, float]:
+    """Pitch below the horizontal and roll [rad] of a pan, three parallel, roll arm at ``q``."""
+    return float(q[1] + q[2] + q[3]), float(q[4])

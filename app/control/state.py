@@ -1,0 +1,112 @@
+"""The whole state of the session, one immutable value a tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import Branch
+
+
+@dataclass(frozen=True, eq=False)
+class JointTarget:
+    """The joints themselves are wished for: ``q`` (n,) [rad]."""
+
+    q: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ToolTarget:
+    """The five freedoms of the arm's tool: ``position`` (3,) [m] in {S}, pitch and roll [rad]."""
+
+    position: FloatArray
+    pitch: float
+    roll: float
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTarget:
+    """A full pose ``T`` (4, 4) in {S}: one number more than five axes can follow."""
+
+    T: FloatArray
+
+
+Target = JointTarget | ToolTarget | PoseTarget
+
+
+class Status(Enum):
+    """How the goal of the arm stands to what was wished."""
+
+    OK = "ok"
+    LIMITED = "limited"
+    FAULT = "fault"
+
+
+class Reason(Enum):
+    """Why the goal differs from what was wished."""
+
+    OUT_OF_REACH = "out of reach"
+    AXIS_LIMIT = "axis limit"
+    GRIPPER_LIMIT = "gripper limit"
+    YAW_FIXED = "yaw fixed"
+    PITCH_CHANGED = "pitch changed"
+    ROLL_CHANGED = "roll changed"
+    INTERNAL = "internal error"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One reason with its number.
+
+    Attributes:
+        reason: what holds the goal back.
+        amount: by how much [m or rad]; for a limit, the limit itself [rad].
+        axis: the axis it is about, counted from 0, where it is about one.
+    """
+
+    reason: Reason
+    amount: float = 0.0
+    axis: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything the session knows after a tick.
+
+    Attributes:
+        t: time of the tick [s].
+        q, gripper: where the arm is, as the driver last said, (n,) and scalar [rad].
+        setpoint, gripper_setpoint: what the driver is told in this tick.
+        goal, gripper_goal: where the arm is going: the nearest it can do to the target.
+        tool: the tool frame that targets and read-outs are of.
+        target: what was wished, kept as it was wished.
+        branch: the branch that dragging keeps.
+        findings: why the goal is not what was last wished; empty when it is.
+    """
+
+    t: float
+    q: FloatArray
+    gripper: float
+    setpoint: FloatArray
+    gripper_setpoint: float
+    goal: FloatArray
+    gripper_goal: float
+    tool: str
+    target: Target
+    branch: Branch
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def status(self) -> Status:
+        """What the findings come to."""
+        if any(finding.reason is Reason.INTERNAL for finding in self.findings):
+            return Status.FAULT
+        return Status.LIMITED if self.findings else Status.OK
+
+    @property
+    def moving(self) -> bool:
+        """Whether the arm or the gripper is still on its way."""
+        return bool(
+            (self.setpoint != self.goal).any() or self.gripper_setpoint != self.gripper_goal
+        )

@@ -1,0 +1,1 @@
+"""What stands between a setpoint and an arm. Every driver is a ``Driver``; one is simulated."""

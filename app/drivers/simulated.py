@@ -1,0 +1,47 @@
+"""An arm that follows its setpoints exactly, as far as its joints are able."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.control.arm import Arm
+from app.drivers.driver import Sent
+from app.errors import InputError
+from app.geometry.arrays import FloatArray, frozen
+
+
+class SimulatedDriver:
+    """Keeps to limits and speeds by itself, so that a fault upstream shows instead of hiding."""
+
+    def __init__(self, arm: Arm, q: FloatArray, gripper: float) -> None:
+        """The arm stands at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad]."""
+        self._arm = arm
+        self._sent = Sent(frozen(arm.chain.clamp(q)), gripper)
+        self._t: float | None = None
+
+    def start(self, t: float) -> Sent:
+        self._t = t
+        return self._sent
+
+    def send(self, q: FloatArray, gripper: float, t: float) -> Sent:
+        if self._t is None:
+            raise InputError("The simulated arm takes no setpoint before it is started.")
+        if not (np.isfinite(q).all() and np.isfinite(gripper)):
+            raise InputError(f"The arm was sent a setpoint that is not finite: {q}, {gripper}.")
+        dt = max(t - self._t, 0.0)
+        self._t = max(t, self._t)
+        if gripper == self._sent.gripper and (q == self._sent.q).all():
+            return self._sent
+        step = self._arm.chain.speed * dt
+        moved = self._sent.q + np.clip(self._arm.chain.clamp(q) - self._sent.q, -step, step)
+        self._sent = Sent(frozen(moved), self._gripper(gripper, dt))
+        return self._sent
+
+    def stop(self) -> None:
+        self._t = None
+
+    def _gripper(self, angle: float, dt: float) -> float:
+        fingers = self._arm.gripper
+        step = fingers.speed * dt
+        wanted = min(max(angle, fingers.lower), fingers.upper)
+        return self._sent.gripper + min(max(wanted - self._sent.gripper, -step), step)

@@ -1,0 +1,19 @@
+"""The errors a person may meet: whole sentences that say what is wrong, where, what to do."""
+
+from __future__ import annotations
+
+
+class KatanaError(Exception):
+    """Base of every error of this project; its text can be shown to a person as it stands."""
+
+
+class InputError(KatanaError, ValueError):
+    """A value handed in cannot be used: not finite, of the wrong shape, not a rotation, ..."""
+
+
+class RobotDescriptionError(KatanaError):
+    """The description of the robot is broken, or of an arm these kinematics do not cover."""
+
+
+class ConfigurationError(KatanaError):
+    """A setting of the program is missing or contradicts another."""

@@ -1,0 +1,1 @@
+"""Rigid-body geometry: rotations, poses, twists and screws. Twist order is (omega, v)."""

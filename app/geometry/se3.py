@@ -1,0 +1,98 @@
+"""Rigid motions: SE(3), its exponential and logarithm, and twists.
+
+A pose T_a_b is a (4, 4) float64 matrix that maps coordinates of {b} into {a}; lengths in m, angles
+in rad. A twist V (6,) is (omega, v): the angular part first. Source: Lynch & Park, Modern Robotics
+(2017), ch. 3.3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from app import tolerances
+from app.errors import InputError
+from app.geometry import so3
+from app.geometry.arrays import FloatArray, finite_array
+
+
+def hat(V: npt.ArrayLike) -> FloatArray:
+    """The (4, 4) matrix of the twist V = (omega, v) (6,)."""
+    V = np.asarray(V, dtype=np.float64)
+    X = np.zeros((4, 4))
+    X[:3, :3] = so3.hat(V[:3])
+    X[:3, 3] = V[3:]
+    return X
+
+
+def vee(X: FloatArray) -> FloatArray:
+    """Inverse of `hat`: the twist (omega, v) (6,) of a (4, 4) matrix."""
+    return np.concatenate((so3.vee(X[:3, :3]), X[:3, 3]))
+
+
+def from_rotation_translation(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
+    """The pose with rotation `R` (3, 3) and position `p` (3,) [m]."""
+    T = np.eye(4)
+    T[:3, :3] = R
+    T[:3, 3] = p
+    return T
+
+
+def inverse(T: FloatArray) -> FloatArray:
+    """T_b_a of T_a_b."""
+    Rt = T[:3, :3].T
+    return from_rotation_translation(Rt, -Rt @ T[:3, 3])
+
+
+def adjoint(T: FloatArray) -> FloatArray:
+    """The (6, 6) matrix that maps twists in {b} to twists in {a}, of T_a_b."""
+    A = np.zeros((6, 6))
+    A[:3, :3] = A[3:, 3:] = T[:3, :3]
+    A[3:, :3] = so3.hat(T[:3, 3]) @ T[:3, :3]
+    return A
+
+
+def exp(V: npt.ArrayLike) -> FloatArray:
+    """The motion along the twist V = (omega, v) (6,) for unit time; with a screw axis S, exp(S q).
+
+    The coefficient of hat(omega)^2 loses digits near 0 only as fast as hat(omega)^2 itself
+    vanishes, so no series is needed.
+    """
+    V = np.asarray(V, dtype=np.float64)
+    w, v = V[:3], V[3:]
+    theta = math.hypot(*w)
+    a = so3.sinc(theta)
+    b = 0.5 * so3.sinc(0.5 * theta) ** 2
+    square = theta * theta
+    c = (1.0 - a) / square if square else 1.0 / 6.0
+    W = so3.hat(w)
+    Wv = W @ v
+    return from_rotation_translation(so3.exp(w), v + b * Wv + c * (W @ Wv))
+
+
+def log(T: FloatArray) -> FloatArray:
+    """The twist (omega, v) (6,) with exp(V) == T and |omega| <= pi."""
+    w = so3.log(T[:3, :3])
+    p = T[:3, 3]
+    theta = math.hypot(*w)
+    square = theta * theta
+    half = 0.5 * theta
+    c = (1.0 - math.cos(half) / so3.sinc(half)) / square if square else 1.0 / 12.0
+    W = so3.hat(w)
+    Wp = W @ p
+    return np.concatenate((w, p - 0.5 * Wp + c * (W @ Wp)))
+
+
+def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
+    """A clean copy of the pose `T` (4, 4): rotation made orthonormal, last row exact.
+
+    Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, or its
+    rotation is none.
+    """
+    M = finite_array(T, (4, 4), name)
+    if np.abs(M[3] - (0.0, 0.0, 0.0, 1.0)).max() > tolerances.POSE_LAST_ROW:
+        row = " ".join(f"{x:g}" for x in M[3])
+        raise InputError(f"{name} has the last row {row}; a pose ends in 0 0 0 1.")
+    return from_rotation_translation(so3.validated(M[:3, :3], f"The rotation of {name}"), M[:3, 3])

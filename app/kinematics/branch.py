@@ -1,0 +1,61 @@
+"""The four ways the arm can stand at one pose, bounded by its singularities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy.typing as npt
+
+from app.errors import InputError
+from app.kinematics.arm import arm_of
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+
+Shoulder = Literal["front", "back"]
+Elbow = Literal["up", "down"]
+
+
+@dataclass(frozen=True, order=True)
+class Branch:
+    """A region of the joint space that the arm leaves only through a singularity.
+
+    shoulder: "front" when the tool point's radial coordinate in the arm's vertical plane,
+    r = x cos(theta1) + y sin(theta1), is >= 0. elbow: "up" when theta3 >= 0, which puts the elbow
+    above the line from shoulder to wrist while the arm faces front. The regions meet where r = 0
+    or sin(theta3) = 0.
+    """
+
+    shoulder: Shoulder
+    elbow: Elbow
+
+    def __str__(self) -> str:
+        return f"{self.shoulder}-{self.elbow}"
+
+    @staticmethod
+    def parse(text: str) -> Branch:
+        """The branch written as `str` writes it; InputError on any other text."""
+        for branch in BRANCHES:
+            if text == str(branch):
+                return branch
+        names = ", ".join(str(branch) for branch in BRANCHES)
+        raise InputError(f"There is no branch {text!r}; the branches are {names}.")
+
+
+BRANCHES: Final[tuple[Branch, ...]] = (
+    Branch("front", "up"),
+    Branch("front", "down"),
+    Branch("back", "up"),
+    Branch("back", "down"),
+)
+
+
+def branch_of(chain: Chain, q: npt.ArrayLike) -> Branch:
+    """The branch the joint angles `q` (5,) [rad] stand on."""
+    arm_of(chain)
+    q = chain.check_q(q)
+    x, y, _ = forward(chain, q)[:3, 3]
+    r = x * math.cos(q[0]) + y * math.sin(q[0])
+    elbow_up = math.remainder(q[2], math.tau) >= 0.0
+    return Branch("front" if r >= 0.0 else "back", "up" if elbow_up else "down")

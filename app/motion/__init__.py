@@ -1,0 +1,1 @@
+"""How a commanded joint position moves in time. Pure: time comes in as an argument."""

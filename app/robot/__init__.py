@@ -1,0 +1,1 @@
+"""From a URDF file to the arm the controller knows and the bodies the view draws."""

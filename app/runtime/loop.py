@@ -1,0 +1,116 @@
+"""The control loop: a fixed number of ticks a second, whatever the view does."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from dataclasses import dataclass
+
+from app.control.session import Session
+from app.control.state import State
+from app.drivers.driver import Driver
+from app.runtime.clock import Clock
+from app.runtime.mailbox import Mailbox
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """What the loop shows the world: a state, and the last mailbox ticket that is in it."""
+
+    state: State
+    ticket: int
+
+
+class ControlLoop:
+    """Drain, step, send, publish."""
+
+    def __init__(
+        self, session: Session, driver: Driver, mailbox: Mailbox, clock: Clock, rate: float
+    ) -> None:
+        """``rate``: ticks a second [Hz]."""
+        self._session = session
+        self._driver = driver
+        self._mailbox = mailbox
+        self._clock = clock
+        self._period = 1.0 / rate
+        t = clock.now()
+        sent = driver.start(t)
+        self._state = session.begin(sent.q, sent.gripper, t)
+        self._snapshot = Snapshot(self._state, 0)
+        self._published = threading.Condition()
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self.late_ticks = 0
+        """Ticks that came more than a whole period late, since the start."""
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest one."""
+        return self._snapshot
+
+    def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
+        """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""
+        with self._published:
+            self._published.wait_for(lambda: self._snapshot is not seen, timeout)
+            return self._snapshot
+
+    def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
+        """Return as soon as a command newer than ``seen`` is in, or ``timeout`` [s] is up."""
+        with self._published:
+            self._published.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)
+
+    def tick(self) -> None:
+        """One turn: take the commands, move on, tell the arm, publish what changed."""
+        commands, ticket = self._mailbox.drain()
+        before = self._state
+        t = self._clock.now()
+        try:
+            state = self._session.step(before, commands, t)
+            sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
+            state = self._session.observe(state, sent.q, sent.gripper)
+        except Exception:
+            # Whatever went wrong, the loop lives on and the arm holds: a person must see it.
+            log.exception("The control loop met an error; the arm holds.")
+            state = self._session.fail(before)
+        self._state = state
+        # An arm at rest wakes nobody: time alone is no news.
+        if commands or _differs(before, state):
+            with self._published:
+                self._snapshot = Snapshot(state, ticket)
+                self._published.notify_all()
+
+    def start(self) -> None:
+        """Run the ticks in a thread of their own until ``stop``."""
+        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and let go of the arm."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._driver.stop()
+
+    def _run(self) -> None:
+        due = self._clock.now()
+        while not self._stopping.is_set():
+            self.tick()
+            due += self._period
+            late = self._clock.now() - due
+            if late > self._period:
+                # Do not run after lost ticks: the session moves by the time that passed.
+                self.late_ticks += 1
+                due += late
+            self._clock.sleep_until(due)
+
+
+def _differs(a: State, b: State) -> bool:
+    return (
+        a.q is not b.q
+        or a.gripper != b.gripper
+        or a.setpoint is not b.setpoint
+        or a.gripper_setpoint != b.gripper_setpoint
+        or a.findings != b.findings
+    )

@@ -1,0 +1,48 @@
+"""Every tolerance of the pure core, each with its unit and its reason."""
+
+from __future__ import annotations
+
+from typing import Final
+
+# How far from orthonormal (largest entry of R^T R - I) a matrix may be and still be meant as a
+# rotation: single-precision numbers and rounded text pass, a scale or a shear does not.
+ROTATION_INPUT: Final = 1e-6
+
+# How far from 0 0 0 1 the last row of a pose may be: rounding of a product of poses, no more.
+POSE_LAST_ROW: Final = 1e-9
+
+# [1, m] How exactly a joint's screw axis must have |omega| = 1 and no travel along itself.
+SCREW: Final = 1e-9
+
+# Cosine of the pitch below which roll and yaw turn about one axis and only their sum is known.
+GIMBAL_LOCK: Final = 1e-9
+
+# [1, m] How exactly the axes of a described arm must cross, be square or parallel. A rounded number
+# in a description file shows up far above this, rounding of double precision far below.
+ARM_GEOMETRY: Final = 1e-9
+
+# [m] Distance below which a point counts as lying on a rotation axis: its direction seen from the
+# axis is then known to fewer digits than a joint encoder resolves.
+ON_AXIS: Final = 1e-9
+
+# [m, or the unit of the plane's d] Misfit up to which a subproblem's answer counts as exact.
+SUBPROBLEM_EXACT: Final = 1e-9
+
+# [1] Sine of the angle between two axes below which they count as parallel.
+PARALLEL: Final = 1e-9
+
+# [rad] How far over a limit an angle still counts as on it: rounding grows as its square root next
+# to a singularity, and an encoder step is 5e-4 rad or more.
+LIMIT_SLACK: Final = 1e-9
+
+# [rad] The same inside the closed-form planar solutions, which are then set onto the limit itself;
+# it costs less than 1e-12 m at the tool.
+PLANAR_LIMIT_SLACK: Final = 1e-12
+
+# [1] Negative radicand, relative to the squared lengths it came from, that is rounding alone.
+RADICAND: Final = 1e-12
+
+# [m], [rad] Residuals nearer than these are the same to a person and to the arm; the choice between
+# them then goes to the solution that moves the arm less.
+SAME_POSITION: Final = 1e-9
+SAME_ROTATION: Final = 1e-9

@@ -1,0 +1,191 @@
+"""The front panel: what the arm does, sliders for its joints, a pose to type, buttons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.control import commands as cmd
+from app.control.state import State
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.view import readout
+from app.view.texts import AXIS_NAMES, degrees
+
+ANGLE_WORTH_SENDING = 1e-6
+"""[deg] Rounding on the way to radians and back is less."""
+
+READOUT_INTERVAL = 0.1
+"""[s] People cannot read numbers that change faster."""
+
+FARTHEST = 1000.0
+"""[mm] Beyond any tool point of the arm: what a typed position may hold."""
+
+
+GESTURES: dict[str, cmd.Command] = {
+    "Home": cmd.Home(),
+    "Stretch": cmd.Stretch(),
+    "Reset": cmd.Reset(),
+}
+
+
+class Panel:
+    """Sliders show the goal, as the gizmo does; the read-out shows the arm itself."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        put: Callable[[cmd.Command], int],
+        state: State,
+    ) -> None:
+        """``put`` takes a command; ``state`` is what the panel shows first."""
+        self._model = model
+        self._put = put
+        self._gui = server.gui
+        self._told_at = -math.inf
+        self._told = ""
+        self._readout = self._gui.add_html(readout.page(model, state))
+        with self._gui.add_folder("Joints"):
+            self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
+            self._gripper = self._finger(state)
+        self._gestures = self._gui.add_button_group(
+            "Drive",
+            tuple(GESTURES),
+            hint="Home: to the ready posture. Stretch: every joint to zero, the arm along x. "
+            "Reset: stop here and forget the target.",
+        )
+        self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
+        with self._gui.add_folder("Pose by numbers"):
+            self._pose_form(state)
+
+    def follow(self, state: State, now: float, *, caught_up: bool) -> None:
+        """Show ``state`` at time ``now`` [s].
+
+        ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
+        that an older state never takes a slider out of the hand that moves it.
+        """
+        if caught_up:
+            for slider, angle in zip(self._sliders, state.goal, strict=True):
+                _set(slider, math.degrees(angle))
+            _set(self._gripper, self._opening(state.gripper_goal))
+            if self._tool.value != state.tool:
+                self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
+        if now - self._told_at >= READOUT_INTERVAL or not state.moving:
+            self._told_at = now
+            page = readout.page(self._model, state)
+            if page != self._told:
+                self._told = self._readout.content = page
+
+    def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
+        chain = self._model.arm.chain
+        lower, upper = (float(math.degrees(limit[axis])) for limit in (chain.lower, chain.upper))
+        slider = self._gui.add_slider(
+            f"Axis {axis + 1}",
+            min=lower,
+            max=upper,
+            step=0.05,
+            initial_value=float(np.clip(math.degrees(state.goal[axis]), lower, upper)),
+            hint=f"{AXIS_NAMES[axis]}, degrees: "
+            f"{degrees(chain.lower[axis], 2)} to {degrees(chain.upper[axis], 2)}".capitalize(),
+        )
+        slider.precision = 2
+        self._on_person(slider, lambda: cmd.SetJoint(axis, math.radians(slider.value)))
+        return slider
+
+    def _finger(self, state: State) -> viser.GuiSliderHandle[float]:
+        fingers = self._model.arm.gripper
+        slider = self._gui.add_slider(
+            "Gripper",
+            min=0.0,
+            max=100.0,
+            step=0.5,
+            initial_value=self._opening(state.gripper_goal),
+            hint=f"Percent open: 0 is closed ({degrees(fingers.lower)} at each finger), "
+            f"100 is open ({degrees(fingers.upper)})",
+        )
+        slider.precision = 1
+        self._on_person(slider, lambda: cmd.SetGripper(self._finger_angle(slider.value)))
+        return slider
+
+    def _pose_form(self, state: State) -> None:
+        arm = self._model.arm
+        T = forward(arm.chain_to(state.tool), state.goal)
+        self._tool = self._gui.add_dropdown(
+            "Tool",
+            tuple(arm.tools),
+            initial_value=state.tool,
+            hint="The frame that the gizmo, the numbers and the read-out are of",
+        )
+        self._on_person(self._tool, lambda: cmd.SetTool(self._tool.value))
+        position = self._gui.add_vector3(
+            "x, y, z",
+            np.round(1e3 * T[:3, 3], 1),
+            min=(-FARTHEST, -FARTHEST, -FARTHEST),
+            max=(FARTHEST, FARTHEST, FARTHEST),
+            step=1.0,
+            hint="Tool position in mm, in the frame {S} at the shoulder",
+        )
+        angles = self._gui.add_vector3(
+            "r, p, y",
+            np.round(np.degrees(so3.to_rpy(T[:3, :3])), 1),
+            min=(-180.0, -180.0, -180.0),
+            max=(180.0, 180.0, 180.0),
+            step=1.0,
+            hint="Roll, pitch and yaw in degrees, in the frame {S}; pitch above 0 points down",
+        )
+
+        def pose() -> cmd.Command:
+            return cmd.SetPose(typed_pose(position.value, angles.value))
+
+        self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
+
+    def _on_person(
+        self,
+        handle: viser.GuiInputHandle[Any] | viser.GuiButtonHandle | viser.GuiButtonGroupHandle,
+        say: Callable[[], cmd.Command],
+    ) -> None:
+        """Send what ``say`` makes when a person, not this program, changes ``handle``."""
+
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            try:
+                self._put(say())
+            except InputError as error:
+                if event.client is not None:
+                    event.client.add_notification("Not done", str(error), color="red")
+
+        if isinstance(handle, viser.GuiInputHandle):
+            handle.on_update(changed)
+        else:
+            handle.on_click(changed)
+
+    def _opening(self, angle: float) -> float:
+        fingers = self._model.arm.gripper
+        return 100.0 * (angle - fingers.lower) / (fingers.upper - fingers.lower)
+
+    def _finger_angle(self, opening: float) -> float:
+        fingers = self._model.arm.gripper
+        return fingers.lower + opening / 100.0 * (fingers.upper - fingers.lower)
+
+
+def typed_pose(
+    position: tuple[float, float, float], angles: tuple[float, float, float]
+) -> FloatArray:
+    """The pose (4, 4) in {S} of numbers as people type them: mm, and degrees roll, pitch, yaw."""
+    R = so3.from_rpy(*(math.radians(angle) for angle in angles))
+    return se3.from_rotation_translation(R, 1e-3 * np.array(position))
+
+
+def _set(slider: viser.GuiSliderHandle[float], value: float) -> None:
+    value = min(max(value, slider.min), slider.max)
+    if abs(slider.value - value) > ANGLE_WORTH_SENDING:
+        slider.value = value  # type: ignore[misc]  # viser declares it read-only

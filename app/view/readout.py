@@ -1,0 +1,50 @@
+"""The read-out as HTML: what the arm does, and where its tool is and is going."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from html import escape
+from pathlib import Path
+
+import app
+from app.control.state import State, Status
+from app.geometry import so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.view.texts import headline, sentence, signed
+
+STATIC = Path(app.__file__).resolve().parent.parent / "static"
+
+ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+def page(model: RobotModel, state: State) -> str:
+    """The whole read-out for ``state``."""
+    chain = model.arm.chain_to(state.tool)
+    now, goal = (_numbers(forward(chain, q)) for q in (state.q, state.goal))
+    rows = "".join(
+        f"<tr><th>{name}</th><td data-now='{name}'>{a}</td><td data-goal='{name}'>{b}</td>"
+        f"<td class='unit'>{'mm' if name in 'xyz' else '°'}</td></tr>"
+        for name, a, b in zip(ROWS, now, goal, strict=True)
+    )
+    mood = "moving" if state.moving and state.status is Status.OK else state.status.value
+    why = sentence(state)
+    return (
+        f"<style>{_style()}</style><div class='k450'>"
+        f"<p class='status {mood}'><b>{escape(headline(state))}</b>"
+        f"<span>{escape(why) or '&nbsp;'}</span></p>"
+        f"<table><thead><tr><th>{escape(state.tool)} in {{S}}</th><th>now</th><th>goal</th>"
+        f"<th></th></tr></thead><tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _numbers(T: FloatArray) -> list[str]:
+    position = [signed(1e3 * float(x), 1) for x in T[:3, 3]]
+    return position + [signed(math.degrees(angle), 1) for angle in so3.to_rpy(T[:3, :3])]
+
+
+@cache
+def _style() -> str:
+    return (STATIC / "panel.css").read_text(encoding="utf-8")

@@ -1,0 +1,137 @@
+"""The arm in the browser: a tree of frames that move by rotation only, and its ghost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import trimesh
+import viser
+
+from app.geometry import so3
+from app.robot.model import Body, RobotModel
+
+ANGLE_WORTH_SENDING = 1e-7
+"""[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
+
+
+class FrameTree:
+    """One viser frame a link, nested as the links are; shapes are hung below by a subclass."""
+
+    def __init__(self, server: viser.ViserServer, root: str, model: RobotModel) -> None:
+        """``root``: name of the node that carries the tree, for instance ``/arm``."""
+        self._server = server
+        self.root = server.scene.add_frame(root, show_axes=False)
+        self.path: dict[str, str] = {}
+        self._joints: list[tuple[str, Body, viser.FrameHandle]] = []
+        self._angles: dict[str, float] = {}
+        for body in model.bodies:
+            parent = root if body.parent is None else self.path[body.parent]
+            self.path[body.name] = f"{parent}/{body.name}"
+            frame = server.scene.add_frame(
+                self.path[body.name],
+                show_axes=False,
+                wxyz=so3.to_quaternion(body.T_parent_body[:3, :3]),
+                position=body.T_parent_body[:3, 3],
+            )
+            if body.joint is not None:
+                self._joints.append((body.joint, body, frame))
+
+    def move(self, angles: Mapping[str, float]) -> None:
+        """Turn the links to the joint ``angles`` [rad]; sends only what changed."""
+        for joint, body, frame in self._joints:
+            angle = angles[joint]
+            if abs(angle - self._angles.get(joint, np.inf)) > ANGLE_WORTH_SENDING:
+                self._angles[joint] = angle
+                R = body.T_parent_body[:3, :3] @ so3.exp(body.axis * angle)
+                frame.wxyz = so3.to_quaternion(R)
+
+
+class ArmNodes(FrameTree):
+    """The arm itself: the GLB files as they are, so that normals and materials are kept."""
+
+    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
+        super().__init__(server, "/arm", model)
+        for body in model.bodies:
+            for number, mesh in enumerate(body.meshes):
+                server.scene.add_glb(f"{self.path[body.name]}/shape{number}", mesh.read_bytes())
+
+
+class GhostNodes(FrameTree):
+    """Where the arm is going: the same links, translucent, in one colour that tells how it went."""
+
+    OPACITY = 0.35
+
+    def __init__(
+        self, server: viser.ViserServer, model: RobotModel, colour: tuple[int, int, int]
+    ) -> None:
+        super().__init__(server, "/ghost", model)
+        self.root.visible = False
+        self._colour = colour
+        self._shapes = [
+            server.scene.add_mesh_simple(
+                f"{self.path[body.name]}/shape{number}",
+                *_surface(mesh),
+                color=colour,
+                opacity=self.OPACITY,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for body in model.bodies
+            for number, mesh in enumerate(body.meshes)
+            if body.joint is not None or body.name == "gripper_link"
+        ]
+
+    def show(self, visible: bool, colour: tuple[int, int, int]) -> None:
+        """Show or hide the ghost, in ``colour`` (red, green, blue of 255)."""
+        if visible != self.root.visible:
+            self.root.visible = visible
+        if visible and colour != self._colour:
+            self._colour = colour
+            for shape in self._shapes:
+                shape.color = colour
+
+
+def _surface(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Vertices (n, 3) [m] and faces (m, 3) of a GLB file, its materials forgotten."""
+    mesh = trimesh.load_scene(path).to_mesh()
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+
+FLOOR = (226, 231, 236)
+SKY = (247, 249, 251)
+
+
+def furnish(server: viser.ViserServer) -> None:
+    """The room: floor, light, where a person first looks from."""
+    scene = server.scene
+    scene.set_up_direction("+z")
+    scene.add_grid(
+        "/floor",
+        infinite_grid=True,
+        cell_size=0.05,
+        cell_thickness=0.6,
+        cell_color=(205, 211, 218),
+        section_size=0.25,
+        section_thickness=1.0,
+        section_color=(172, 181, 192),
+        plane_color=FLOOR,
+        plane_opacity=1.0,
+        fade_distance=5.0,
+        shadow_opacity=0.35,
+        # A hair below the table top, so that the foot of the arm does not flicker in it.
+        position=(0.0, 0.0, -5e-4),
+    )
+    scene.set_background_image(_gradient(SKY, FLOOR), format="png")
+    scene.configure_environment_map("studio", environment_intensity=0.35)
+    server.initial_camera.position = (0.98, -0.82, 0.62)
+    server.initial_camera.look_at = (0.17, 0.0, 0.25)
+    server.initial_camera.fov = float(np.deg2rad(40.0))
+
+
+def _gradient(top: tuple[int, int, int], bottom: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
+    rows = np.linspace(top, bottom, 128).round().astype(np.uint8)
+    return np.repeat(rows[:, None, :], 2, axis=1)

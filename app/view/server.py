@@ -1,0 +1,60 @@
+"""The viser server, opened on the port that was asked for or not at all."""
+
+from __future__ import annotations
+
+import errno
+import socket
+
+import viser
+
+from app.errors import ConfigurationError
+from app.view.guard import Guard
+
+
+def open_server(host: str, port: int) -> viser.ViserServer:
+    """A guarded viser server on ``host``:``port``; port 0 takes any free one.
+
+    Raises:
+        ConfigurationError: the port is busy, or cannot be had; says which and what to do.
+    """
+    _check_free(host, port)
+    server = viser.ViserServer(host=host, port=port, label="Katana450", verbose=False)
+    # viser takes the next port when another program was quicker; a person would look in vain.
+    if port not in (0, server.get_port()):
+        server.stop()
+        raise ConfigurationError(_busy(host, port))
+    Guard(server)
+    return server
+
+
+def _check_free(host: str, port: int) -> None:
+    try:
+        family, _, _, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+    except (socket.gaierror, OverflowError) as error:
+        raise ConfigurationError(
+            f"{host!r} is not an address of this machine: {error}. Choose another with --host."
+        ) from error
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        # As the server itself will: a port that is only closing down is free.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(address)
+        except OSError as error:
+            raise ConfigurationError(_refused(host, port, error)) from error
+
+
+def _refused(host: str, port: int, error: OSError) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return _busy(host, port)
+    if error.errno == errno.EACCES:
+        return f"Port {port} may not be opened by this user. Choose one above 1023 with --port."
+    return f"Cannot listen on {host}: {error.strerror}. Choose another with --host."
+
+
+def _busy(host: str, port: int) -> str:
+    return (
+        f"Port {port} on {host} is in use by another program. "
+        f"Stop it, or choose another port: --port {port + 1}"
+    )

@@ -1,0 +1,114 @@
+"""The window on the arm: one viser server, one scene for every browser."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import viser
+
+from app.control.commands import Command
+from app.control.state import State, Status
+from app.errors import InputError
+from app.robot.model import RobotModel
+from app.runtime.loop import ControlLoop, Snapshot
+from app.runtime.mailbox import Mailbox
+from app.view.gizmo import Gizmo
+from app.view.panel import READOUT_INTERVAL, Panel
+from app.view.scene import ArmNodes, GhostNodes, furnish
+
+BRAND = (36, 119, 212)
+
+GHOST_COLOURS: dict[Status, tuple[int, int, int]] = {
+    Status.OK: (64, 156, 255),
+    Status.LIMITED: (255, 153, 0),
+    Status.FAULT: (230, 45, 45),
+}
+
+GHOST_FROM = np.deg2rad(0.2)
+"""[rad] The ghost shows while a joint is farther than this from its goal: nearer it would only
+flicker inside the arm."""
+
+
+class View:
+    """Shows each new snapshot to every browser; hands what people do to the mailbox."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        loop: ControlLoop,
+        mailbox: Mailbox,
+        frame_rate: float,
+    ) -> None:
+        """``frame_rate``: most updates a second [Hz]."""
+        self._server = server
+        self._model = model
+        self._loop = loop
+        self._mailbox = mailbox
+        self._interval = 1.0 / frame_rate
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="view", daemon=True)
+        server.gui.configure_theme(
+            control_width="medium", show_logo=False, show_share_button=False, brand_color=BRAND
+        )
+        server.gui.set_panel_label("Katana450")
+        server.gui.main_panel.dock_right()
+        furnish(server)
+        state = loop.snapshot.state
+        self._arm = ArmNodes(server, model)
+        self._ghost = GhostNodes(server, model, GHOST_COLOURS[Status.OK])
+        self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
+        self._panel = Panel(server, model, mailbox.put, state)
+        self._show(loop.snapshot)
+
+    def start(self) -> None:
+        """Follow the control loop in a thread of the view's own."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop following, and close the server."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._server.stop()
+
+    def _put_from_gizmo(self, command: Command) -> None:
+        try:
+            self._mailbox.put(command)
+        except InputError:
+            # A drag sends twenty a second; the next one tells the same more truly.
+            return
+
+    def _run(self) -> None:
+        seen = self._loop.snapshot
+        settled = True
+        while not self._stopping.is_set():
+            # After the last change the read-out still owes its final numbers.
+            snapshot = self._loop.wait_for_change(seen, 0.5 if settled else READOUT_INTERVAL)
+            settled = snapshot is seen
+            seen = snapshot
+            due = time.perf_counter() + self._interval
+            self._show(snapshot)
+            # Motion is shown at the frame rate, what a person does at once.
+            self._loop.wait_for_command(snapshot, due - time.perf_counter())
+
+    def _show(self, snapshot: Snapshot) -> None:
+        state = snapshot.state
+        with self._server.atomic():
+            self._arm.move(self._model.joint_angles(state.q, state.gripper))
+            self._show_ghost(state)
+            self._gizmo.follow(state)
+            self._panel.follow(
+                state,
+                time.perf_counter(),
+                caught_up=snapshot.ticket == self._mailbox.last_ticket,
+            )
+        self._server.flush()
+
+    def _show_ghost(self, state: State) -> None:
+        away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM
+        self._ghost.show(away, GHOST_COLOURS[state.status])
+        if away:
+            self._ghost.move(self._model.joint_angles(state.goal, state.gripper_goal))

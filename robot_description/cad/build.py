@@ -1,0 +1,73 @@
+"""From parts to files: one GLB for each link that has geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from robot_description.cad.arm import forearm_link, upper_arm_link, wrist_link
+from robot_description.cad.column import arm_base_link, pan_link
+from robot_description.cad.control_box import base_link
+from robot_description.cad.glb import Primitive, glb_bytes
+from robot_description.cad.gripper import (
+    finger_left_link,
+    finger_right_link,
+    gripper_link,
+    roll_link,
+)
+from robot_description.cad.part import Part
+from robot_description.cad.shading import shade, weld
+
+MILLIMETRE = 0.001
+MESHES = Path(__file__).resolve().parent.parent / "meshes"
+
+PARTS: tuple[Callable[[], Part], ...] = (
+    base_link,
+    arm_base_link,
+    pan_link,
+    upper_arm_link,
+    forearm_link,
+    wrist_link,
+    roll_link,
+    gripper_link,
+    finger_right_link,
+    finger_left_link,
+)
+"""From the table to the finger tips, each named as its link."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """One written file and what it holds."""
+
+    path: Path
+    materials: int
+    triangles: int
+    size: int
+
+
+def primitives_of(part: Part) -> list[Primitive]:
+    """Return the shaded triangles of ``part`` in metres, one primitive for each material."""
+    primitives = []
+    for material, solid in part.bodies():
+        mesh = solid.to_mesh64()
+        positions = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] * MILLIMETRE
+        triangles = np.asarray(mesh.tri_verts, dtype=np.int64)
+        primitives.append(Primitive(material, *shade(*weld(positions, triangles))))
+    return primitives
+
+
+def build(folder: Path = MESHES) -> Iterator[Built]:
+    """Write every link's GLB into ``folder``, yielding each as it is done."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for make in PARTS:
+        part = make()
+        primitives = primitives_of(part)
+        data = glb_bytes(part.link, primitives)
+        path = folder / f"{part.link}.glb"
+        path.write_bytes(data)
+        triangles = sum(len(primitive.triangles) for primitive in primitives)
+        yield Built(path, len(primitives), triangles, len(data))

@@ -1,0 +1,38 @@
+"""Physically based materials, as glTF's metallic-roughness model knows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface: colour is sRGB 0..1, metallic and rough are glTF's factors 0..1."""
+
+    name: str
+    colour: tuple[float, float, float]
+    metallic: float
+    rough: float
+
+    def linear_colour(self) -> list[float]:
+        """Return the colour as glTF wants it: linear RGB and opacity."""
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in self.colour]
+        return [*(round(c, 5) for c in linear), 1.0]
+
+
+def _hex(code: str) -> tuple[float, float, float]:
+    red, green, blue = (int(code[k : k + 2], 16) / 255.0 for k in (0, 2, 4))
+    return red, green, blue
+
+
+ALUMINIUM = Material("champagne aluminium", _hex("d8d2c4"), 0.25, 0.42)
+BRIGHT = Material("bright aluminium", _hex("e2e1de"), 0.35, 0.34)
+STEEL = Material("dark steel", _hex("5a5955"), 0.50, 0.40)
+RUBBER = Material("black rubber", _hex("2a2a2c"), 0.0, 0.80)
+PLASTIC = Material("black plastic", _hex("343437"), 0.0, 0.55)
+PANEL = Material("light panel", _hex("e2e2de"), 0.0, 0.55)
+GREEN = Material("terminal green", _hex("1f8a4d"), 0.0, 0.50)
+BLUE = Material("blue lettering", _hex("24479e"), 0.0, 0.50)
+
+MATERIALS: tuple[Material, ...] = (ALUMINIUM, BRIGHT, STEEL, RUBBER, PLASTIC, PANEL, GREEN, BLUE)
+"""In the order their primitives are written."""

@@ -1,0 +1,112 @@
+"""Vertex normals: smooth over fillets, sharp over creases, flat where a face is flat."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+CREASE = math.radians(42.0)
+"""Faces that meet at a larger angle are shaded apart."""
+COPLANAR = math.radians(0.5)
+"""Faces that meet at a smaller angle count as one plane."""
+NORMAL_DIGITS = 4
+"""Corners of one vertex share it when their normals agree to this many decimals."""
+
+
+def weld(
+    positions: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return single-precision ``positions`` (n, 3) without duplicates, and their triangles.
+
+    Triangles that single precision collapses to a line are dropped with their twins, so a closed
+    surface stays closed.
+    """
+    unique, inverse = np.unique(positions.astype(np.float32), axis=0, return_inverse=True)
+    faces = inverse.reshape(-1)[triangles]
+    a, b, c = faces.T
+    return unique, faces[(a != b) & (b != c) & (c != a)]
+
+
+def _patches(triangles: NDArray[np.int64], flat: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return for each triangle the lowest number among the coplanar ones it hangs together with."""
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
+    one, other = order[1:][same] // 3, order[:-1][same] // 3
+    level = (flat[one] * flat[other]).sum(axis=1) > math.cos(COPLANAR)
+    one, other = one[level], other[level]
+    patch = np.arange(len(triangles))
+    while True:
+        lowest = patch.copy()
+        np.minimum.at(lowest, one, patch[other])
+        np.minimum.at(lowest, other, patch[one])
+        lowest = lowest[lowest]
+        if np.array_equal(lowest, patch):
+            return patch
+        patch = lowest
+
+
+def _angles(corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the (m, 3) angles of triangles given by their corners (m, 3, 3)."""
+    ahead = np.roll(corner, -1, axis=1) - corner
+    back = np.roll(corner, 1, axis=1) - corner
+    dot = (ahead * back).sum(axis=2)
+    cross = np.cross(ahead, back)
+    angles: NDArray[np.float64] = np.arctan2(np.sqrt((cross * cross).sum(axis=2)), dot)
+    return angles
+
+
+def shade(
+    positions: NDArray[np.float32], triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
+    """Return vertices, unit normals, triangles with each vertex split where the surface creases.
+
+    A corner's normal is the sum of the normals of the faces about its vertex that lie within the
+    crease angle of its own face, each weighted by the corner's angle and by the area of the whole
+    plane patch the face belongs to. So a large flat face stays flat beside the facets of a fillet,
+    and how a patch happens to be cut into triangles does not show.
+    """
+    corner = positions[triangles].astype(np.float64)
+    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    size = np.sqrt((area * area).sum(axis=1))
+    flat = area / np.maximum(size, 1e-30)[:, None]
+    patch = _patches(triangles, flat)
+    weight = (_angles(corner) * np.bincount(patch, weights=size)[patch][:, None]).reshape(-1)
+
+    vertex = triangles.reshape(-1)
+    face = np.repeat(np.arange(len(triangles)), 3)
+    order = np.argsort(vertex, kind="stable")
+    degree = np.bincount(vertex, minlength=len(positions))
+    first = np.concatenate(([0], np.cumsum(degree)[:-1]))
+
+    # Every corner meets every corner of its vertex once: `mine` and `other` list those pairs.
+    meets = degree[vertex]
+    mine = np.repeat(np.arange(len(vertex)), meets)
+    offset = np.arange(len(mine)) - np.repeat(np.cumsum(meets) - meets, meets)
+    other = order[first[vertex[mine]] + offset]
+    near = (flat[face[mine]] * flat[face[other]]).sum(axis=1) >= math.cos(CREASE)
+    sliver = size[face[mine]] < 1e-14
+    kept = near | sliver
+    normal = np.column_stack(
+        [
+            np.bincount(
+                mine[kept],
+                weights=flat[face[other[kept]], k] * weight[other[kept]],
+                minlength=len(vertex),
+            )
+            for k in range(3)
+        ]
+    )
+    length = np.sqrt((normal * normal).sum(axis=1))
+    normal = np.where((length > 0.0)[:, None], normal / np.maximum(length, 1e-30)[:, None], 0.0)
+    normal[length == 0.0] = (0.0, 0.0, 1.0)
+
+    key = np.column_stack((vertex, np.round(normal * 10**NORMAL_DIGITS).astype(np.int64)))
+    unique, index, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return (
+        positions[unique[:, 0]],
+        np.round(normal[index], 5).astype(np.float32),
+        inverse.reshape(-1, 3),
+    )

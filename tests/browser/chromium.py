@@ -1,0 +1,209 @@
+"""Find a Chromium, install one where there is none, and launch it with WebGL and no GPU.
+
+``python tests/browser/chromium.py`` finds or installs; it exits with 1 when neither works.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from playwright.sync_api import Browser, Error, Playwright, sync_playwright
+
+ENVIRONMENT_VARIABLE = "KATANA450_BROWSER"
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+APPLICATIONS = (
+    Path("/Applications/Google Chrome.app/Contents/MacOS/Google Chrome"),
+    Path("/Applications/Chromium.app/Contents/MacOS/Chromium"),
+)
+
+FLAGS = (
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--disable-gpu-compositing",
+    "--force-device-scale-factor=1",
+    # A page behind another must go on drawing and keep its timers.
+    "--disable-background-timer-throttling",
+    "--disable-renderer-backgrounding",
+    "--disable-backgrounding-occluded-windows",
+)
+# Software renderers, the faster first. Mesa's llvmpipe draws about twice as fast as SwiftShader,
+# but is there on Linux with Mesa alone.
+RENDERERS = {
+    "llvmpipe": ("--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"),
+    "SwiftShader": ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+}
+HAS_WEBGL = "() => document.createElement('canvas').getContext('webgl2') !== null"
+
+
+class BrowserError(RuntimeError):
+    """No browser to test with; the message says what to install or to set."""
+
+
+class Installer(NamedTuple):
+    """Commands that install a browser, and whether they must be run by root."""
+
+    commands: tuple[tuple[str, ...], ...]
+    needs_root: bool
+
+
+INSTALLERS = {
+    "apt-get": Installer(
+        (
+            ("apt-get", "update"),
+            (
+                *("apt-get", "install", "--yes", "--no-install-recommends"),
+                *("chromium", "libgl1-mesa-dri", "libegl1"),
+            ),
+        ),
+        needs_root=True,
+    ),
+    "dnf": Installer(
+        (("dnf", "install", "-y", "chromium", "mesa-dri-drivers", "mesa-libEGL"),), needs_root=True
+    ),
+    "pacman": Installer(
+        (("pacman", "-Sy", "--needed", "--noconfirm", "chromium", "mesa"),), needs_root=True
+    ),
+    "brew": Installer((("brew", "install", "--cask", "google-chrome"),), needs_root=False),
+}
+
+
+def find() -> Path | None:
+    """Path of the browser named by the environment, else of the first known one installed.
+
+    Raises BrowserError if the environment names a file that is not there.
+    """
+    named = os.environ.get(ENVIRONMENT_VARIABLE)
+    if named:
+        path = shutil.which(named)
+        if path is None:
+            raise BrowserError(
+                f"{ENVIRONMENT_VARIABLE}={named} is no program that can be run: "
+                "set it to the path of a Chromium or Chrome, or unset it"
+            )
+        return Path(path)
+    on_path = (Path(path) for name in NAMES if (path := shutil.which(name)))
+    return next(on_path, next((path for path in APPLICATIONS if path.exists()), None))
+
+
+def version(path: Path) -> str:
+    """What the browser at path says of itself.
+
+    Raises BrowserError if it does not run.
+    """
+    try:
+        answer = subprocess.run(
+            [str(path), "--version"], capture_output=True, text=True, timeout=60, check=True
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        said = (getattr(error, "stderr", None) or str(error)).strip()
+        raise BrowserError(
+            f"{path} does not run ({said}): reinstall it, or set {ENVIRONMENT_VARIABLE} "
+            "to the path of another Chromium or Chrome"
+        ) from error
+    return answer.stdout.strip()
+
+
+def ensure() -> Path:
+    """Path of a browser that runs, installed first if there is none.
+
+    Raises BrowserError with what a person has to do if that cannot be done from here.
+    """
+    path = find()
+    if path is None:
+        _install()
+        path = find()
+    if path is None:
+        raise BrowserError(f"the installation brought none of {', '.join(NAMES)}. {_remedy()}")
+    version(path)
+    return path
+
+
+def _install() -> None:
+    manager = next((name for name in INSTALLERS if shutil.which(name)), None)
+    if manager is None:
+        raise BrowserError(f"no Chromium was found, nor a way to install one. {_remedy()}")
+    installer = INSTALLERS[manager]
+    prefix: tuple[str, ...] = ()
+    if installer.needs_root and os.geteuid() != 0:
+        prefix = ("sudo", "--non-interactive")
+        if not shutil.which("sudo") or subprocess.run([*prefix, "true"], check=False).returncode:
+            raise BrowserError(f"no Chromium was found, and root must install one. {_remedy()}")
+    for command in installer.commands:
+        print("Running:", *prefix, *command, flush=True)
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        status = subprocess.run([*prefix, *command], env=environment, check=False).returncode
+        if status:
+            raise BrowserError(f"`{' '.join(command)}` failed with status {status}. {_remedy()}")
+
+
+def _remedy() -> str:
+    manager = next((name for name in INSTALLERS if shutil.which(name)), "apt-get")
+    installer = INSTALLERS[manager]
+    sudo = "sudo " if installer.needs_root else ""
+    commands = " && ".join(sudo + " ".join(command) for command in installer.commands)
+    return (
+        f"Install Chromium or Chrome, for example: {commands}\n"
+        f"Or set {ENVIRONMENT_VARIABLE} to the path of one."
+    )
+
+
+@contextmanager
+def launched() -> Iterator[Browser]:
+    """A headless browser that draws WebGL 2 in software, closed at the end.
+
+    Raises BrowserError if there is none, or if none of RENDERERS draws.
+    """
+    path = ensure()
+    with sync_playwright() as playwright:
+        browser = _launch(playwright, path)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def _launch(playwright: Playwright, path: Path) -> Browser:
+    failures = []
+    for renderer, flags in RENDERERS.items():
+        if renderer == "llvmpipe" and sys.platform != "linux":
+            continue
+        try:
+            browser = playwright.chromium.launch(
+                executable_path=path,
+                args=[*FLAGS, *flags],
+                # The same renderer with and without a graphics card.
+                env={**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"},
+            )
+        except Error as error:
+            failures.append(f"{renderer}: {error}")
+            continue
+        page = browser.new_page()
+        if page.evaluate(HAS_WEBGL):
+            page.close()
+            return browser
+        failures.append(f"{renderer}: no WebGL 2")
+        browser.close()
+    raise BrowserError(f"{path} cannot draw WebGL 2 ({'; '.join(failures)}). {_remedy()}")
+
+
+def main() -> None:
+    """Print the browser that tests will use, installing it if need be."""
+    try:
+        path = ensure()
+        print(f"Browser for the tests: {path} ({version(path)})")
+    except BrowserError as error:
+        raise SystemExit(f"katana450 tests need a browser: {error}") from error
+
+
+if __name__ == "__main__":
+    main()

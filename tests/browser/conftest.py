@@ -1,0 +1,110 @@
+"""One browser for all tests here, windows on servers, and pictures of what failed."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import pytest
+from playwright.sync_api import Browser
+from playwright.sync_api import Error as PlaywrightError
+
+from tests.browser.chromium import launched
+from tests.browser.page import ViserPage
+
+ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
+
+
+class Windows:
+    """The windows that are open in one browser."""
+
+    def __init__(self, browser: Browser) -> None:
+        self._browser = browser
+        self._pages: list[ViserPage] = []
+
+    @contextmanager
+    def open(self, url: str, **options: Any) -> Iterator[ViserPage]:
+        """A window for as long as the block lasts; options as ViserPage.open has them."""
+        page = ViserPage.open(self._browser, url, **options)
+        self._pages.append(page)
+        try:
+            yield page
+        finally:
+            self._pages.remove(page)
+            page.close()
+
+    def save(self, stem: str) -> None:
+        """Save a picture of each window and the errors on its console, as files `stem`-N."""
+        ARTEFACTS.mkdir(exist_ok=True)
+        for number, page in enumerate(self._pages, start=1):
+            errors = "".join(f"{error}\n" for error in page.errors)
+            (ARTEFACTS / f"{stem}-{number}.log").write_text(errors, encoding="utf-8")
+            try:
+                page.screenshot(ARTEFACTS / f"{stem}-{number}.png")
+            except PlaywrightError as error:  # the page may have crashed, which is the news
+                print(f"window {number} gave no picture: {error}")
+
+
+WINDOWS = pytest.StashKey[Windows]()
+
+
+class OpenPage(Protocol):
+    """Opens a window that closes with the test; options as ViserPage.open has them."""
+
+    def __call__(self, url: str, **options: Any) -> ViserPage: ...
+
+
+# Playwright keeps an asyncio loop running in this thread, in which no other test can run one. So
+# the browser ends with this folder's tests, not with the session.
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Browser]:
+    """A headless browser that draws WebGL in software."""
+    before = set(threading.enumerate())
+    with launched() as browser:
+        yield browser
+    # asyncio waits for the browser's process in a thread that ends a moment after it.
+    for thread in set(threading.enumerate()) - before:
+        thread.join(THREAD_SECONDS)
+    left = set(threading.enumerate()) - before
+    assert not left, f"the browser left threads behind: {left}"
+
+
+@pytest.fixture(scope="package")
+def windows(browser: Browser, request: pytest.FixtureRequest) -> Windows:
+    """Opens windows for fixtures that outlive a test; when a test fails, each is saved."""
+    windows = Windows(browser)
+    request.session.stash[WINDOWS] = windows
+    return windows
+
+
+@pytest.fixture
+def open_page(windows: Windows) -> Iterator[OpenPage]:
+    """Opens windows that close with the test."""
+    with ExitStack() as stack:
+
+        def open_page(url: str, **options: Any) -> ViserPage:
+            return stack.enter_context(windows.open(url, **options))
+
+        yield open_page
+
+
+@pytest.fixture(scope="session")
+def artefacts() -> Path:
+    """Folder for pictures and other evidence, outside version control."""
+    ARTEFACTS.mkdir(exist_ok=True)
+    return ARTEFACTS
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Save what the windows show at the moment a test fails."""
+    report = yield
+    if report.failed and (windows := item.session.stash.get(WINDOWS, None)):
+        windows.save(re.sub(r"[^\w.-]+", "-", f"{item.path.stem}-{item.name}").strip("-"))
+    return report

@@ -1,0 +1,101 @@
+"""A hand on a gizmo: the mouse holds one handle and moves it by metres or radians."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from tests.browser.page import Pixel, ViserPage
+
+Array = NDArray[np.floating[Any]]
+
+
+class Grip(ABC):
+    """Context manager that presses the mouse on a handle and releases it at the end.
+
+    `hit` (3,) is where the press meets the handle and `matrix` (4,4) the handle's pose, both in
+    three.js's world. Raises AssertionError if the press does not start a drag.
+    """
+
+    def __init__(self, page: ViserPage, node: str, pixel: Pixel, hit: Array, matrix: Array) -> None:
+        self._page = page
+        self._mouse = page.page.mouse
+        self._node = node
+        self._pixel = pixel
+        self._hit = hit
+        self._origin = matrix[:3, 3]
+        self._axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
+        self._value = 0.0
+
+    @abstractmethod
+    def _point_at(self, value: float) -> Array:
+        """Point (3,) of three.js's world that the mouse must point at to reach the value."""
+
+    def to(self, value: float) -> None:
+        """Move the handle to a value counted from where it was taken."""
+        self._mouse.move(*self._page.project_three(self._point_at(value)))
+        self._value = value
+
+    def sweep(self, value: float, steps: int) -> None:
+        """Move the handle to a value in equal steps from where it is."""
+        for step in np.linspace(self._value, value, steps + 1)[1:]:
+            self.to(float(step))
+
+    def __enter__(self) -> Self:
+        started = self._count("Start")
+        self._mouse.move(*self._pixel)
+        self._mouse.down()
+        try:
+            self._page.wait_until(
+                lambda: self._count("Start") > started, f"a drag of {self._node} to start"
+            )
+        except BaseException:
+            self._mouse.up()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        ended = self._count("End")
+        self._mouse.up()
+        if error is None:
+            # A page that has lost its server drops the message.
+            self._page.wait_until(
+                lambda: self._count("End") > ended or not self._page.connected,
+                f"the drag of {self._node} to end",
+            )
+
+    def _count(self, phase: str) -> int:
+        sent = self._page.sent(f"TransformControlsDrag{phase}Message")
+        return sum(each.body["name"] == self._node for each in sent)
+
+
+class ArrowGrip(Grip):
+    """Holds an arrow, which lies along y of its own frame; values are metres."""
+
+    def _point_at(self, value: float) -> Array:
+        # drei moves the control by the point of this line that is nearest to the mouse's ray.
+        point: Array = self._hit + value * self._axes[:, 1]
+        return point
+
+
+class RingGrip(Grip):
+    """Holds a ring in the x-y plane of its own frame; values are radians about z."""
+
+    def _point_at(self, value: float) -> Array:
+        # drei counts the angle in the ring's plane from the point that the press met.
+        x, y, _ = self._axes.T @ (self._hit - self._origin)
+        angle = math.atan2(y, x) + value
+        in_plane = np.array([math.cos(angle), math.sin(angle), 0.0]) * math.hypot(x, y)
+        point: Array = self._origin + self._axes @ in_plane
+        return point

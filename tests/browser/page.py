@@ -1,0 +1,310 @@
+"""A viser page in a real browser, driven by mouse and read through three.js and the wire."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Self
+from urllib.parse import urlencode
+
+import imageio.v3 as imageio
+import numpy as np
+import viser.transforms as vtf
+from numpy.typing import ArrayLike, NDArray
+from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
+
+from tests.browser.grip import ArrowGrip, Grip, RingGrip
+
+Matrix = NDArray[np.floating[Any]]
+Pixel = tuple[float, float]
+Axis = Literal["x", "y", "z"]
+
+SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("record.js", "scene.js"))
+# Wide enough for viser to dock its panel beside the scene.
+WINDOW = (1280, 800)
+READY_SECONDS = 60.0  # a software renderer compiles shaders for up to 22 s
+POLL_MILLISECONDS = 20.0
+DRAG_STEPS = 8
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where the browser looks from: viser's world, metres, `fov` vertical in radians."""
+
+    position: tuple[float, float, float] = (0.75, -0.7, 0.65)
+    look_at: tuple[float, float, float] = (0.2, 0.0, 0.22)
+    fov: float = 0.7
+
+    @property
+    def query(self) -> str:
+        """The camera as viser's page takes it in its address, with one pixel drawn per pixel."""
+        values = {
+            "initialCameraPosition": ",".join(map(str, self.position)),
+            "initialCameraLookAt": ",".join(map(str, self.look_at)),
+            "initialCameraFov": str(self.fov),
+            # Else viser draws in fewer pixels whenever the machine is slow.
+            "fixedDpr": "1",
+        }
+        return urlencode(values, safe=",")
+
+
+@dataclass(frozen=True)
+class Message:
+    """A decoded viser message: `time` in seconds since the epoch, as `time.time()` has it."""
+
+    time: float
+    type: str
+    body: dict[str, Any]
+
+
+class ViserPage:
+    """One browser window on a viser server.
+
+    Nodes are named as in viser's scene. Poses are 4x4 matrices, metres, radians; pixels are
+    counted from the window's top left corner.
+    """
+
+    def __init__(self, page: Page, errors: list[str]) -> None:
+        self.page = page
+        self.errors = errors
+
+    @classmethod
+    def open(
+        cls,
+        browser: Browser,
+        url: str,
+        *,
+        camera: Camera | None = None,
+        nodes: Sequence[str] = (),
+        stub_draws: bool = False,
+        shadows: bool = False,
+    ) -> Self:
+        """Open `url` in a window of its own and wait until the scene can be used.
+
+        `nodes` must be there besides whatever the server has sent by then. `stub_draws` leaves
+        out all WebGL drawing, for measuring; `shadows` are off because they are slow.
+        """
+        camera = camera or Camera()
+        width, height = WINDOW
+        context = browser.new_context(viewport={"width": width, "height": height})
+        options = json.dumps({"stubDraws": stub_draws, "shadows": shadows})
+        scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
+        context.add_init_script(f"window.harness = {options};\n{scripts}")
+        page = context.new_page()
+        errors: list[str] = []
+        page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        try:
+            page.goto(f"{url}/?{camera.query}")
+            viser_page = cls(page, errors)
+            viser_page.wait_ready(nodes)
+        except BaseException:
+            context.close()
+            raise
+        return viser_page
+
+    def close(self) -> None:
+        """Close the window."""
+        self.page.context.close()
+
+    # Waiting
+
+    def wait_until(
+        self, condition: Callable[[], object], what: str, *, seconds: float = 10.0
+    ) -> None:
+        """Return when the condition holds; raise AssertionError naming `what` if it never does."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, f"waited {seconds:g} s for {what}"
+            self.page.wait_for_timeout(POLL_MILLISECONDS)
+
+    def wait_ready(self, nodes: Sequence[str] = (), *, seconds: float = READY_SECONDS) -> None:
+        """Return when connected, with all nodes mounted in their poses and a frame drawn of them.
+
+        Raises AssertionError that names what is missing.
+        """
+        deadline = time.monotonic() + seconds
+        while missing := self.page.evaluate("(names) => harness.missing(names)", list(nodes)):
+            assert time.monotonic() < deadline, (
+                f"the page was not usable after {seconds:g} s; missing: {', '.join(missing)}"
+                + "".join(f"\n  console: {error}" for error in self.errors)
+            )
+            self.page.wait_for_timeout(POLL_MILLISECONDS)
+        self.wait_drawn()
+
+    def wait_drawn(self) -> None:
+        """Return when one more frame is drawn, with every message that had come before it."""
+        self.page.evaluate("() => harness.drawn()")
+
+    def wait_lost(self, *, seconds: float = 10.0) -> None:
+        """Return when the page has noticed that the server is away."""
+        self.wait_until(lambda: not self.connected, "the page to lose its server", seconds=seconds)
+
+    @property
+    def connected(self) -> bool:
+        """Whether the page's socket is open."""
+        state: str | None = self.page.evaluate("() => harness.links.at(-1)?.type ?? null")
+        return state == "connected"
+
+    # The wire
+
+    def messages(self, kind: str, *, since: float = 0.0) -> list[Message]:
+        """Messages of one type that the server sent, in order, `since` a time of `time.time()`."""
+        return self._recorded("received", kind, since)
+
+    def sent(self, kind: str, *, since: float = 0.0) -> list[Message]:
+        """Messages of one type that the page sent, likewise."""
+        return self._recorded("sent", kind, since)
+
+    def _recorded(self, log: str, kind: str, since: float) -> list[Message]:
+        found = self.page.evaluate(
+            """([log, type, since]) =>
+                harness[log].filter((each) => each.type === type && each.time >= since)""",
+            [log, kind, since],
+        )
+        return [Message(each["time"], each["type"], each["body"]) for each in found]
+
+    def last_pose(self, node: str) -> Matrix:
+        """T_parent_node as the server last sent it (4,4).
+
+        The server does not send a gizmo's pose back to the page that drags it. Raises
+        LookupError if it never sent one.
+        """
+        position, wxyz = (
+            [each.body for each in self.messages(kind) if each.body["name"] == node]
+            for kind in ("SetPositionMessage", "SetOrientationMessage")
+        )
+        if not position and not wxyz:
+            raise LookupError(f"the server sent no pose of {node}")
+        rotation = vtf.SO3(np.array(wxyz[-1]["wxyz"] if wxyz else (1.0, 0.0, 0.0, 0.0)))
+        translation = np.array(position[-1]["position"] if position else (0.0, 0.0, 0.0))
+        return vtf.SE3.from_rotation_and_translation(rotation, translation).as_matrix()
+
+    # The scene
+
+    def node_pose(self, node: str) -> Matrix:
+        """T_world_node as three.js drew it (4,4), with every message handled that had come."""
+        poses = self.page.evaluate("(name) => harness.poses(name)", node)
+        T_three_world, T_three_node = _matrix(poses["root"]), _matrix(poses["node"])
+        return np.linalg.solve(T_three_world, T_three_node)
+
+    def project(self, point: ArrayLike) -> Pixel:
+        """Pixel at which the browser draws a point (3,) of viser's world, in metres."""
+        view = self.page.evaluate("() => harness.view()")
+        return self._pixel(view, _matrix(view["root"]) @ [*np.asarray(point, float), 1.0])
+
+    def project_three(self, point: ArrayLike) -> Pixel:
+        """Pixel at which the browser draws a point (3,) of three.js's world, in metres."""
+        return self._pixel(self.page.evaluate("() => harness.view()"), np.append(point, 1.0))
+
+    def _pixel(self, view: dict[str, Any], point: Matrix) -> Pixel:
+        clip = _matrix(view["projection"]) @ _matrix(view["inverse"]) @ point
+        x, y = clip[:2] / clip[3]
+        left, top, width, height = view["rectangle"]
+        return left + (1 + x) / 2 * width, top + (1 - y) / 2 * height
+
+    # Dragging in the scene
+
+    def grip_arrow(self, node: str, axis: Axis) -> Grip:
+        """Take hold of the arrow along a control's own axis; values are metres along it."""
+        spot = self.page.evaluate("(which) => harness.grip(...which)", [node, "arrow", axis])
+        matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
+        return ArrowGrip(self, node, spot["pixel"], hit, matrix)
+
+    def grip_ring(self, node: str, axis: Axis) -> Grip:
+        """Take hold of the ring about a control's own axis; values are radians about it."""
+        spot = self.page.evaluate("(which) => harness.grip(...which)", [node, "ring", axis])
+        matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
+        return RingGrip(self, node, spot["pixel"], hit, matrix)
+
+    def drag_arrow(self, node: str, axis: Axis, metres: float, *, steps: int = DRAG_STEPS) -> None:
+        """Drag a control along one of its own axes and let go."""
+        with self.grip_arrow(node, axis) as grip:
+            grip.sweep(metres, steps)
+
+    def drag_ring(self, node: str, axis: Axis, radians: float, *, steps: int = DRAG_STEPS) -> None:
+        """Turn a control about one of its own axes, right-handed, and let go."""
+        with self.grip_ring(node, axis) as grip:
+            grip.sweep(radians, steps)
+
+    # The panel
+
+    def _label(self, label: str) -> Locator:
+        named = self.page.locator("label").filter(has_text=re.compile(f"^{re.escape(label)}$"))
+        return named.filter(visible=True).first
+
+    def _labelled(self, label: str) -> Locator:
+        return self.page.locator(f'[id="{self._label(label).get_attribute("for")}"]')
+
+    def slider_value(self, label: str) -> float:
+        """Value that a slider shows, in its own unit."""
+        thumb = self._labelled(label).get_by_role("slider")
+        return float(thumb.get_attribute("aria-valuenow") or "nan")
+
+    def drag_slider(self, label: str, value: float, *, steps: int = DRAG_STEPS) -> float:
+        """Drag a slider's thumb to a value as nearly as pixels allow; return what it then shows."""
+        slider = self._labelled(label)
+        slider.scroll_into_view_if_needed()
+        thumb = slider.get_by_role("slider")
+        low, high = (float(thumb.get_attribute(f"aria-value{end}") or 0) for end in ("min", "max"))
+        track = slider.locator(".mantine-Slider-trackContainer").bounding_box()
+        assert track is not None, f"the slider {label} is not visible"
+        start, stop = (
+            track["x"] + track["width"] * (each - low) / (high - low)
+            for each in (self.slider_value(label), value)
+        )
+        y = track["y"] + track["height"] / 2
+        self.page.mouse.move(start, y)
+        self.page.mouse.down()
+        self.page.mouse.move(stop, y, steps=steps)
+        self.page.mouse.up()
+        return self.slider_value(label)
+
+    def type_number(self, label: str, value: float, *, index: int = 0) -> None:
+        """Type a number into the box beside a label, or into one of several boxes there."""
+        row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
+        row.locator("input:not([type=hidden])").nth(index).fill(str(value))
+
+    def click_button(self, label: str) -> None:
+        """Click the button with this text."""
+        self.page.get_by_role("button", name=label, exact=True).click()
+
+    def text_of(self, selector: str) -> str:
+        """Text that the first element for a CSS selector shows."""
+        return self.page.locator(selector).first.inner_text()
+
+    def panel_text(self) -> str:
+        """All text that viser shows, the panel's and that of its messages."""
+        return self.text_of("body")
+
+    # Evidence
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Colours of the window (height, width, 3), indexed by pixels as `project` gives them."""
+        self.wait_drawn()
+        return np.asarray(imageio.imread(self._png(), extension=".png")[..., :3])
+
+    def screenshot(self, path: Path) -> Path:
+        """Write a PNG of the window, or of the scene alone if the window cannot be had."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(self._png())
+        return path
+
+    def _png(self) -> bytes:
+        try:
+            # Given a path, Playwright would write it from a thread that it never ends.
+            return self.page.screenshot(timeout=20_000)
+        except PlaywrightTimeoutError:
+            # The browser waits for a frame in vain while shaders compile; the canvas does not.
+            data: str = self.page.evaluate("() => __viserMutable.canvas.toDataURL('image/png')")
+            return base64.b64decode(data.partition(",")[2])
+
+
+def _matrix(elements: Sequence[float]) -> Matrix:
+    return np.array(elements, float).reshape(4, 4).T

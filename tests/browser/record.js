@@ -1,0 +1,70 @@
+// Runs in every frame before any script of the page. `harness` holds the options already.
+(() => {
+  "use strict";
+  const MAX_NUMBERS = 64; // longer arrays (meshes, images) are recorded by their length
+
+  harness.received = []; // {time, type, body}: decoded messages from the server
+  harness.sent = []; //     {time, type, body}: messages to the server
+  harness.links = []; //    {time, type}: "connected" and "closed"
+  harness.now = () => (performance.timeOrigin + performance.now()) / 1000; // s since the epoch
+
+  function plain(value) {
+    if (ArrayBuffer.isView(value))
+      return value.length <= MAX_NUMBERS ? Array.from(value) : { length: value.length };
+    if (Array.isArray(value))
+      return value.length <= MAX_NUMBERS ? value.map(plain) : { length: value.length };
+    if (value === null || typeof value !== "object") return value;
+    return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, plain(item)]));
+  }
+
+  function note(log, message) {
+    log.push({ time: harness.now(), type: message.type, body: plain(message) });
+  }
+
+  // viser's socket lives in a worker, which hands decoded messages to the page.
+  window.Worker = class extends Worker {
+    constructor(...args) {
+      super(...args);
+      // Before the page's own listener, which is set after construction.
+      this.addEventListener("message", ({ data }) => {
+        if (data?.type === "message_batch")
+          for (const message of data.messages) note(harness.received, message);
+        else if (data?.type === "connected" || data?.type === "closed")
+          harness.links.push({ time: harness.now(), type: data.type });
+      });
+    }
+    postMessage(data, ...rest) {
+      if (data?.type === "send") note(harness.sent, data.message);
+      super.postMessage(data, ...rest);
+    }
+  };
+
+  // Software rendering is slow: no antialiasing, and no drawing at all where asked.
+  const DRAWS = ["drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"];
+  const UNMASKED_RENDERER_WEBGL = 0x9246;
+  const getContext = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, attributes) {
+    if (!/^webgl/.test(kind)) return getContext.call(this, kind, attributes);
+    const gl = getContext.call(this, kind, { ...attributes, antialias: false });
+    if (gl === null || gl.recorded) return gl;
+    gl.recorded = true;
+    if (harness.stubDraws) for (const name of DRAWS) gl[name] = () => {};
+    // The name of a software renderer makes viser cover the scene with a warning.
+    const getParameter = gl.getParameter;
+    gl.getParameter = (name) =>
+      name === UNMASKED_RENDERER_WEBGL ? "not named in tests" : getParameter.call(gl, name);
+    return gl;
+  };
+
+  // viser offers its state here as soon as there is a renderer, before the first frame.
+  let viewer;
+  Object.defineProperty(window, "__viserMutable", {
+    configurable: true,
+    get: () => viewer,
+    set: (value) => {
+      viewer = value;
+      const { shadowMap } = value.scene.__r3f.root.getState().gl;
+      Object.defineProperty(shadowMap, "enabled", { get: () => harness.shadows, set: () => {} });
+    },
+  });
+})();

@@ -1,0 +1,174 @@
+"""A server run as a person runs it: a process of its own that can be killed and started again."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Self
+
+ROOT = Path(__file__).resolve().parents[2]
+APP = (sys.executable, "-m", "app", "serve", "--port", "{port}")
+BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
+
+# Below the ports that systems hand to outgoing connections, so that none of those can take the
+# port while a killed server is away.
+PORTS = range(8200, 8300)
+READY = re.compile(r"is ready: (https?://\S+)")
+KEPT_LINES = 400
+
+
+class ServerError(RuntimeError):
+    """The server did not start or stop; the message ends with what it printed."""
+
+
+def free_port() -> int:
+    """A port of PORTS on which nobody listens. Raises ServerError if all are taken."""
+    for attempt in range(len(PORTS)):
+        # Each process begins at a place of its own, so that parallel runs seldom meet.
+        port = PORTS[(os.getpid() + attempt) % len(PORTS)]
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return port
+    raise ServerError(f"no port from {PORTS[0]} to {PORTS[-1]} is free on 127.0.0.1")
+
+
+class AppServer:
+    """Context manager around a server process.
+
+    `command` holds ``{port}`` where the port belongs, and the process prints a line
+    ``… is ready: URL`` once it can be used. `seconds` limits each start and each stop.
+    """
+
+    def __init__(
+        self, command: Sequence[str] = APP, *, port: int | None = None, seconds: float = 60.0
+    ) -> None:
+        self.port = free_port() if port is None else port
+        self.url = f"http://127.0.0.1:{self.port}"
+        self._command = [part.replace("{port}", str(self.port)) for part in command]
+        self._seconds = seconds
+        self._lines: deque[str] = deque(maxlen=KEPT_LINES)
+        self._process: subprocess.Popen[str] | None = None
+        self._reader: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    @property
+    def output(self) -> str:
+        """The last lines that the process printed, in both streams."""
+        return "\n".join(self._lines)
+
+    @property
+    def running(self) -> bool:
+        """Whether the process lives."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Start the process and return when it is ready.
+
+        Raises ServerError if it dies first, takes longer than allowed or serves elsewhere.
+        """
+        if self.running:
+            raise ServerError(f"{self._name} runs already")
+        self._process = subprocess.Popen(
+            self._command,
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            # Its own group, so that kill() also ends what it started.
+            start_new_session=True,
+        )
+        # A pipe that nobody reads fills up and stops the writer.
+        ready: SimpleQueue[str | None] = SimpleQueue()
+        self._reader = threading.Thread(target=self._read, args=(self._process, ready), daemon=True)
+        self._reader.start()
+        try:
+            url = ready.get(timeout=self._seconds)
+        except Empty:
+            reason = f"was not ready after {self._seconds:g} s"
+        else:
+            if url == self.url:
+                return
+            reason = (
+                f"ended before it was ready, with status {self._process.wait()}"
+                if url is None
+                else f"is at {url} instead of {self.url}"
+            )
+        self.kill()
+        raise ServerError(f"{self._name} {reason}. It printed:\n{self.output or '(nothing)'}")
+
+    def stop(self) -> None:
+        """End the process as Ctrl-C does. Raises ServerError if it has to be killed instead."""
+        if self._process is not None and self.running:
+            os.killpg(self._process.pid, signal.SIGINT)
+            try:
+                self._process.wait(self._seconds)
+            except subprocess.TimeoutExpired as error:
+                self.kill()
+                raise ServerError(
+                    f"{self._name} did not end in {self._seconds:g} s after Ctrl-C. "
+                    f"It printed:\n{self.output}"
+                ) from error
+        self._collect()
+
+    def kill(self) -> None:
+        """End the process and its children at once, without a farewell (SIGKILL)."""
+        if self._process is not None and self.running:
+            self._process.kill()
+        self._collect()
+
+    def restart(self) -> None:
+        """Start anew on the same port; kills first if the process still runs."""
+        self.kill()
+        self.start()
+
+    @property
+    def _name(self) -> str:
+        return f"`{' '.join(self._command)}`"
+
+    def _read(self, process: subprocess.Popen[str], ready: SimpleQueue[str | None]) -> None:
+        """Keep what the process prints; put its address once known, and None at its end."""
+        assert process.stdout is not None
+        with process.stdout as stream:
+            for line in stream:
+                self._lines.append(line.rstrip())
+                if match := READY.search(line):
+                    ready.put(match[1].rstrip("/"))
+        ready.put(None)
+
+    def _collect(self) -> None:
+        if self._process is not None:
+            self._process.wait()
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        if self._reader is not None:
+            self._reader.join()
+        self._process = self._reader = None

@@ -1,0 +1,328 @@
+"""The app through a real browser: what a person does with a mouse, and what the browser is sent."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.control.state import Status
+from app.geometry import so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.settings import Settings
+from app.view.view import GHOST_COLOURS
+from tests.browser.conftest import OpenPage, Windows
+from tests.browser.page import Message, ViserPage
+from tests.browser.server import AppServer
+
+AXES = tuple(f"Axis {number}" for number in range(1, 6))
+READY = np.array(Settings().ready)
+MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
+
+# A dragged handle lands within a pixel of where it was meant: 1 mm from this far away.
+PIXEL = 2e-3
+
+
+class Robot:
+    """What a page shows and was sent of the arm."""
+
+    def __init__(self, page: ViserPage, model: RobotModel) -> None:
+        self.page = page
+        self.since = 0.0
+        """Only what was sent from this time on counts: another server may have spoken before."""
+        self._model = model
+        self.path: dict[str, str] = {}
+        for body in model.bodies:
+            above = "/arm" if body.parent is None else self.path[body.parent]
+            self.path[body.name] = f"{above}/{body.name}"
+
+    @property
+    def q(self) -> FloatArray:
+        """The joints [rad] that the sliders report."""
+        return np.radians([self.page.slider_value(label) for label in AXES])
+
+    def reported(self, tool: str = "tcp") -> FloatArray:
+        """The tool's pose in the base frame by the product of exponentials of those joints."""
+        return self._model.T_base_shoulder @ forward(self._model.arm.chain_to(tool), self.q)
+
+    def sent(self, link: str = "tcp") -> FloatArray:
+        """The link's pose in the base frame as the frames on the wire add up to it."""
+        parts = self.path[link].split("/")
+        T = np.eye(4)
+        for end in range(3, len(parts) + 1):
+            T = T @ self._sent_pose("/".join(parts[:end]))
+        return T
+
+    def _sent_pose(self, node: str) -> FloatArray:
+        """T_parent_node; viser sends none of a node that stays as it is made, at its parent."""
+        T = np.eye(4)
+        for message in self._of(node, "SetPositionMessage")[-1:]:
+            T[:3, 3] = message.body["position"]
+        for message in self._of(node, "SetOrientationMessage")[-1:]:
+            T[:3, :3] = so3.from_quaternion(message.body["wxyz"])
+        assert self._of(node, "FrameMessage"), f"the server never made {node}"
+        return T
+
+    def _of(self, node: str, kind: str) -> list[Message]:
+        heard = self.page.messages(kind, since=self.since)
+        return [message for message in heard if message.body["name"] == node]
+
+    def drawn(self, link: str = "tcp") -> FloatArray:
+        """The link's pose in the base frame as three.js drew it."""
+        return self.page.node_pose(self.path[link])
+
+    def gizmo(self) -> FloatArray:
+        """Where the handle is drawn, (3,) [m] in the base frame."""
+        return self.page.node_pose(MOVE)[:3, 3]
+
+    def settle(self) -> None:
+        """Wait until the arm is where the sliders say, and check that all accounts agree."""
+
+        def arrived() -> bool:
+            return np.allclose(self.sent(), self.reported(), atol=1e-6)
+
+        self.page.wait_until(arrived, "the arm to arrive where the sliders say")
+        self.page.wait_drawn()
+        assert np.allclose(self.drawn(), self.reported(), atol=1e-5)
+        assert np.allclose(self.gizmo(), self.reported()[:3, 3], atol=1e-5)
+
+    def said(self) -> str:
+        """The status and its sentence."""
+        return self.page.text_of(".k450 .status")
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def window(server: AppServer, windows: Windows, model: RobotModel) -> Iterator[Robot]:
+    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        yield Robot(page, model)
+
+
+@pytest.fixture
+def robot(window: Robot) -> Iterator[Robot]:
+    """A window on the running app, the arm at home."""
+    go_home(window)
+    yield window
+    assert window.page.errors == []
+
+
+def go_home(robot: Robot) -> None:
+    robot.page.click_button("Home")
+    robot.page.wait_until(lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders at home")
+    robot.settle()
+
+
+def pitch_of(T: FloatArray) -> float:
+    return math.asin(-T[2, 0])
+
+
+def test_the_arm_follows_the_arrow_it_is_dragged_by(robot: Robot, artefacts: Path) -> None:
+    start = robot.drawn()
+    robot.page.drag_arrow(MOVE, "z", 0.06)
+    robot.settle()
+    end = robot.drawn()
+    assert end[:3, 3] - start[:3, 3] == pytest.approx([0.0, 0.0, 0.06], abs=PIXEL)
+    assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
+    assert "On target" in robot.said()
+    robot.page.screenshot(artefacts / "app-arrow.png")
+
+
+def test_dragged_sideways_the_tool_turns_with_the_arm_and_nothing_is_lost(robot: Robot) -> None:
+    start = robot.drawn()
+    robot.page.drag_arrow(MOVE, "y", 0.12)
+    robot.settle()
+    end = robot.drawn()
+    assert end[:3, 3] - start[:3, 3] == pytest.approx([0.0, 0.12, 0.0], abs=PIXEL)
+    yaw = math.atan2(end[1, 0], end[0, 0])
+    assert yaw == pytest.approx(math.atan2(end[1, 3], end[0, 3]), abs=1e-6)
+    assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
+
+
+def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: Path) -> None:
+    start = robot.drawn()
+    robot.page.drag_ring(PITCH, "y", 0.25)
+    robot.settle()
+    end = robot.drawn()
+    assert end[:3, 3] == pytest.approx(start[:3, 3], abs=1e-6)
+    assert pitch_of(end) - pitch_of(start) == pytest.approx(0.25, abs=0.01)
+    robot.page.screenshot(artefacts / "app-pitch.png")
+
+
+def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
+    start = robot.drawn()
+    before = robot.q
+    robot.page.drag_ring(ROLL, "x", -0.5)
+    robot.settle()
+    assert robot.drawn()[:3, 3] == pytest.approx(start[:3, 3], abs=1e-6)
+    assert robot.drawn()[:3, 0] == pytest.approx(start[:3, 0], abs=1e-6)
+    turned = robot.q - before
+    assert turned[:4] == pytest.approx(np.zeros(4), abs=1e-6)
+    assert turned[4] == pytest.approx(-0.5, abs=0.01)
+
+
+def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artefacts: Path) -> None:
+    shown = robot.page.drag_slider("Axis 1", 60.0)
+    assert shown == pytest.approx(60.0, abs=4.0)
+    robot.settle()
+    assert robot.q[0] == pytest.approx(math.radians(shown), abs=1e-9)
+    assert robot.q[1:] == pytest.approx(READY[1:], abs=1e-6)
+    robot.page.screenshot(artefacts / "app-slider.png")
+
+
+def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot, model: RobotModel) -> None:
+    node = robot.path["pan_link"]
+    robot.page.drag_slider("Axis 1", 120.0)
+    robot.settle()
+    turns = [m for m in robot.page.messages("SetOrientationMessage") if m.body["name"] == node]
+    turns = turns[-20:]
+    angles = np.array([2.0 * math.atan2(m.body["wxyz"][3], m.body["wxyz"][0]) for m in turns])
+    steps, whole = np.abs(np.diff(angles)), abs(angles[-1] - angles[0])
+    speed = model.arm.chain.speed[0]
+    took = turns[-1].time - turns[0].time
+    assert len(turns) == 20
+    # Frames jitter on their way; over all of them the speed is the joint's, and none is a leap.
+    assert whole / took <= speed * 1.1
+    assert steps.max() < 0.25 * whole
+
+
+def test_the_gripper_slider_moves_both_fingers(robot: Robot) -> None:
+    robot.page.drag_slider("Gripper", 0.0)
+    closed = [finger_turn(robot, name) for name in ("finger_right_link", "finger_left_link")]
+    robot.page.drag_slider("Gripper", 100.0)
+    opened = [finger_turn(robot, name) for name in ("finger_right_link", "finger_left_link")]
+    assert closed[0] == pytest.approx(-closed[1], abs=1e-6)
+    assert opened[0] == pytest.approx(-opened[1], abs=1e-6)
+    assert abs(opened[0] - closed[0]) == pytest.approx(0.74, abs=0.03)
+
+
+def finger_turn(robot: Robot, link: str) -> float:
+    """The finger's turn about z [rad] as last sent, once it has come to rest."""
+    seen: list[float] = []
+
+    def resting() -> bool:
+        R = robot.page.last_pose(robot.path[link])[:3, :3]
+        seen.append(math.atan2(R[1, 0], R[0, 0]))
+        return len(seen) > 10 and seen[-1] == seen[-10]
+
+    robot.page.wait_until(resting, f"{link} to come to rest")
+    return seen[-1]
+
+
+def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
+    robot: Robot, artefacts: Path
+) -> None:
+    page = robot.page
+    with page.grip_arrow(MOVE, "x") as grip:
+        grip.sweep(0.4, 8)
+        page.wait_until(lambda: "out of reach" in robot.said(), "the reason")
+        held = robot.gizmo()
+        said = robot.said()
+        page.screenshot(artefacts / "app-out-of-reach.png")
+        robot.page.wait_until(
+            lambda: np.allclose(robot.sent(), robot.reported(), atol=1e-6), "the arm to arrive"
+        )
+        gap = float(np.linalg.norm(held - robot.drawn()[:3, 3]))
+        assert f"{1e3 * gap:.0f} mm out of reach" in said
+    # Let go, the handle comes back to the tool, and the reason stays to be read.
+    page.wait_until(
+        lambda: np.allclose(robot.gizmo(), robot.drawn()[:3, 3], atol=1e-5), "the handle to return"
+    )
+    assert "out of reach" in robot.said()
+    colours = [
+        tuple(m.body["updates"]["color"])
+        for m in page.messages("SceneNodeUpdateMessage")
+        if m.body["name"].startswith("/ghost") and "color" in m.body["updates"]
+    ]
+    assert GHOST_COLOURS[Status.LIMITED] in colours
+    shown = [
+        m.body["visible"]
+        for m in page.messages("SetSceneNodeVisibilityMessage")
+        if m.body["name"] == "/ghost"
+    ]
+    assert True in shown
+    assert shown[-1] is False
+
+
+def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None:
+    page = robot.page
+    for label, values in (("x, y, z", (350.0, 0.0, 0.0)), ("r, p, y", (0.0, 30.0, 23.0))):
+        for index, value in enumerate(values):
+            page.type_number(label, value, index=index)
+    page.click_button("Go to pose")
+    page.wait_until(lambda: "yaw is fixed by position" in robot.said(), "the reason")
+    robot.settle()
+    assert robot.drawn()[:3, 3] == pytest.approx([0.35, 0.0, 0.2745], abs=1e-6)
+    # The tool's x axis leaves the arm's plane by asin(cos 30 sin 23).
+    off = math.degrees(math.asin(math.cos(math.radians(30.0)) * math.sin(math.radians(23.0))))
+    assert f"{off:.0f}° off" in robot.said()
+
+
+def test_every_browser_sees_the_same_arm_and_may_move_it(
+    robot: Robot, server: AppServer, open_page: OpenPage, model: RobotModel, artefacts: Path
+) -> None:
+    other = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
+    robot.page.drag_slider("Axis 1", -50.0)
+    robot.settle()
+    other.settle()
+    assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
+    other.page.drag_arrow(MOVE, "z", 0.05)
+    other.settle()
+    robot.settle()
+    assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
+    other.page.screenshot(artefacts / "app-second-browser.png")
+    assert other.page.errors == []
+
+
+def test_killed_and_restarted_the_app_comes_back_whole(
+    open_page: OpenPage, model: RobotModel, artefacts: Path
+) -> None:
+    with AppServer() as server:
+        robot = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
+        robot.page.drag_slider("Axis 1", 70.0)
+        robot.settle()
+        server.kill()
+        robot.page.wait_lost()
+        robot.since = time.time()
+        server.restart()
+        robot.page.wait_until(lambda: robot.page.connected, "the page to come back", seconds=20.0)
+        robot.page.wait_ready(("/arm", MOVE))
+        # A new arm stands at home: nothing of the old motion is left.
+        robot.page.wait_until(
+            lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders of the new server"
+        )
+        robot.settle()
+        sliders = robot.page.page.get_by_role("slider").count()
+        assert sliders == len(AXES) + 1
+        robot.page.drag_arrow(MOVE, "z", 0.05)
+        robot.settle()
+        robot.page.screenshot(artefacts / "app-restarted.png")
+
+
+def test_killed_in_mid_drag_the_app_comes_back_at_rest(
+    open_page: OpenPage, model: RobotModel
+) -> None:
+    with AppServer() as server:
+        robot = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
+        with robot.page.grip_arrow(MOVE, "z") as grip:
+            grip.sweep(0.05, 4)
+            server.kill()
+            robot.page.wait_lost()
+        robot.since = time.time()
+        server.restart()
+        robot.page.wait_until(lambda: robot.page.connected, "the page to come back", seconds=20.0)
+        robot.page.wait_ready(("/arm", MOVE))
+        robot.page.wait_until(
+            lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders of the new server"
+        )
+        robot.settle()

@@ -1,0 +1,232 @@
+"""The harness itself, against the barest viser app: what it drags and reads is what happens."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import viser.transforms as vtf
+from playwright.sync_api import Error as PlaywrightError
+
+from tests.browser import chromium
+from tests.browser.conftest import OpenPage, Windows
+from tests.browser.page import Axis, Matrix, ViserPage
+from tests.browser.server import BARE_APP, AppServer, ServerError
+
+MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
+BOX, DIAL = "/arm/box", "/arm/dial"
+NODES = (MOVE, PITCH, ROLL, BOX, DIAL)
+START = (0.25, 0.0, 0.25)
+# A pixel of the slider is some degrees wide.
+SLIDER_PIXEL_DEGREES = 340.0 / 100.0
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    """The bare app, running."""
+    with AppServer(BARE_APP) as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def window(windows: Windows, server: AppServer) -> Iterator[ViserPage]:
+    """One window on the bare app for all tests here."""
+    with windows.open(server.url, nodes=NODES) as window:
+        yield window
+
+
+@pytest.fixture
+def page(window: ViserPage) -> Iterator[ViserPage]:
+    """That window, with the box at its start and no error on the console."""
+    page = window
+    page.click_button("Reset")
+    page.wait_until(
+        lambda: np.allclose(page.node_pose(BOX), _at(START), atol=1e-9), "the box at its start"
+    )
+    yield page
+    assert page.errors == []
+
+
+def _at(position: tuple[float, float, float]) -> Matrix:
+    return vtf.SE3.from_translation(np.array(position)).as_matrix()
+
+
+def _rotation_vector(T: Matrix) -> Matrix:
+    return vtf.SO3.from_matrix(T[:3, :3]).log()
+
+
+@pytest.mark.parametrize(("axis", "metres"), [("x", -0.06), ("y", 0.05), ("z", 0.07)])
+def test_an_arrow_moves_the_box_along_its_axis(page: ViserPage, axis: Axis, metres: float) -> None:
+    page.drag_arrow(MOVE, axis, metres)
+    moved = page.node_pose(BOX)[:3, 3] - START
+    along = "xyz".index(axis)
+    assert moved[along] == pytest.approx(metres, abs=1e-5)
+    assert np.delete(moved, along) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("node", "axis", "radians"), [(PITCH, "y", 0.5), (PITCH, "y", -0.7), (ROLL, "x", 0.6)]
+)
+def test_a_ring_turns_the_box_about_its_axis(
+    page: ViserPage, node: str, axis: Axis, radians: float
+) -> None:
+    page.drag_ring(node, axis, radians)
+    turned = _rotation_vector(page.node_pose(BOX))
+    assert turned == pytest.approx(radians * np.eye(3)["xyz".index(axis)], abs=1e-4)
+    assert page.node_pose(BOX)[:3, 3] == pytest.approx(START, abs=1e-6)
+
+
+def test_a_slider_is_dragged_by_mouse(page: ViserPage) -> None:
+    for degrees in (75.0, -120.0):
+        shown = page.drag_slider("Axis 1", degrees)
+        assert shown == pytest.approx(degrees, abs=SLIDER_PIXEL_DEGREES)
+        page.wait_until(
+            lambda shown=shown: np.allclose(  # type: ignore[misc]
+                _rotation_vector(page.node_pose(DIAL)), [0.0, 0.0, math.radians(shown)], atol=1e-9
+            ),
+            f"the dial at {shown} degrees",
+        )
+    assert "Axis 1" in page.panel_text()
+
+
+def test_a_number_is_typed_beside_a_slider(page: ViserPage) -> None:
+    page.type_number("Axis 1", 33.3)
+    assert page.slider_value("Axis 1") == 33.3
+    page.wait_until(
+        lambda: np.allclose(
+            _rotation_vector(page.node_pose(DIAL)), [0.0, 0.0, math.radians(33.3)], atol=1e-9
+        ),
+        "the dial at 33.3 degrees",
+    )
+
+
+def test_a_second_window_sees_the_same_pose(
+    page: ViserPage, open_page: OpenPage, server: AppServer
+) -> None:
+    other = open_page(server.url, nodes=NODES)
+    page.drag_arrow(MOVE, "z", 0.04)
+    page.drag_ring(ROLL, "x", 0.4)
+    pose = page.node_pose(BOX)
+    assert not np.allclose(pose, _at(START), atol=0.03)
+    other.wait_until(
+        lambda: np.allclose(other.node_pose(BOX), pose, atol=1e-9), "the box in the second window"
+    )
+    # The window that drags is not told the gizmo's pose, the other one is.
+    assert other.node_pose(MOVE) == pytest.approx(page.node_pose(MOVE), abs=1e-9)
+    assert other.last_pose(MOVE)[2, 3] == pytest.approx(START[2] + 0.04, abs=1e-3)
+
+
+def test_messages_are_recorded_with_their_time(page: ViserPage) -> None:
+    before = time.time()
+    page.drag_arrow(MOVE, "x", 0.03)
+    page.wait_until(
+        lambda: page.last_pose(BOX)[0, 3] == pytest.approx(START[0] + 0.03, abs=1e-3),
+        "the box's last pose on the wire",
+    )
+    assert page.last_pose(BOX) == pytest.approx(page.node_pose(BOX), abs=1e-9)
+    [start] = page.sent("TransformControlsDragStartMessage", since=before)
+    poses = page.messages("SetPositionMessage", since=before)
+    assert start.body["name"] == MOVE
+    assert {pose.body["name"] for pose in poses} == {BOX}
+    times = [before, start.time, *(pose.time for pose in poses), time.time()]
+    assert times == sorted(times)
+    with pytest.raises(LookupError, match="/nowhere"):
+        page.last_pose("/nowhere")
+
+
+def test_the_box_is_drawn_where_it_is_projected(page: ViserPage, artefacts: Path) -> None:
+    red, _, blue = np.moveaxis(page.picture().astype(int), -1, 0)
+    x, y = (round(value) for value in page.project(START))
+    assert red[y, x] > blue[y, x] + 50  # orange
+    assert abs(red[y + 150, x] - blue[y + 150, x]) < 10  # the background is grey
+    assert page.screenshot(artefacts / "bare-app.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_page_outlives_its_server(open_page: OpenPage) -> None:
+    with AppServer(BARE_APP) as server:
+        page = open_page(server.url, nodes=NODES)
+        with page.grip_arrow(MOVE, "z") as grip:
+            grip.to(0.05)
+            server.kill()
+            page.wait_lost()
+        assert page.node_pose(BOX)[2, 3] > START[2]  # the last picture stays
+        server.restart()
+        page.wait_ready(NODES)
+        assert page.node_pose(BOX) == pytest.approx(_at(START), abs=1e-9)
+        page.drag_arrow(MOVE, "y", -0.05)
+        assert page.node_pose(BOX)[1, 3] == pytest.approx(-0.05, abs=1e-3)
+        assert page.page.get_by_role("button", name="Reset").count() == 1
+
+
+def test_what_is_not_there_is_named(page: ViserPage) -> None:
+    with pytest.raises(AssertionError, match="missing: /nowhere"):
+        page.wait_ready(["/nowhere"], seconds=0.2)
+    with pytest.raises(PlaywrightError, match=r"has no ring z; it has: ring y"):
+        page.grip_ring(PITCH, "z")
+
+
+def test_a_server_that_dies_shows_its_output() -> None:
+    command = (sys.executable, "-c", "raise SystemExit('no arm on port {port}')")
+    server = AppServer(command, seconds=20.0)
+    with pytest.raises(ServerError, match=f"with status 1(.|\n)*no arm on port {server.port}"):
+        server.start()
+    assert not server.running
+
+
+def test_a_server_that_is_never_ready_is_ended() -> None:
+    server = AppServer((sys.executable, "-c", "import time; time.sleep(60)"), seconds=0.3)
+    with pytest.raises(ServerError, match=r"not ready after 0\.3 s"):
+        server.start()
+    assert not server.running
+
+
+def test_a_wrong_browser_in_the_environment_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(chromium.ENVIRONMENT_VARIABLE, "/nowhere/chromium")
+    with pytest.raises(chromium.BrowserError, match="KATANA450_BROWSER=/nowhere/chromium"):
+        chromium.find()
+
+
+@pytest.fixture
+def bare_path(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """An empty folder that is the whole PATH, on a machine without a browser."""
+    monkeypatch.delenv(chromium.ENVIRONMENT_VARIABLE, raising=False)
+    monkeypatch.setattr(chromium, "APPLICATIONS", ())
+    monkeypatch.setenv("PATH", str(tmp_path))
+    return tmp_path
+
+
+def _write_program(path: Path, body: str) -> None:
+    path.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
+    path.chmod(0o755)
+
+
+def test_a_missing_browser_is_installed(bare_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    browser = bare_path / "chromium"
+    _write_program(bare_path / "sudo", 'shift; exec "$@"')
+    _write_program(
+        bare_path / "apt-get",
+        f"""[ "$1" = install ] || exit 0
+        printf '#!/bin/sh\\necho Chromium 1.2.3\\n' > {browser}
+        /bin/chmod +x {browser}""",
+    )
+    chromium.main()
+    assert f"Browser for the tests: {browser} (Chromium 1.2.3)" in capfd.readouterr().out
+
+
+def test_a_failed_installation_is_an_error(bare_path: Path) -> None:
+    _write_program(bare_path / "sudo", 'shift; exec "$@"')
+    _write_program(bare_path / "apt-get", "exit 100")
+    with pytest.raises(SystemExit, match="`apt-get update` failed with status 100"):
+        chromium.main()
+
+
+@pytest.mark.usefixtures("bare_path")
+def test_a_missing_browser_is_an_error_with_a_remedy() -> None:
+    with pytest.raises(SystemExit, match="Install Chromium or Chrome") as stopped:
+        chromium.main()
+    assert "KATANA450_BROWSER" in str(stopped.value)

@@ -1,0 +1,110 @@
+"""``katana450 serve`` as a person starts it: ready, refused, stopped."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from tests.browser.server import AppServer, ServerError, free_port
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def serve(*options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "app", "serve", *options],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_it_serves_the_page_on_this_machine_only() -> None:
+    with AppServer() as server:
+        with urllib.request.urlopen(server.url, timeout=10) as page:
+            assert page.status == 200
+        listening = Path("/proc/net/tcp")
+        if listening.exists():
+            port = f"{server.port:04X}"
+            addresses = {
+                line.split()[1].split(":")[0]
+                for line in listening.read_text(encoding="ascii").splitlines()[1:]
+                if line.split()[1].endswith(":" + port) and line.split()[3] == "0A"
+            }
+            assert addresses == {"0100007F"}  # 127.0.0.1
+
+
+def test_a_busy_port_is_told_with_the_way_out() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", free_port()))
+        other.listen()
+        port = other.getsockname()[1]
+        done = serve("--port", str(port))
+    assert done.returncode == 1
+    assert f"Port {port} on 127.0.0.1 is in use" in done.stderr
+    assert f"--port {port + 1}" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_two_servers_do_not_share_a_port() -> None:
+    with AppServer() as first, pytest.raises(ServerError, match="in use"):
+        AppServer(port=first.port).start()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--port", "70000"), "0 to 65535"),
+        (("--port", "http"), "0 to 65535"),
+        (("--host", "no.such.host.invalid"), "--host"),
+        (("--host", "192.0.2.1", "--port", "8299"), "--host"),
+    ],
+)
+def test_an_address_that_cannot_be_is_told(options: tuple[str, ...], said: str) -> None:
+    done = serve(*options)
+    assert done.returncode != 0
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_stops_when_told(number: signal.Signals) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app", "serve", "--port", str(free_port())],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=ROOT,
+    )
+    assert process.stdout is not None
+    for line in process.stdout:
+        if "is ready" in line:
+            break
+    started = time.monotonic()
+    process.send_signal(number)
+    output = process.communicate(timeout=20)[0]
+    assert process.returncode == 0, output
+    assert time.monotonic() - started < 5.0
+    assert "Traceback" not in output
+
+
+def test_the_command_tells_its_version_and_its_ways() -> None:
+    for option in ("--version", "--help"):
+        done = subprocess.run(
+            [sys.executable, "-m", "app", option],
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            timeout=60,
+            check=True,
+        )
+        assert done.stdout.startswith(("katana450 ", "usage: katana450"))

@@ -1,0 +1,54 @@
+"""Commands are checked when they are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.errors import InputError
+
+NAN = math.nan
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: cmd.SetJoint(0, NAN), "axis 1 has to be a finite number"),
+        (lambda: cmd.SetJoint(2, math.inf), "axis 3"),
+        (lambda: cmd.SetJoint(-1, 0.0), "whole number from 0"),
+        (lambda: cmd.SetJoint(True, 0.0), "whole number from 0"),
+        (lambda: cmd.SetJoint(0, "1"), "finite number"),  # type: ignore[arg-type]
+        (lambda: cmd.SetJoints(np.array([0.0, NAN])), "finite"),
+        (lambda: cmd.SetJoints(np.zeros((2, 2))), "flat list"),
+        (lambda: cmd.SetJoints(np.array([])), "flat list"),
+        (lambda: cmd.SetJoints([[1.0], [2.0, 3.0]]), "list of numbers"),  # type: ignore[arg-type]
+        (lambda: cmd.MoveTool(np.zeros(2)), "3 numbers"),
+        (lambda: cmd.MoveTool(np.array([0.0, 0.0, NAN])), "finite"),
+        (lambda: cmd.MoveTool("abc"), "list of numbers"),  # type: ignore[arg-type]
+        (lambda: cmd.TurnTool(NAN, 0.0), "pitch"),
+        (lambda: cmd.TurnTool(0.0, -math.inf), "roll"),
+        (lambda: cmd.SetPose(np.zeros((4, 4))), "T"),
+        (lambda: cmd.SetPose(np.diag([1.0, 1.0, 2.0, 1.0])), "rotation"),
+        (lambda: cmd.SetPose(np.full((4, 4), NAN)), "finite"),
+        (lambda: cmd.SetPose(np.eye(3)), "shape"),
+        (lambda: cmd.SetGripper(NAN), "finger"),
+    ],
+)
+def test_what_is_not_a_command_is_refused_with_a_reason(
+    make: Callable[[], object], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        make()
+
+
+def test_a_command_does_not_change_with_the_array_it_was_made_of() -> None:
+    q = np.zeros(5)
+    command = cmd.SetJoints(q)
+    q[0] = 1.0
+    assert command.q[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        command.q[0] = 1.0

@@ -1,0 +1,276 @@
+"""The session: what is asked, what the arm makes of it, how fast."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.arm import Arm
+from app.control.session import LONGEST_STEP, Session, pitch_and_roll
+from app.control.state import JointTarget, PoseTarget, Reason, State, Status
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import branch_of
+from app.kinematics.forward import forward
+
+TICK = 0.01
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
+    """``ticks`` turns of the loop with an arm that follows exactly."""
+    commands = list(commands)
+    for _ in range(ticks):
+        state = session.step(state, commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        commands = []
+    return state
+
+
+def tool_point(arm: Arm, state: State, q: FloatArray | None = None) -> FloatArray:
+    return forward(arm.chain_to(state.tool), state.goal if q is None else q)[:3, 3]
+
+
+def reasons(state: State) -> set[Reason]:
+    return {finding.reason for finding in state.findings}
+
+
+def test_a_far_target_is_approached_at_the_joints_speed(
+    arm: Arm, session: Session, state: State
+) -> None:
+    state = session.step(state, [cmd.SetJoint(0, 2.0)], TICK)
+    ticks = 1
+    while state.moving:
+        before = state.setpoint
+        state = session.step(state, [], state.t + TICK)
+        assert (np.abs(state.setpoint - before) <= arm.chain.speed * TICK * (1 + 1e-9)).all()
+        ticks += 1
+    assert ticks * TICK == pytest.approx(2.0 / arm.chain.speed[0], abs=2 * TICK)
+    assert state.setpoint[0] == 2.0
+
+
+def test_a_late_tick_is_no_leap(arm: Arm, session: Session, state: State) -> None:
+    after = session.step(state, [cmd.SetJoint(0, 2.0)], 60.0)
+    assert after.setpoint[0] <= arm.chain.speed[0] * LONGEST_STEP * (1 + 1e-12)
+
+
+def test_time_that_stands_or_runs_back_moves_nothing(session: Session, state: State) -> None:
+    for t in (0.0, -5.0):
+        after = session.step(state, [cmd.SetJoint(0, 2.0)], t)
+        assert (after.setpoint == state.setpoint).all()
+        assert after.t == 0.0
+
+
+def test_step_is_a_fold_that_can_be_replayed_to_the_bit(session: Session, state: State) -> None:
+    commands: list[list[cmd.Command]] = [
+        [cmd.MoveTool(np.array([0.3, 0.1 + 0.01 * i, 0.0])), cmd.SetGripper(0.01 * i)]
+        for i in range(20)
+    ]
+    first = second = state
+    for batch in commands:
+        first = session.step(first, batch, first.t + TICK)
+    for batch in commands:
+        second = session.step(second, batch, second.t + TICK)
+    assert first.setpoint.tobytes() == second.setpoint.tobytes()
+    assert first.goal.tobytes() == second.goal.tobytes()
+
+
+def test_moving_the_tool_keeps_pitch_and_roll_and_needs_no_yaw(
+    arm: Arm, session: Session, state: State
+) -> None:
+    state = run(session, state, [cmd.TurnTool(0.6, 0.4)])
+    wanted = np.array([0.25, 0.25, -0.05])
+    state = run(session, state, [cmd.MoveTool(wanted)])
+    assert np.allclose(tool_point(arm, state), wanted, atol=1e-12)
+    assert pitch_and_roll(state.goal) == pytest.approx((0.6, 0.4), abs=1e-12)
+    assert state.status is Status.OK
+
+
+def test_turning_the_tool_keeps_its_position(arm: Arm, session: Session, state: State) -> None:
+    before = tool_point(arm, state)
+    state = run(session, state, [cmd.TurnTool(0.55, -1.0)])
+    assert np.allclose(tool_point(arm, state), before, atol=1e-12)
+    assert pitch_and_roll(state.goal) == pytest.approx((0.55, -1.0), abs=1e-12)
+
+
+def test_a_pose_with_a_yaw_of_its_own_says_how_much_is_lost(
+    arm: Arm, session: Session, state: State
+) -> None:
+    R = so3.rotation_z(math.radians(23.0)) @ so3.rotation_y(0.5)
+    T = se3.from_rotation_translation(R, np.array([0.35, 0.0, 0.0]))
+    state = run(session, state, [cmd.SetPose(T)])
+    assert isinstance(state.target, PoseTarget)
+    assert np.allclose(tool_point(arm, state), T[:3, 3], atol=1e-12)
+    (yaw,) = (f for f in state.findings if f.reason is Reason.YAW_FIXED)
+    expected = math.asin(abs(R[1, 0]))  # the tool's x axis against the plane y = 0
+    assert yaw.amount == pytest.approx(expected, abs=1e-12)
+
+
+def test_out_of_reach_the_goal_is_the_nearest_point_and_the_gap_is_told(
+    arm: Arm, session: Session, state: State
+) -> None:
+    far = np.array([0.9, 0.0, 0.1])
+    state = run(session, state, [cmd.MoveTool(far)])
+    reached = tool_point(arm, state)
+    lengths = float(np.linalg.norm(arm.tools["tcp"][:3, 3]))
+    assert np.linalg.norm(reached) == pytest.approx(lengths, abs=1e-9)
+    assert np.allclose(np.cross(reached, far), 0.0, atol=1e-9)
+    (gap,) = (f for f in state.findings if f.reason is Reason.OUT_OF_REACH)
+    assert gap.amount == pytest.approx(np.linalg.norm(far) - lengths, abs=1e-9)
+    assert state.status is Status.LIMITED
+
+
+def test_dragging_back_from_out_of_reach_brings_the_wished_pitch_back(
+    session: Session, state: State
+) -> None:
+    home = run(session, state, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))])
+    pitch, _ = pitch_and_roll(home.goal)
+    away = run(session, home, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=50)
+    assert abs(pitch_and_roll(away.goal)[0] - pitch) > 0.3
+    back = run(session, away, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))])
+    assert pitch_and_roll(back.goal)[0] == pytest.approx(pitch, abs=1e-12)
+
+
+def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
+    session: Session, state: State
+) -> None:
+    away = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.0])), cmd.Settle()])
+    assert isinstance(away.target, JointTarget)
+    assert away.target.q is away.goal
+    assert reasons(away) == {Reason.OUT_OF_REACH}
+    # The next wish starts from what the arm does, and clears the reason.
+    back = run(session, away, [cmd.TurnTool(*pitch_and_roll(away.goal))])
+    assert np.allclose(back.goal, away.goal, atol=1e-6)
+    assert reasons(back) == set()
+
+
+@pytest.mark.parametrize("axis", range(5))
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_joint_stops_at_its_limit_and_says_which(
+    arm: Arm, session: Session, state: State, axis: int, side: float
+) -> None:
+    state = run(session, state, [cmd.SetJoint(axis, side * 4.0)])
+    limit = (arm.chain.upper if side > 0 else arm.chain.lower)[axis]
+    assert state.goal[axis] == limit
+    (finding,) = state.findings
+    assert (finding.reason, finding.axis) == (Reason.AXIS_LIMIT, axis)
+    assert finding.amount == limit
+
+
+def test_dragging_never_changes_the_branch(arm: Arm, session: Session, state: State) -> None:
+    rng = np.random.default_rng(450)
+    branch = state.branch
+    position = tool_point(arm, state)
+    for _ in range(400):
+        position = position + rng.normal(scale=0.03, size=3)
+        position = np.clip(position, -0.9, 0.9)
+        pitch, roll = pitch_and_roll(state.goal)
+        batch: list[cmd.Command] = [cmd.MoveTool(position)]
+        if rng.random() < 0.2:
+            batch.append(cmd.TurnTool(pitch + rng.normal(scale=0.3), roll + rng.normal(scale=0.3)))
+        state = run(session, state, batch)
+        assert state.branch == branch
+        assert arm.chain.within_limits(state.goal)
+        on = branch_of(arm.chain_to(state.tool), state.goal)
+        # On the seam between two branches the posture belongs to both.
+        r = (
+            math.cos(state.goal[0]) * tool_point(arm, state)[0]
+            + math.sin(state.goal[0]) * tool_point(arm, state)[1]
+        )
+        assert on.elbow == branch.elbow or abs(state.goal[2]) < 1e-6
+        assert on.shoulder == branch.shoulder or abs(r) < 1e-6
+
+
+def test_sliders_may_change_the_branch_because_a_person_says_so(
+    session: Session, state: State
+) -> None:
+    assert str(state.branch) == "front-up"
+    state = run(session, state, [cmd.SetJoint(2, -0.5)])
+    assert str(state.branch) == "front-down"
+
+
+def test_home_stretch_and_reset(session: Session, state: State) -> None:
+    state = run(session, state, [cmd.Stretch()])
+    assert (state.goal == 0.0).all()
+    state = run(session, state, [], ticks=20)
+    assert state.moving
+    held = run(session, state, [cmd.Reset()])
+    assert not held.moving
+    assert (held.goal == state.setpoint).all()
+    home = run(session, held, [cmd.Home()])
+    assert (home.goal == session.ready).all()
+
+
+def test_a_tool_change_moves_nothing(arm: Arm, session: Session, state: State) -> None:
+    changed = run(session, state, [cmd.SetTool("flange")])
+    assert (changed.goal == state.goal).all()
+    assert not changed.moving
+    moved = run(session, changed, [cmd.MoveTool(np.array([0.25, 0.0, 0.05]))])
+    assert np.allclose(forward(arm.chain_to("flange"), moved.goal)[:3, 3], [0.25, 0.0, 0.05])
+
+
+def test_the_gripper_moves_at_its_speed_and_stops_at_its_limit(
+    arm: Arm, session: Session, state: State
+) -> None:
+    state = run(session, state, [cmd.SetGripper(1.0)])
+    assert state.gripper_goal == arm.gripper.upper
+    assert reasons(state) == {Reason.GRIPPER_LIMIT}
+    assert 0.0 < state.gripper_setpoint <= arm.gripper.speed * TICK * (1 + 1e-12)
+    state = run(session, state, [], ticks=100)
+    assert state.gripper_setpoint == arm.gripper.upper
+    # An arm command does not take the gripper's reason away, a good gripper command does.
+    state = run(session, state, [cmd.Home()])
+    assert reasons(state) == {Reason.GRIPPER_LIMIT}
+    assert reasons(run(session, state, [cmd.SetGripper(0.0)])) == set()
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (cmd.SetJoint(5, 0.0), "no axis 6"),
+        (cmd.SetJoints(np.zeros(6)), "5 joints"),
+        (cmd.SetTool("hammer"), "hammer.*tcp, grasp, flange"),
+        (cmd.SetTool([]), "no tool"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_this_arm_cannot_be_asked_changes_nothing(
+    session: Session, state: State, command: cmd.Command, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        session.check(command)
+    with pytest.raises(InputError, match=said):
+        session.step(state, [cmd.SetJoint(0, 1.0), command], TICK)
+    assert (state.goal == session.ready).all()
+
+
+def test_a_failure_leaves_an_arm_that_holds(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoint(0, 2.0)], ticks=5)
+    failed = session.fail(moving)
+    assert failed.status is Status.FAULT
+    after = run(session, failed, [], ticks=5)
+    assert (after.setpoint == moving.setpoint).all()
+    assert run(session, after, [cmd.Home()]).status is Status.OK
+
+
+def test_a_ready_posture_outside_the_limits_is_refused(arm: Arm) -> None:
+    with pytest.raises(InputError, match="limits"):
+        Session(arm, np.full(5, 2.0))
+
+
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.3), (1e-12, 0.0, 0.3), (0.0, 0.0, 0.7)])
+def test_over_the_base_the_arm_keeps_its_azimuth(
+    session: Session, state: State, point: tuple[float, float, float]
+) -> None:
+    turned = run(session, state, [cmd.SetJoint(0, 0.7)])
+    over = run(session, turned, [cmd.MoveTool(np.array(point))])
+    assert over.goal[0] == pytest.approx(0.7, abs=1e-9)
+    assert np.isfinite(over.goal).all()

@@ -1,0 +1,65 @@
+"""The simulated arm: follows, and refuses to do what a real arm could not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.control.arm import Arm
+from app.drivers.simulated import SimulatedDriver
+from app.errors import InputError
+
+START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])
+
+
+@pytest.fixture
+def driver(arm: Arm) -> SimulatedDriver:
+    driver = SimulatedDriver(arm, START, 0.0)
+    driver.start(0.0)
+    return driver
+
+
+def test_a_setpoint_within_speed_is_followed_exactly(driver: SimulatedDriver) -> None:
+    wanted = START + 0.01
+    sent = driver.send(wanted, 0.005, 0.01)
+    assert np.allclose(sent.q, wanted, atol=1e-15)
+    assert sent.gripper == 0.005
+
+
+def test_a_leap_is_cut_to_the_joints_speed(arm: Arm, driver: SimulatedDriver) -> None:
+    sent = driver.send(START + 1.0, 0.3, 0.01)
+    assert np.allclose(sent.q - START, arm.chain.speed * 0.01)
+    assert sent.gripper == pytest.approx(arm.gripper.speed * 0.01)
+
+
+def test_limits_hold(arm: Arm, driver: SimulatedDriver) -> None:
+    for tick in range(1, 500):
+        sent = driver.send(np.full(5, 9.0), 9.0, tick * 0.01)
+    assert np.allclose(sent.q, arm.chain.upper)
+    assert sent.gripper == arm.gripper.upper
+
+
+def test_time_that_runs_back_moves_nothing(driver: SimulatedDriver) -> None:
+    driver.send(START, 0.0, 1.0)
+    sent = driver.send(START + 0.1, 0.0, 0.5)
+    assert (sent.q == START).all()
+
+
+@pytest.mark.parametrize(("q", "gripper"), [(np.full(5, np.nan), 0.0), (START, np.inf)])
+def test_what_is_not_finite_is_refused_and_moves_nothing(
+    driver: SimulatedDriver, q: np.ndarray, gripper: float
+) -> None:
+    with pytest.raises(InputError, match="not finite"):
+        driver.send(q, gripper, 0.01)
+    assert (driver.send(START, 0.0, 0.02).q == START).all()
+
+
+def test_nothing_is_sent_before_start_or_after_stop(arm: Arm) -> None:
+    driver = SimulatedDriver(arm, START, 0.0)
+    with pytest.raises(InputError, match="before it is started"):
+        driver.send(START, 0.0, 0.0)
+    driver.start(0.0)
+    driver.stop()
+    driver.stop()
+    with pytest.raises(InputError, match="before it is started"):
+        driver.send(START, 0.0, 0.0)

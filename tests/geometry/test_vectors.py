@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+
+from app.geometry import so3, vectors
+from app.geometry.arrays import FloatArray
+from tests.geometry.strategies import angles, directions, points, repeatable
+
+
+@repeatable
+@given(points, points)
+def test_they_agree_with_numpy(a: FloatArray, b: FloatArray) -> None:
+    u, v = vectors.vector(a), vectors.vector(b)
+    np.testing.assert_array_equal(vectors.add(u, v), a + b)
+    np.testing.assert_array_equal(vectors.sub(u, v), a - b)
+    np.testing.assert_array_equal(vectors.scale(2.5, u), 2.5 * a)
+    np.testing.assert_allclose(vectors.dot(u, v), a @ b, atol=1e-14)
+    np.testing.assert_allclose(vectors.cross(u, v), np.cross(a, b), atol=1e-14)
+    np.testing.assert_allclose(vectors.norm(u), np.linalg.norm(a), rtol=1e-15)
+
+
+@repeatable
+@given(points, directions)
+def test_perpendicular_is_what_the_axis_leaves(a: FloatArray, omega: FloatArray) -> None:
+    left = np.array(vectors.perpendicular(vectors.vector(a), vectors.vector(omega)))
+    np.testing.assert_allclose(left @ omega, 0.0, atol=1e-14)
+    np.testing.assert_allclose(np.cross(a - left, omega), 0.0, atol=1e-14)
+
+
+@repeatable
+@given(points, directions, points, angles)
+def test_rotate_is_the_exponential_about_a_point(
+    p: FloatArray, omega: FloatArray, r: FloatArray, theta: float
+) -> None:
+    got = vectors.rotate(vectors.vector(p), vectors.vector(omega), vectors.vector(r), theta)
+    np.testing.assert_allclose(got, r + so3.exp(omega * theta) @ (p - r), atol=1e-14)

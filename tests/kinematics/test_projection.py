@@ -1,0 +1,416 @@
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import BRANCHES, Branch, branch_of
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.inverse import inverse
+from app.kinematics.projection import Projection, project
+from tests.kinematics.brute_force import NearestPoint, least_rotation
+
+FRONT_UP = Branch("front", "up")
+REACH = 0.6318
+
+
+def pose(w: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
+    return se3.from_rotation_translation(so3.exp(w), p)
+
+
+def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatArray]:
+    """Poses of every kind the arm cannot take as they are, one of each a round."""
+    result = []
+    for _ in range(rounds):
+        turned = forward(chain, rng.uniform(chain.lower, chain.upper))
+        turned[:3, :3] = turned[:3, :3] @ so3.exp(0.5 * rng.normal(size=3))
+        far: FloatArray = rng.normal(size=3)
+        far *= rng.uniform(0.6, 1.2) / np.linalg.norm(far)
+        behind = math.pi + 0.07 + rng.uniform(-0.25, 0.25)
+        beside_axis = [
+            *(10.0 ** rng.uniform(-6, -1.5) * rng.normal(size=2)),
+            rng.uniform(-0.6, 0.65),
+        ]
+        result += [
+            turned,
+            pose(2.0 * rng.normal(size=3), far),
+            pose(2.0 * rng.normal(size=3), 0.12 * rng.normal(size=3)),
+            pose(
+                2.0 * rng.normal(size=3),
+                [0.4 * math.cos(behind), 0.4 * math.sin(behind), rng.uniform(-0.4, 0.5)],
+            ),
+            pose(2.0 * rng.normal(size=3), beside_axis),
+            forward(chain, rng.uniform(chain.lower - 0.6, chain.upper + 0.6)),
+        ]
+    return result
+
+
+def assert_measured(chain: Chain, T: FloatArray, p: Projection) -> None:
+    """Every figure of `p`, by other means than its own."""
+    np.testing.assert_array_equal(p.T, forward(chain, p.q))
+    assert p.position_error == pytest.approx(
+        float(np.linalg.norm(p.T[:3, 3] - T[:3, 3])), abs=1e-15
+    )
+    between = so3.log(p.T[:3, :3].T @ T[:3, :3])
+    assert p.rotation_error == pytest.approx(float(np.linalg.norm(between)), abs=1e-12)
+    normal = np.array([-math.sin(p.q[0]), math.cos(p.q[0]), 0.0])
+    asked, taken = T[:3, 0], p.T[:3, 0]
+    assert math.sin(p.yaw_error) == pytest.approx(abs(normal @ asked), abs=1e-12)
+    assert 0.0 <= p.yaw_error <= math.pi / 2
+    in_plane = asked - (normal @ asked) * normal
+    cosine = (in_plane @ taken) / np.linalg.norm(in_plane)
+    assert math.cos(p.pitch_error) == pytest.approx(cosine, abs=1e-9)
+
+
+def assert_on_branch(p: Projection) -> None:
+    """On `p.branch` or its edge."""
+    r = p.T[0, 3] * math.cos(p.q[0]) + p.T[1, 3] * math.sin(p.q[0])
+    assert abs(r) < 1e-11 or (r > 0.0) == (p.branch.shoulder == "front")
+    assert p.q[2] == 0.0 or (p.q[2] > 0.0) == (p.branch.elbow == "up")
+
+
+def test_a_feasible_pose_comes_back_unchanged(chain: Chain, rng: np.random.Generator) -> None:
+    for q in rng.uniform(chain.lower, chain.upper, size=(400, 5)):
+        T = forward(chain, q)
+        for p in (
+            project(chain, T, branch=branch_of(chain, q)),
+            project(chain, T, q_hint=q),
+            project(chain, T, q_hint=q, within_limits=False),
+        ):
+            assert p.position_error < 2e-15
+            assert p.rotation_error < 1e-14
+            assert p.pitch_error < 1e-13
+            assert p.branch == branch_of(chain, q)
+            np.testing.assert_allclose(p.q, q, atol=1e-9)
+            assert p.limits == ()
+            assert not p.reach
+
+
+def test_a_feasible_pose_on_limits_comes_back_unchanged(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    ends = np.stack((chain.lower, chain.upper))
+    for inside in rng.uniform(chain.lower, chain.upper, size=(200, 5)):
+        at_end = rng.random(5) < 0.5
+        q = np.where(at_end, ends[rng.integers(2, size=5), range(5)], inside)
+        p = project(chain, forward(chain, q), branch=branch_of(chain, q))
+        assert p.position_error < 2e-12
+        assert p.rotation_error < 1e-11
+        assert chain.within_limits(p.q, slack=0.0)
+
+
+def test_every_figure_is_what_forward_kinematics_measures(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    for T in targets(chain, rng, 15):
+        for branch in (None, *BRANCHES):
+            p = project(chain, T, branch=branch)
+            assert branch in (None, p.branch)
+            assert chain.within_limits(p.q, slack=0.0)
+            assert_on_branch(p)
+            assert_measured(chain, T, p)
+
+
+def test_inverse_of_the_feasible_pose_gives_its_joints(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    for T in targets(chain, rng, 15):
+        p = project(chain, T, branch=FRONT_UP)
+        solutions = inverse(chain, p.T, q_hint=p.q)
+        # Stretched out, joints are known to the root of rounding; the pose is exact all the same.
+        assert min(np.abs(s.q - p.q).max() for s in solutions) < 1e-6
+        assert max(s.position_error for s in solutions) < 1e-12
+
+
+def assert_no_search_beats_it(
+    chain: Chain, lengths: FloatArray, asked: list[FloatArray], branch: Branch | None
+) -> None:
+    search = NearestPoint(chain, lengths, steps=15)
+    inexact = 0
+    for i, T in enumerate(asked):
+        p = project(chain, T, branch=branch)
+        assert_on_branch(p)
+        if p.position_error > 1e-9:
+            inexact += 1
+            assert p.position_error <= search.distance(T[:3, 3], branch, seed=i) + 1e-6
+        facing = math.atan2(p.T[1, 3], p.T[0, 3])
+        theta1s = np.array([p.q[0], facing, facing - math.pi, facing + math.pi])
+        theta1s = theta1s[(theta1s >= chain.lower[0]) & (theta1s <= chain.upper[0])]
+        least = least_rotation(chain, lengths, T, p.T[:3, 3], branch, theta1s)
+        assert p.rotation_error <= least + 1e-4
+    assert 0 < inexact < len(asked)
+
+
+def test_no_search_beats_it(chain: Chain, lengths: FloatArray) -> None:
+    asked = targets(chain, np.random.default_rng(5), 5)
+    assert_no_search_beats_it(chain, lengths, asked, None)
+
+
+@pytest.mark.parametrize("branch", BRANCHES, ids=str)
+def test_no_search_on_its_branch_beats_it(
+    chain: Chain, lengths: FloatArray, branch: Branch
+) -> None:
+    asked = targets(chain, np.random.default_rng(6), 1)
+    assert_no_search_beats_it(chain, lengths, asked, branch)
+
+
+# Limits so narrow that axis 1 cannot face every target, the wrist not straighten, or the tool only
+# fold back over the arm.
+NARROW = (
+    ([-0.5, -2.6, -0.9, 0.5, -1.0], [0.6, 0.1, 1.2, 1.8, 1.0]),
+    ([-2.0, -2.6, -0.4, 2.0, -1.0], [2.0, 0.1, 0.3, 3.3, 1.0]),
+    ([-0.5, -1.4, -0.9, -1.0, -0.4], [0.6, 0.1, 1.2, 0.8, 0.3]),
+    ([-0.4, -2.6, -3.1, -2.8, -1.0], [0.3, -0.9, 3.1, 2.9, 0.2]),
+)
+
+
+@pytest.mark.parametrize(("lower", "upper"), NARROW)
+@pytest.mark.parametrize("branch", [None, FRONT_UP])
+def test_no_search_within_narrow_limits_beats_it(
+    chain: Chain,
+    lengths: FloatArray,
+    lower: list[float],
+    upper: list[float],
+    branch: Branch | None,
+) -> None:
+    narrow = dataclasses.replace(chain, lower=np.array(lower), upper=np.array(upper))
+    asked = targets(narrow, np.random.default_rng(7), 2)
+    assert_no_search_beats_it(narrow, lengths, asked, branch)
+
+
+def test_too_near_the_shoulder_the_tool_folds_back_as_far_as_it_goes(chain: Chain) -> None:
+    # An elbow that bends by 0.4 rad at most keeps the wrist farther out than the tool is long.
+    lower, upper = np.array([-3.0, -3.0, -0.4, 2.0, -3.0]), np.array([3.0, 3.0, 0.3, 3.3, 3.0])
+    stiff = dataclasses.replace(chain, lower=lower, upper=upper)
+    hole = math.hypot(0.190 + 0.139 * math.cos(0.4), 0.139 * math.sin(0.4)) - 0.3028
+    p = project(stiff, pose([0.0, 0.3, 0.0], [0.004, 0.0, 0.003]))
+    assert p.position_error == pytest.approx(hole - 0.005, abs=1e-12)
+    assert p.q[2] == -0.4
+    assert p.limits == (2,)
+    assert p.reach
+
+
+def test_a_yawed_tool_loses_its_yaw_alone(chain: Chain, rng: np.random.Generator) -> None:
+    q = np.array([0.5, -0.9, 1.1, 0.3, 0.4])
+    T = forward(chain, q)
+    in_plane = np.cross([-math.sin(q[0]), math.cos(q[0]), 0.0], T[:3, 0])
+    for yaw in rng.uniform(-1.4, 1.4, size=20):
+        asked = np.array(T)
+        asked[:3, :3] = so3.exp(yaw * in_plane) @ T[:3, :3]
+        p = project(chain, asked, branch=branch_of(chain, q))
+        assert p.position_error < 2e-15
+        assert p.yaw_error == pytest.approx(abs(yaw), abs=1e-13)
+        assert p.rotation_error == pytest.approx(abs(yaw), abs=1e-13)
+        assert p.pitch_error < 1e-12
+        np.testing.assert_allclose(p.q, q, atol=1e-12)
+        assert p.limits == ()
+
+
+def test_beyond_reach_the_arm_stretches_towards_the_target(chain: Chain) -> None:
+    direction = np.array([math.cos(0.4), 0.0, math.sin(0.4)])
+    for distance in (REACH + 1e-6, 0.8, 5.0, 1e6):
+        p = project(chain, pose([0.2, -0.4, 0.0], distance * direction))
+        np.testing.assert_allclose(p.T[:3, 3], REACH * direction, atol=1e-9)
+        assert p.position_error == pytest.approx(distance - REACH, rel=1e-9)
+        np.testing.assert_allclose(p.q[1:4], [-0.4, 0.0, 0.0], atol=1e-9)
+        assert p.reach
+        assert p.limits == ()
+
+
+def overdriven(chain: Chain, axis: int) -> tuple[FloatArray, FloatArray]:
+    """A posture with one axis 0.1 rad over its limit, and its pose."""
+    q = np.array([0.3, -0.8, 1.0, 0.4, 0.5])
+    q[axis] = chain.upper[axis] + 0.1
+    return q, forward(chain, q)
+
+
+@pytest.mark.parametrize("axis", range(5))
+def test_a_limit_holds_when_on_and_is_gone_when_off(chain: Chain, axis: int) -> None:
+    q, T = overdriven(chain, axis)
+    branch = branch_of(chain, q)
+    free = project(chain, T, branch=branch, within_limits=False)
+    assert free.position_error < 2e-15
+    assert free.rotation_error < 1e-14
+    np.testing.assert_allclose(free.q, q, atol=1e-12)
+    assert free.limits == ()
+
+    held = project(chain, T, branch=branch)
+    assert chain.within_limits(held.q, slack=0.0)
+    assert held.rotation_error > 1e-3
+    assert held.limits
+    for i in held.limits:
+        assert held.q[i] in (chain.lower[i], chain.upper[i])
+    if axis in (0, 4):
+        assert held.limits == (axis,)
+        assert (held.position_error > 1e-3) == (axis == 0)
+
+
+def test_held_axis_1_waits_at_the_limit_the_hint_is_near(chain: Chain) -> None:
+    T = pose([0.0, 0.0, 3.1], [-0.4, -0.02, 0.1])
+    nearer = project(chain, T, branch=FRONT_UP)
+    assert nearer.q[0] == chain.lower[0]
+    for end in (chain.lower[0], chain.upper[0]):
+        hint = np.array([0.8 * end, -0.8, 1.0, 0.4, 0.5])
+        p = project(chain, T, branch=FRONT_UP, q_hint=hint)
+        assert p.q[0] == end
+        assert p.limits[0] == 0
+
+
+def test_of_equally_near_rolls_the_hint_decides(chain: Chain) -> None:
+    lower, upper = chain.lower[4], chain.upper[4]
+    between = 0.5 * (lower + upper) + math.pi
+    T = forward(chain, [0.3, -0.8, 1.0, 0.4, between])
+    for end in (lower, upper):
+        p = project(chain, T, branch=FRONT_UP, q_hint=[0.3, -0.8, 1.0, 0.4, 0.9 * end])
+        assert p.q[4] == end
+        assert p.limits == (4,)
+        assert p.rotation_error == pytest.approx(between - upper, abs=1e-12)
+
+
+def test_of_equal_branches_the_hint_decides(chain: Chain) -> None:
+    q = np.array([0.3, -1.2, 0.9, 0.2, 0.5])
+    T = forward(chain, q)
+    inside = [s for s in inverse(chain, T) if s.within_limits]
+    assert len(inside) >= 2
+    for s in inside:
+        assert project(chain, T, q_hint=s.q + 0.01).branch == s.branch
+
+
+def test_without_a_branch_the_nearest_of_the_four_is_taken(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    for T in targets(chain, rng, 10):
+        p = project(chain, T)
+        each = [project(chain, T, branch=branch) for branch in BRANCHES]
+        nearest = min(e.position_error for e in each)
+        assert p.position_error <= nearest + 1e-9
+        as_near = [e.rotation_error for e in each if e.position_error <= nearest + 1e-9]
+        assert p.rotation_error <= min(as_near) + 1e-9
+
+
+def test_tool_point_on_axis_1_takes_theta1_from_the_tool(chain: Chain) -> None:
+    R = so3.rotation_z(0.7) @ so3.rotation_y(-0.9)
+    p = project(chain, se3.from_rotation_translation(R, [0.0, 0.0, 0.5]))
+    assert p.position_error < 2e-15
+    assert p.rotation_error < 1e-14
+    assert math.remainder(p.q[0] - 0.7, math.pi) == pytest.approx(0.0, abs=1e-12)
+    assert chain.within_limits(p.q)
+
+
+def test_tool_point_on_axis_1_may_be_reached_facing_either_way(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    backwards = 0
+    for q in rng.uniform(chain.lower, chain.upper, size=(300, 5)):
+        # Lean the arm until its tool point is on axis 1.
+        x, _, z = forward(chain, [0.0, *q[1:]])[:3, 3]
+        q[1] -= math.atan2(x, z)
+        if not chain.within_limits(q):
+            continue
+        T = forward(chain, q)
+        T[:2, 3] = 0.0
+        backwards += math.cos(q[1] + q[2] + q[3]) < 0.0
+        for shoulder in ("front", "back"):
+            p = project(chain, T, branch=Branch(shoulder, branch_of(chain, q).elbow))
+            assert p.position_error < 2e-15
+            assert p.rotation_error < 1e-13
+    assert backwards > 5
+
+
+def test_tool_along_axis_1_takes_theta1_from_the_hint(chain: Chain) -> None:
+    T = se3.from_rotation_translation(so3.rotation_y(-math.pi / 2), [0.0, 0.0, 0.6])
+    for theta1 in (0.0, -1.1):
+        hint = np.array([theta1, -1.2, 0.5, 0.0, 0.0])
+        p = project(chain, T, q_hint=hint)
+        assert p.position_error < 2e-15
+        assert p.rotation_error < 1e-7
+        assert p.q[0] == theta1
+    assert project(chain, T).q[0] == 0.0
+
+
+def test_small_steps_of_the_target_are_small_steps_of_the_arm(chain: Chain) -> None:
+    # A wavy path with its own yaw, in and out of reach and of the limits.
+    previous = None
+    hint = np.array([0.5, -0.8, 1.0, 0.4, 0.5])
+    held: set[int] = set()
+    reach = 0
+    for t in np.linspace(0.0, math.tau, 2001):
+        radius = 0.50 + 0.17 * math.sin(3.0 * t)
+        azimuth, z = 1.2 * math.sin(t), 0.1 + 0.20 * math.cos(2.0 * t)
+        R = so3.from_rpy(1.5 * math.sin(2.0 * t), 0.5 + 0.3 * math.sin(t), azimuth + 0.4)
+        p_tool = [radius * math.cos(azimuth), radius * math.sin(azimuth), z]
+        T = se3.from_rotation_translation(R, p_tool)
+        p = project(chain, T, branch=FRONT_UP, q_hint=hint)
+        assert p.branch == FRONT_UP
+        held.update(p.limits)
+        reach += p.reach
+        if previous is not None:
+            assert np.linalg.norm(p.T[:3, 3] - previous.T[:3, 3]) < 3e-3
+            # Next to the stretched arm joints move as the root of what the target moves.
+            assert np.abs(p.q - previous.q).max() < 0.2
+        previous, hint = p, p.q
+    assert held
+    assert reach
+
+
+def test_every_pose_has_an_answer(chain: Chain, rng: np.random.Generator) -> None:
+    sizes = (0.0, 1e-300, 1e-12, 0.1, 0.6, 1e3, 1e200)
+    turns = (*so3_corners(), *(so3.exp(rng.normal(size=3)) for _ in range(4)))
+    skew: FloatArray = rng.normal(size=3)
+    directions = (*np.eye(3), *-np.eye(3), skew / np.linalg.norm(skew))
+    for size, R, direction in itertools.product(sizes, turns, directions):
+        T = se3.from_rotation_translation(R, size * direction)
+        for branch, within in ((None, True), (FRONT_UP, True), (BRANCHES[3], False)):
+            p = project(chain, T, branch=branch, within_limits=within)
+            assert np.isfinite(p.T).all()
+            assert np.isfinite(p.q).all()
+            assert chain.within_limits(p.q, slack=0.0) or not within
+            assert p.position_error < 2e-12 or within or size > REACH
+            assert 0.0 <= p.rotation_error <= math.pi
+
+
+def so3_corners() -> list[FloatArray]:
+    """Orientations along the axes, where two pitches, rolls or branches are equally near."""
+    quarter = math.pi / 2
+    return [
+        so3.from_rpy(roll * quarter, pitch * quarter, yaw * quarter)
+        for roll, pitch, yaw in ((0, 0, 0), (2, 0, 0), (0, 1, 0), (0, -1, 1), (1, 0, 1), (0, 2, 1))
+    ]
+
+
+def test_the_same_question_has_the_same_answer(chain: Chain, rng: np.random.Generator) -> None:
+    for T in targets(chain, rng, 3):
+        a, b = project(chain, T), project(chain, np.array(T))
+        np.testing.assert_array_equal(a.q, b.q)
+        assert a.branch == b.branch
+
+
+@pytest.mark.parametrize(
+    ("T", "words"),
+    [
+        (np.full((4, 4), np.nan), "nan"),
+        (np.where(np.eye(4) == 0.0, np.inf, 1.0), "inf"),
+        (np.eye(3), "shape"),
+        (np.diag([1.0, -1.0, 1.0, 1.0]), "reflection"),
+        (np.diag([2.0, 1.0, 1.0, 1.0]), "not a rotation"),
+        (np.diag([1.0, 1.0, 1.0, 0.0]), "last row"),
+    ],
+)
+def test_what_is_no_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        project(chain, T)
+
+
+def test_a_hint_that_is_no_joint_vector_is_refused(chain: Chain) -> None:
+    with pytest.raises(InputError, match="shape"):
+        project(chain, chain.M, q_hint=np.zeros(4))
+    with pytest.raises(InputError, match="axis 4"):
+        project(chain, chain.M, q_hint=[0.0, 0.0, 0.0, np.inf, 0.0])

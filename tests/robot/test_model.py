@@ -1,0 +1,123 @@
+"""The URDF becomes a chain: screw axes, home configuration and limits come from the file alone."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from app.errors import RobotDescriptionError
+from app.geometry import so3
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel, load
+from robot_description import URDF_PATH
+
+
+def test_the_axes_are_the_papers(model: RobotModel) -> None:
+    S = model.arm.chain.S
+    assert np.allclose(S[:3].T, [[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]], atol=1e-12)
+    assert model.arm.chain.names == tuple(f"axis_{i}" for i in range(1, 6))
+
+
+@pytest.mark.parametrize(
+    ("tool", "reach"), [("tcp", 0.6318), ("flange", 0.5173), ("grasp", 0.5863)]
+)
+def test_home_configurations_are_the_papers(model: RobotModel, tool: str, reach: float) -> None:
+    M = model.arm.tools[tool]
+    assert np.allclose(M[:3, :3], np.eye(3), atol=1e-12)
+    assert np.allclose(M[:3, 3], [reach, 0.0, 0.0], atol=1e-9)
+
+
+def test_limits_and_speeds_are_the_manufacturers(model: RobotModel) -> None:
+    chain = model.arm.chain
+    lower = [-173.35, -124.25, -117.70, -116.50, -164.50]
+    upper = [165.65, 7.75, 127.30, 107.50, 171.50]
+    assert np.allclose(np.degrees(chain.lower), lower, atol=1e-9)
+    assert np.allclose(np.degrees(chain.upper), upper, atol=1e-9)
+    assert np.allclose(chain.speed, [2.209, 1.191, 1.191, 2.209, 2.209], atol=5e-4)
+
+
+def test_the_shoulder_frame_stands_where_axes_1_and_2_cross(model: RobotModel) -> None:
+    assert np.allclose(model.T_base_shoulder[:3, :3], np.eye(3))
+    assert np.allclose(model.T_base_shoulder[:3, 3], [0.0, 0.0, 0.2745])
+
+
+def test_the_chain_agrees_with_yourdfpy_everywhere(model: RobotModel) -> None:
+    urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        q = rng.uniform(model.arm.chain.lower, model.arm.chain.upper)
+        gripper = rng.uniform(model.arm.gripper.lower, model.arm.gripper.upper)
+        angles = model.joint_angles(q, gripper)
+        urdf.update_cfg({name: angles[name] for name in urdf.actuated_joint_names})
+        for tool in model.arm.tools:
+            T = model.T_base_shoulder @ forward(model.arm.chain_to(tool), q)
+            assert np.allclose(T, urdf.get_transform(tool), atol=1e-12)
+
+
+def test_the_bodies_the_view_draws_stand_where_yourdfpy_has_them(model: RobotModel) -> None:
+    urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
+    q = np.array([0.4, -1.0, 0.7, 0.5, 1.1])
+    angles = model.joint_angles(q, 0.2)
+    urdf.update_cfg({name: angles[name] for name in urdf.actuated_joint_names})
+    poses: dict[str | None, np.ndarray] = {None: np.eye(4)}
+    for body in model.bodies:
+        T = poses[body.parent] @ body.T_parent_body
+        if body.joint is not None:
+            T[:3, :3] = T[:3, :3] @ so3.exp(body.axis * angles[body.joint])
+        poses[body.name] = T
+        assert np.allclose(T, urdf.get_transform(body.name), atol=1e-12), body.name
+
+
+def test_both_fingers_follow_one_joint(model: RobotModel) -> None:
+    angles = model.joint_angles(np.zeros(5), 0.2)
+    fingers = {name: angle for name, angle in angles.items() if name.startswith("finger")}
+    assert len(fingers) == 2
+    assert all(abs(angle) == 0.2 for angle in fingers.values())
+    assert model.arm.gripper.lower == pytest.approx(-0.44)
+    assert model.arm.gripper.upper == pytest.approx(0.30)
+
+
+def test_every_mesh_is_there(model: RobotModel) -> None:
+    meshes = [visual for body in model.bodies for visual in body.meshes]
+    assert len(meshes) == 10
+    assert all(mesh.read_bytes()[:4] == b"glTF" for mesh in meshes)
+
+
+def edited(tmp_path: Path, old: str, new: str) -> Path:
+    text = URDF_PATH.read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "edited.urdf"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
+    """Nothing of the robot is typed a second time: a longer arm in the file is a longer arm."""
+    changed = load(edited(tmp_path, 'xyz="0.190', 'xyz="0.290'))
+    assert changed.arm.tools["tcp"][0, 3] == pytest.approx(0.7318)
+    assert math.isclose(changed.arm.chain.S[5, 2], 0.290)  # v of axis 3: -omega x r
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"shoulder_frame"', '"elsewhere"', "shoulder_frame"),
+        ('xyz="0.190', 'xyz="wide', "not a robot description"),
+        ('<mimic joint="finger_right_joint"', '<dynamics friction="0"', "driven finger"),
+    ],
+)
+def test_a_file_that_will_not_do_is_refused_with_a_reason(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = edited(tmp_path, old, new)
+    with pytest.raises(RobotDescriptionError, match=said):
+        load(path)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(RobotDescriptionError, match="nowhere.urdf"):
+        load(tmp_path / "nowhere.urdf")

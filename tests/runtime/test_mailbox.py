@@ -1,0 +1,77 @@
+"""The mailbox: order, tickets, the last of a stream, a bound, a check at the door."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.session import Session
+from app.errors import InputError
+from app.runtime.mailbox import CAPACITY, Mailbox
+
+
+@pytest.fixture
+def mailbox(session: Session) -> Mailbox:
+    return Mailbox(session.check)
+
+
+def test_commands_come_out_once_in_the_order_they_went_in(mailbox: Mailbox) -> None:
+    sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Reset()]
+    tickets = [mailbox.put(command) for command in sent]
+    assert tickets == [1, 2, 3]
+    assert mailbox.drain() == (sent, 3)
+    assert mailbox.drain() == ([], 3)
+
+
+def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) -> None:
+    for i in range(50):
+        mailbox.put(cmd.MoveTool(np.array([0.3, 0.0, 0.001 * i])))
+    commands, ticket = mailbox.drain()
+    assert ticket == 50 == mailbox.last_ticket
+    (last,) = commands
+    assert isinstance(last, cmd.MoveTool)
+    assert last.position[2] == 0.049
+
+
+def test_sliders_of_two_axes_do_not_swallow_each_other(mailbox: Mailbox) -> None:
+    for command in (cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.0), cmd.SetJoint(1, -1.1)):
+        mailbox.put(command)
+    assert mailbox.drain()[0] == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
+
+
+def test_a_button_pressed_twice_is_two_commands(mailbox: Mailbox) -> None:
+    mailbox.put(cmd.Home())
+    mailbox.put(cmd.Home())
+    assert len(mailbox.drain()[0]) == 2
+
+
+def test_a_flood_is_refused_and_what_waits_is_kept(mailbox: Mailbox) -> None:
+    for _ in range(CAPACITY):
+        mailbox.put(cmd.Home())
+    with pytest.raises(InputError, match="slower"):
+        mailbox.put(cmd.Home())
+    assert len(mailbox.drain()[0]) == CAPACITY
+    assert mailbox.put(cmd.Home()) == CAPACITY + 1
+
+
+def test_what_the_arm_cannot_be_asked_does_not_enter(mailbox: Mailbox) -> None:
+    with pytest.raises(InputError, match="no axis 9"):
+        mailbox.put(cmd.SetJoint(8, 0.0))
+    assert mailbox.drain() == ([], 0)
+
+
+def test_threads_lose_nothing(mailbox: Mailbox) -> None:
+    taken: list[cmd.Command] = []
+    writers = [
+        threading.Thread(target=lambda: [mailbox.put(cmd.Home()) for _ in range(60)])
+        for _ in range(4)
+    ]
+    for writer in writers:
+        writer.start()
+    while any(writer.is_alive() for writer in writers):
+        taken += mailbox.drain()[0]
+    taken += mailbox.drain()[0]
+    assert len(taken) == 240
