@@ -42,6 +42,9 @@ PLANAR_LIMIT_SLACK: Final = 1e-12
 # [1] Negative radicand, relative to the squared lengths it came from, that is rounding alone.
 RADICAND: Final = 1e-12
 
+# [rad] How well angles are known where two circles touch: to the root of rounding, and some more.
+TOUCHING: Final = 1e-6
+
 # [m], [rad] Residuals nearer than these are the same to a person and to the arm; the choice between
 # them then goes to the solution that moves the arm less.
 SAME_POSITION: Final = 1e-9

@@ -17,6 +17,7 @@ from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import branch_of
 from app.kinematics.forward import forward
+from app.kinematics.inverse import inverse
 from app.kinematics.projection import project
 from app.motion.approach import approach
 
@@ -151,11 +152,14 @@ class Session:
             )
         T = target.T if isinstance(target, PoseTarget) else self._pose(state, target)
         best = project(chain, T, branch=state.branch, q_hint=state.goal)
+        # Of the solutions for the feasible pose, the one that stays on the branch.
+        solutions = inverse(chain, best.T, q_hint=best.q)
+        q = min((solution.q for solution in solutions), key=lambda q: np.abs(q - best.q).max())
         yaw_was_wished = isinstance(target, PoseTarget)
         return replace(
             state,
             target=target,
-            goal=frozen(best.q),
+            goal=frozen(chain.clamp(q)),
             findings=of_projection(chain, best, yaw_was_wished=yaw_was_wished) + gripper,
         )
 

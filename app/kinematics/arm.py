@@ -24,7 +24,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Arm:
+class FiveAxisArm:
     """A 5R arm in the paper's Fig. 2: axes z, y, y, y, x, stretched along +x of {S} at q = 0.
 
     l1: shoulder (axes 1 and 2 cross) to elbow (axis 3). l2: elbow to wrist (axes 4 and 5 cross).
@@ -72,7 +72,7 @@ def _size(v: FloatArray) -> float:
 
 
 @lru_cache(maxsize=16)
-def arm_of(chain: Chain) -> Arm:
+def arm_of(chain: Chain) -> FiveAxisArm:
     """The arm `chain` describes, checked once a chain.
 
     Raises RobotDescriptionError that names the axis at fault and by how much.
@@ -101,4 +101,4 @@ def arm_of(chain: Chain) -> Arm:
     one, two, three, four, five = (
         Axis(vector(chain.S[:3, i]), vector(points[i])) for i in range(5)
     )
-    return Arm(*lengths, (one, two, three, four, five), vector(points[3]), vector(tool))
+    return FiveAxisArm(*lengths, (one, two, three, four, five), vector(points[3]), vector(tool))

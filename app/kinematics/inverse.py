@@ -16,7 +16,7 @@ import numpy.typing as npt
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
 from app.geometry.vectors import Vector, add, dot, norm, rotate, scale, sub, vector
-from app.kinematics.arm import Arm, Axis, arm_of
+from app.kinematics.arm import Axis, FiveAxisArm, arm_of
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
@@ -89,7 +89,7 @@ def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:
     return result
 
 
-def _target(arm: Arm, G: FloatArray) -> _Target:
+def _target(arm: FiveAxisArm, G: FloatArray) -> _Target:
     R, p = G[:3, :3], G[:3, 3]
     four, five = arm.axes[3], arm.axes[4]
     return _Target(
@@ -105,7 +105,7 @@ def _back(axis: Axis, theta: float, p: Vector) -> Vector:
     return rotate(p, axis.omega, axis.r, -theta)
 
 
-def _shoulders(arm: Arm, target: _Target, free_theta1: float) -> tuple[float, float]:
+def _shoulders(arm: FiveAxisArm, target: _Target, free_theta1: float) -> tuple[float, float]:
     """theta1 facing the tool point, and with the back to it.
 
     The arm's plane holds axis 1 and is square to axis 2: turning back by theta1 takes the tool
@@ -127,7 +127,7 @@ def _shoulders(arm: Arm, target: _Target, free_theta1: float) -> tuple[float, fl
     return (theta, other) if faces else (other, theta)
 
 
-def _elbows(arm: Arm, target: _Target, theta1: float) -> tuple[tuple[float, float], ...]:
+def _elbows(arm: FiveAxisArm, target: _Target, theta1: float) -> tuple[tuple[float, float], ...]:
     """(theta2, theta3) with the elbow up, and down."""
     one, two, three = arm.axes[:3]
     q0 = _back(one, theta1, target.wrist)
@@ -140,7 +140,7 @@ def _elbows(arm: Arm, target: _Target, theta1: float) -> tuple[tuple[float, floa
 
 
 def _wrist(
-    arm: Arm, target: _Target, theta1: float, theta2: float, theta3: float
+    arm: FiveAxisArm, target: _Target, theta1: float, theta2: float, theta3: float
 ) -> tuple[float, float, float, float, float]:
     """All five angles: theta4 turns the tool point into place, theta5 a point beside the wrist."""
     one, two, three, four, five = arm.axes

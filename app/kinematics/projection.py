@@ -20,7 +20,7 @@ import numpy.typing as npt
 from app import tolerances
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
-from app.kinematics.arm import Arm, arm_of
+from app.kinematics.arm import FiveAxisArm, arm_of
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
@@ -111,9 +111,9 @@ def project(
     """The feasible pose nearest to `T` (4, 4) = T_S_tool: in position, then in rotation angle.
 
     branch: the branch to stay on; None takes the one that comes nearest, and of equals the one
-    nearest to `q_hint` (5,) [rad]. The hint also says which limit of axis 1 to wait at, and theta1
-    where the pose leaves it free. within_limits: keep every axis inside its limits. Every valid `T`
-    has an answer.
+    nearest to `q_hint` (5,) [rad]. The hint also says which limit of axis 1 to wait at,
+    which way to go on facing with the tool point on axis 1, and theta1 where the pose leaves it
+    free. within_limits: keep every axis inside its limits. Every valid `T` has an answer.
 
     Raises InputError for a `T` or `q_hint` that cannot be used, RobotDescriptionError for an arm of
     another kind.
@@ -140,7 +140,7 @@ def _limits(chain: Chain) -> _Limits:
 
 
 def _candidates(
-    arm: Arm,
+    arm: FiveAxisArm,
     limits: _Limits,
     asked: _Asked,
     branch: Branch,
@@ -167,7 +167,7 @@ def _candidates(
         )
 
 
-def _planar_arm(arm: Arm, limits: _Limits, branch: Branch) -> PlanarArm:
+def _planar_arm(arm: FiveAxisArm, limits: _Limits, branch: Branch) -> PlanarArm:
     """Axes 2 to 4 on `branch`: the elbow's side of the stretched arm, the shoulder's of axis 1."""
     lower, upper = max(limits.theta3.lower, -math.pi), min(limits.theta3.upper, math.pi)
     bend = Interval(0.0, upper) if branch.elbow == "up" else Interval(lower, 0.0)
@@ -189,7 +189,10 @@ def _theta1(
     elif math.hypot(asked.R[0, 0], asked.R[1, 0]) > tolerances.ON_AXIS:
         facing = math.atan2(asked.R[1, 0], asked.R[0, 0])
         angles = [facing, facing + math.pi]
-        if branch.shoulder == "back":
+        if hint is not None:
+            # Both ways put the tool there; turning round would be a motion nobody asked for.
+            angles = [min(angles, key=lambda angle: abs(wrapped(angle - float(hint[0]))))]
+        elif branch.shoulder == "back":
             angles.reverse()
     else:
         angles = [0.0 if hint is None else float(hint[0])]
@@ -208,46 +211,57 @@ def _reaching(planar: PlanarArm, u: float, v: float, wish: _Wish) -> _InPlane | 
 
     Behind axis 1, where the branch has no points, the nearest is straight across from (u, v) on it.
     """
-    return _best_at(planar, u if u * planar.side >= 0.0 else 0.0, v, wish, ())
+    return _best_at(planar, u if u * planar.side >= 0.0 else 0.0, v, wish)
 
 
-def _approaching(planar: PlanarArm, u: float, v: float, wish: _Wish) -> _InPlane | None:
+def _approaching(planar: PlanarArm, u: float, v: float, wish: _Wish) -> _InPlane:
     """With the tool point as near to (u, v) as it comes, when it cannot come there."""
     nearest = planar.nearest(u, v)
-    return _best_at(planar, *planar.tool(nearest), wish, (nearest,))
+    held = _chosen(_rolled(nearest, wish), wish.roll_hint)
+    # Where the edge of the workspace holds the arm the same posture comes back, off by the root of
+    # rounding; only on axis 1 is the orientation free to improve.
+    other = _best_at(planar, *planar.tool(nearest), wish)
+    if other is None or other.rotation_error > held.rotation_error - tolerances.TOUCHING:
+        return held
+    return other._replace(posture_bound=True)
 
 
-def _best_at(
-    planar: PlanarArm, u: float, v: float, wish: _Wish, known: tuple[Posture, ...]
-) -> _InPlane | None:
-    """The best orientation with the tool point at (u, v), where the postures `known` hold it.
+def _best_at(planar: PlanarArm, u: float, v: float, wish: _Wish) -> _InPlane | None:
+    """The best orientation with the tool point at (u, v); None when no posture has it there.
 
     Either pitch and roll are both free and best; or the roll is at an end and the pitch best for
-    it; or a joint is at an end and the roll best for that, or at its own end. None when the limits
-    allow no posture at (u, v).
+    it; or a joint is at an end and the roll best for that, or at its own end.
     """
     wanted, roll, hint = wish
     phi, psi = wanted.best()
     posture = planar.at(u, v, phi)
     free_roll = roll.fit(psi)
     if posture is not None and free_roll is not None:
-        return _InPlane(posture, free_roll, wanted.angle(phi, psi), bool(known), False)
+        return _InPlane(posture, free_roll, wanted.angle(phi, psi), False, False)
     found: list[_InPlane] = []
     for end in roll.ends:
         posture = planar.at(u, v, wanted.best_pitch(end))
         if posture is not None:
-            angle = wanted.angle(posture.phi, end)
-            found.append(_InPlane(posture, end, angle, bool(known), True))
-    for posture in (*known, *planar.pitch_ends(u, v)):
-        free_roll = roll.fit(wanted.best_roll(posture.phi))
-        for psi in roll.ends if free_roll is None else (free_roll,):
-            angle = wanted.angle(posture.phi, psi)
-            found.append(_InPlane(posture, psi, angle, True, free_roll is None))
-    if not found:
-        return None
+            found.append(_InPlane(posture, end, wanted.angle(posture.phi, end), False, True))
+    for posture in planar.pitch_ends(u, v):
+        found.extend(_rolled(posture, wish))
+    return _chosen(found, hint) if found else None
+
+
+def _rolled(posture: Posture, wish: _Wish) -> list[_InPlane]:
+    """`posture` with the roll best for its pitch, or with each end of the roll."""
+    wanted, roll, _ = wish
+    best = roll.fit(wanted.best_roll(posture.phi))
+    rolls = roll.ends if best is None else (best,)
+    return [
+        _InPlane(posture, psi, wanted.angle(posture.phi, psi), True, best is None) for psi in rolls
+    ]
+
+
+def _chosen(found: list[_InPlane], roll_hint: float | None) -> _InPlane:
     least = min(each.rotation_error for each in found) + tolerances.SAME_ROTATION
     equal = [each for each in found if each.rotation_error <= least]
-    return equal[0] if hint is None else min(equal, key=lambda each: abs(each.psi - hint))
+    return equal[0] if roll_hint is None else min(equal, key=lambda e: abs(e.psi - roll_hint))
 
 
 def _nearest_candidate(remaining: list[_Candidate], hint: FloatArray | None) -> _Candidate:

@@ -19,7 +19,6 @@ from app.control.session import pitch_and_roll
 from app.control.state import State, ToolTarget
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 from app.view.guard import WORKSPACE
 
@@ -90,10 +89,8 @@ class Gizmo:
             depth_test=False,
         )
 
-    def follow(self, state: State) -> None:
-        """Show the goal of ``state`` wherever no hand is on the handle."""
-        chain = self._model.arm.chain_to(state.tool)
-        T = self._model.T_base_shoulder @ forward(chain, state.goal)
+    def follow(self, state: State, T: FloatArray) -> None:
+        """Go where the goal of ``state`` is, ``T`` (4, 4) in the base frame, unless held."""
         if not self._held:
             _place(self._move, T[:3, 3])
         if "pitch" not in self._held:

@@ -19,7 +19,7 @@ from app.robot.model import RobotModel
 from app.view import readout
 from app.view.texts import AXIS_NAMES, degrees
 
-ANGLE_WORTH_SENDING = 1e-6
+ANGLE_WORTH_SENDING = 2e-6
 """[deg] Rounding on the way to radians and back is less."""
 
 READOUT_INTERVAL = 0.1
@@ -127,7 +127,7 @@ class Panel:
         self._on_person(self._tool, lambda: cmd.SetTool(self._tool.value))
         position = self._gui.add_vector3(
             "x, y, z",
-            np.round(1e3 * T[:3, 3], 1),
+            np.round(1e3 * T[:3, 3]) + 0.0,
             min=(-FARTHEST, -FARTHEST, -FARTHEST),
             max=(FARTHEST, FARTHEST, FARTHEST),
             step=1.0,
@@ -135,7 +135,7 @@ class Panel:
         )
         angles = self._gui.add_vector3(
             "r, p, y",
-            np.round(np.degrees(so3.to_rpy(T[:3, :3])), 1),
+            np.round(np.degrees(so3.to_rpy(T[:3, :3]))) + 0.0,
             min=(-180.0, -180.0, -180.0),
             max=(180.0, 180.0, 180.0),
             step=1.0,
@@ -186,6 +186,7 @@ def typed_pose(
 
 
 def _set(slider: viser.GuiSliderHandle[float], value: float) -> None:
-    value = min(max(value, slider.min), slider.max)
+    # Rounded off where nobody can see it, so that no slider shows "-0.00".
+    value = min(max(round(value, 6) + 0.0, slider.min), slider.max)
     if abs(slider.value - value) > ANGLE_WORTH_SENDING:
         slider.value = value  # type: ignore[misc]  # viser declares it read-only

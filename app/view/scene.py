@@ -12,10 +12,14 @@ import trimesh
 import viser
 
 from app.geometry import so3
+from app.geometry.arrays import FloatArray
 from app.robot.model import Body, RobotModel
 
 ANGLE_WORTH_SENDING = 1e-7
 """[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
+
+GAP_WORTH_SEEING = 1e-3
+"""[m]"""
 
 
 class FrameTree:
@@ -60,6 +64,11 @@ class ArmNodes(FrameTree):
                 server.scene.add_glb(f"{self.path[body.name]}/shape{number}", mesh.read_bytes())
 
 
+COAT = 1e-3
+"""[m] The ghost is this much thicker than the arm: where both are in one place it coats the arm
+instead of flickering in it."""
+
+
 class GhostNodes(FrameTree):
     """Where the arm is going: the same links, translucent, in one colour that tells how it went."""
 
@@ -95,10 +104,33 @@ class GhostNodes(FrameTree):
                 shape.color = colour
 
 
+class Gap:
+    """A line from where the tool was wished to where it can go."""
+
+    COLOUR = (255, 128, 0)
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._line = server.scene.add_line_segments(
+            "/target/gap", np.zeros((1, 2, 3)), self.COLOUR, thickness=0.004, visible=False
+        )
+
+    def show(self, wished: FloatArray | None, goal: FloatArray) -> None:
+        """Draw it between two points (3,) [m] in the base frame; hide it where there is no gap."""
+        visible = wished is not None and bool(np.abs(wished - goal).max() > GAP_WORTH_SEEING)
+        if visible != self._line.visible:
+            self._line.visible = visible
+        if visible:
+            ends = np.array([[wished, goal]], dtype=np.float32)
+            if not np.array_equal(ends, self._line.points):
+                self._line.points = ends
+
+
 def _surface(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Vertices (n, 3) [m] and faces (m, 3) of a GLB file, its materials forgotten."""
     mesh = trimesh.load_scene(path).to_mesh()
-    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    # One vertex a corner: half of what goes over the wire.
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    return mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces)
 
 
 FLOOR = (226, 231, 236)

@@ -9,14 +9,16 @@ import numpy as np
 import viser
 
 from app.control.commands import Command
-from app.control.state import State, Status
+from app.control.state import PoseTarget, State, Status, ToolTarget
 from app.errors import InputError
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
 from app.view.gizmo import Gizmo
 from app.view.panel import READOUT_INTERVAL, Panel
-from app.view.scene import ArmNodes, GhostNodes, furnish
+from app.view.scene import ArmNodes, Gap, GhostNodes, furnish
 
 BRAND = (36, 119, 212)
 
@@ -27,8 +29,7 @@ GHOST_COLOURS: dict[Status, tuple[int, int, int]] = {
 }
 
 GHOST_FROM = np.deg2rad(0.2)
-"""[rad] The ghost shows while a joint is farther than this from its goal: nearer it would only
-flicker inside the arm."""
+"""[rad] The ghost shows while a joint is farther than this from its goal."""
 
 
 class View:
@@ -59,6 +60,7 @@ class View:
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
         self._ghost = GhostNodes(server, model, GHOST_COLOURS[Status.OK])
+        self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
         self._panel = Panel(server, model, mailbox.put, state)
         self._show(loop.snapshot)
@@ -98,8 +100,7 @@ class View:
         state = snapshot.state
         with self._server.atomic():
             self._arm.move(self._model.joint_angles(state.q, state.gripper))
-            self._show_ghost(state)
-            self._gizmo.follow(state)
+            self._show_goal(state)
             self._panel.follow(
                 state,
                 time.perf_counter(),
@@ -107,8 +108,25 @@ class View:
             )
         self._server.flush()
 
-    def _show_ghost(self, state: State) -> None:
+    def _show_goal(self, state: State) -> None:
         away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM
-        self._ghost.show(away, GHOST_COLOURS[state.status])
-        if away:
+        visible = away or state.status is not Status.OK
+        self._ghost.show(visible, GHOST_COLOURS[state.status])
+        if visible:
             self._ghost.move(self._model.joint_angles(state.goal, state.gripper_goal))
+        chain = self._model.arm.chain_to(state.tool)
+        T_base_goal = self._model.T_base_shoulder @ forward(chain, state.goal)
+        self._gizmo.follow(state, T_base_goal)
+        self._gap.show(self._wished(state), T_base_goal[:3, 3])
+
+    def _wished(self, state: State) -> FloatArray | None:
+        """The tool point that was wished, (3,) [m] in the base frame, if one was."""
+        match state.target:
+            case ToolTarget(position=position):
+                p = position
+            case PoseTarget(T=T):
+                p = T[:3, 3]
+            case _:
+                return None
+        T_base_shoulder = self._model.T_base_shoulder
+        return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]

@@ -16,6 +16,7 @@ from playwright.sync_api import Error as PlaywrightError
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
 
+THREAD_SECONDS = 5.0
 ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
 
 

@@ -30,6 +30,7 @@ SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("record.js", "scene.
 WINDOW = (1280, 800)
 READY_SECONDS = 60.0  # a software renderer compiles shaders for up to 22 s
 POLL_MILLISECONDS = 20.0
+THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
 
 
@@ -83,17 +84,19 @@ class ViserPage:
         camera: Camera | None = None,
         nodes: Sequence[str] = (),
         stub_draws: bool = False,
-        shadows: bool = False,
+        full_quality: bool = False,
+        window: tuple[int, int] = WINDOW,
     ) -> Self:
         """Open `url` in a window of its own and wait until the scene can be used.
 
         `nodes` must be there besides whatever the server has sent by then. `stub_draws` leaves
-        out all WebGL drawing, for measuring; `shadows` are off because they are slow.
+        out all WebGL drawing, for measuring. Shadows and smooth edges are slow, so they are there
+        in `full_quality` alone.
         """
         camera = camera or Camera()
-        width, height = WINDOW
+        width, height = window
         context = browser.new_context(viewport={"width": width, "height": height})
-        options = json.dumps({"stubDraws": stub_draws, "shadows": shadows})
+        options = json.dumps({"stubDraws": stub_draws, "fullQuality": full_quality})
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
         context.add_init_script(f"window.harness = {options};\n{scripts}")
         page = context.new_page()
@@ -154,36 +157,49 @@ class ViserPage:
 
     # The wire
 
-    def messages(self, kind: str, *, since: float = 0.0) -> list[Message]:
-        """Messages of one type that the server sent, in order, `since` a time of `time.time()`."""
-        return self._recorded("received", kind, since)
+    def messages(
+        self, kind: str, *, node: str | None = None, since: float = 0.0, last: int | None = None
+    ) -> list[Message]:
+        """Messages of one type that the server sent, in order.
+
+        `node` takes those about one scene node, `since` (as of `time.time()`) leaves older ones
+        out, `last` takes that many of the newest.
+        """
+        return self._recorded("received", kind, node, since, last)
 
     def sent(self, kind: str, *, since: float = 0.0) -> list[Message]:
         """Messages of one type that the page sent, likewise."""
-        return self._recorded("sent", kind, since)
+        return self._recorded("sent", kind, None, since, None)
 
-    def _recorded(self, log: str, kind: str, since: float) -> list[Message]:
+    def _recorded(
+        self, log: str, kind: str, node: str | None, since: float, last: int | None
+    ) -> list[Message]:
+        # Chosen in the page: a long record takes long to carry over.
         found = self.page.evaluate(
-            """([log, type, since]) =>
-                harness[log].filter((each) => each.type === type && each.time >= since)""",
-            [log, kind, since],
+            """([log, type, node, since, last]) => {
+                const found = harness[log].filter((each) => each.type === type
+                    && each.time >= since && (node === null || each.body.name === node));
+                return last === null ? found : found.slice(-last);
+            }""",
+            [log, kind, node, since, last],
         )
         return [Message(each["time"], each["type"], each["body"]) for each in found]
 
-    def last_pose(self, node: str) -> Matrix:
+    def last_pose(self, node: str, *, since: float = 0.0) -> Matrix:
         """T_parent_node as the server last sent it (4,4).
 
-        The server does not send a gizmo's pose back to the page that drags it. Raises
-        LookupError if it never sent one.
+        viser sends no pose of a node that stays where it was made, in its parent's. Nor does it
+        send a gizmo's pose back to the page that drags it. Raises LookupError if the server made
+        no such frame nor sent a pose of it.
         """
-        position, wxyz = (
-            [each.body for each in self.messages(kind) if each.body["name"] == node]
-            for kind in ("SetPositionMessage", "SetOrientationMessage")
+        position, wxyz, made = (
+            self.messages(kind, node=node, since=since, last=1)
+            for kind in ("SetPositionMessage", "SetOrientationMessage", "FrameMessage")
         )
-        if not position and not wxyz:
+        if not (position or wxyz or made):
             raise LookupError(f"the server sent no pose of {node}")
-        rotation = vtf.SO3(np.array(wxyz[-1]["wxyz"] if wxyz else (1.0, 0.0, 0.0, 0.0)))
-        translation = np.array(position[-1]["position"] if position else (0.0, 0.0, 0.0))
+        rotation = vtf.SO3(np.array(wxyz[0].body["wxyz"] if wxyz else (1.0, 0.0, 0.0, 0.0)))
+        translation = np.array(position[0].body["position"] if position else (0.0, 0.0, 0.0))
         return vtf.SE3.from_rotation_and_translation(rotation, translation).as_matrix()
 
     # The scene
@@ -270,6 +286,8 @@ class ViserPage:
         """Type a number into the box beside a label, or into one of several boxes there."""
         row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
         row.locator("input:not([type=hidden])").nth(index).fill(str(value))
+        # viser holds changes back and forgets all but the newest of any control.
+        self.page.wait_for_timeout(2 * THROTTLE_MILLISECONDS)
 
     def click_button(self, label: str) -> None:
         """Click the button with this text."""

@@ -45,7 +45,10 @@
   const getContext = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, attributes) {
     if (!/^webgl/.test(kind)) return getContext.call(this, kind, attributes);
-    const gl = getContext.call(this, kind, { ...attributes, antialias: false });
+    const gl = getContext.call(this, kind, {
+      ...attributes,
+      antialias: harness.fullQuality,
+    });
     if (gl === null || gl.recorded) return gl;
     gl.recorded = true;
     if (harness.stubDraws) for (const name of DRAWS) gl[name] = () => {};
@@ -64,7 +67,7 @@
     set: (value) => {
       viewer = value;
       const { shadowMap } = value.scene.__r3f.root.getState().gl;
-      Object.defineProperty(shadowMap, "enabled", { get: () => harness.shadows, set: () => {} });
+      Object.defineProperty(shadowMap, "enabled", { get: () => harness.fullQuality, set: () => {} });
     },
   });
 })();

@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from app.control.state import Status
-from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 from app.settings import Settings
 from app.view.view import GHOST_COLOURS
 from tests.browser.conftest import OpenPage, Windows
-from tests.browser.page import Message, ViserPage
+from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 
 AXES = tuple(f"Axis {number}" for number in range(1, 6))
@@ -56,30 +55,16 @@ class Robot:
         parts = self.path[link].split("/")
         T = np.eye(4)
         for end in range(3, len(parts) + 1):
-            T = T @ self._sent_pose("/".join(parts[:end]))
+            T = T @ self.page.last_pose("/".join(parts[:end]), since=self.since)
         return T
-
-    def _sent_pose(self, node: str) -> FloatArray:
-        """T_parent_node; viser sends none of a node that stays as it is made, at its parent."""
-        T = np.eye(4)
-        for message in self._of(node, "SetPositionMessage")[-1:]:
-            T[:3, 3] = message.body["position"]
-        for message in self._of(node, "SetOrientationMessage")[-1:]:
-            T[:3, :3] = so3.from_quaternion(message.body["wxyz"])
-        assert self._of(node, "FrameMessage"), f"the server never made {node}"
-        return T
-
-    def _of(self, node: str, kind: str) -> list[Message]:
-        heard = self.page.messages(kind, since=self.since)
-        return [message for message in heard if message.body["name"] == node]
 
     def drawn(self, link: str = "tcp") -> FloatArray:
         """The link's pose in the base frame as three.js drew it."""
-        return self.page.node_pose(self.path[link])
+        return np.array(self.page.node_pose(self.path[link]))
 
     def gizmo(self) -> FloatArray:
         """Where the handle is drawn, (3,) [m] in the base frame."""
-        return self.page.node_pose(MOVE)[:3, 3]
+        return np.array(self.page.node_pose(MOVE)[:3, 3])
 
     def settle(self) -> None:
         """Wait until the arm is where the sliders say, and check that all accounts agree."""
@@ -184,8 +169,7 @@ def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot, model: Rob
     node = robot.path["pan_link"]
     robot.page.drag_slider("Axis 1", 120.0)
     robot.settle()
-    turns = [m for m in robot.page.messages("SetOrientationMessage") if m.body["name"] == node]
-    turns = turns[-20:]
+    turns = robot.page.messages("SetOrientationMessage", node=node, last=20)
     angles = np.array([2.0 * math.atan2(m.body["wxyz"][3], m.body["wxyz"][0]) for m in turns])
     steps, whole = np.abs(np.diff(angles)), abs(angles[-1] - angles[0])
     speed = model.arm.chain.speed[0]
@@ -246,9 +230,7 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
     ]
     assert GHOST_COLOURS[Status.LIMITED] in colours
     shown = [
-        m.body["visible"]
-        for m in page.messages("SetSceneNodeVisibilityMessage")
-        if m.body["name"] == "/ghost"
+        m.body["visible"] for m in page.messages("SetSceneNodeVisibilityMessage", node="/ghost")
     ]
     assert True in shown
     assert shown[-1] is False

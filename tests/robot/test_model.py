@@ -119,5 +119,5 @@ def test_a_file_that_will_not_do_is_refused_with_a_reason(
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RobotDescriptionError, match="nowhere.urdf"):
+    with pytest.raises(RobotDescriptionError, match=r"nowhere\.urdf"):
         load(tmp_path / "nowhere.urdf")

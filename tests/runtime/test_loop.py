@@ -120,11 +120,11 @@ def test_a_driver_that_fails_makes_the_arm_hold_and_say_so(
         clock.t += 0.01
         loop.tick()
     assert np.allclose(loop.snapshot.state.q, moving.setpoint)
-    assert loop.snapshot.state.status is Status.FAULT
+    assert loop.snapshot.state.findings == held.findings
     mailbox.put(cmd.Home())
     clock.t += 0.01
     loop.tick()
-    assert loop.snapshot.state.status is Status.OK
+    assert loop.snapshot.state.findings == ()
 
 
 def test_waiting_for_a_change_returns_with_it_or_when_time_is_up(table: LoopOnATable) -> None:

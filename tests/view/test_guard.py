@@ -17,6 +17,7 @@ import viser
 import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
 
 from tests.browser.server import BARE_APP, AppServer
 
@@ -82,17 +83,17 @@ class Peer:
         which = {"name": GIZMO["name"], "owner": "", **changed}
         await self.say(type="TransformControlsDragStartMessage", **which)
         update = {"type": GIZMO["type"], "wxyz": wxyz, "position": position}
-        await self.say(**(which | update))  # type: ignore[arg-type]
+        await self.say(**(which | update))
 
 
 @asynccontextmanager
 async def peers(url: str) -> AsyncIterator[tuple[Peer, Peer]]:
     """A client that means ill and one that watches."""
     address = url.replace("http", "ws")
-    subprotocol = f"viser-v{viser.__version__}"
+    subprotocol = Subprotocol(f"viser-v{viser.__version__}")
     async with (
-        connect(address, subprotocols=[subprotocol], max_size=None) as bad,  # type: ignore[list-item]
-        connect(address, subprotocols=[subprotocol], max_size=None) as good,  # type: ignore[list-item]
+        connect(address, subprotocols=[subprotocol], max_size=None) as bad,
+        connect(address, subprotocols=[subprotocol], max_size=None) as good,
     ):
         pair = Peer(bad), Peer(good)
         for peer in pair:

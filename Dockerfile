@@ -1,0 +1,23 @@
+# docker build -t katana450 . && docker run --rm -p 8080:8080 katana450
+FROM python:3.12.11-slim-bookworm AS build
+WORKDIR /src
+COPY requirements.lock ./
+RUN python -m venv /opt/katana450 \
+ && /opt/katana450/bin/pip install --no-cache-dir --require-hashes --requirement requirements.lock
+COPY pyproject.toml README.md LICENSE ./
+COPY app app
+COPY robot_description robot_description
+COPY static static
+RUN /opt/katana450/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
+
+FROM python:3.12.11-slim-bookworm
+COPY --from=build /opt/katana450 /opt/katana450
+RUN useradd --system --create-home --uid 10450 katana
+USER katana
+EXPOSE 8080
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=30s --timeout=3s --start-period=10s \
+  CMD ["/opt/katana450/bin/python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8080', timeout=2)"]
+ENTRYPOINT ["/opt/katana450/bin/katana450"]
+# Inside a container the port must be open to the outside of it; -p decides who reaches it there.
+CMD ["serve", "--host", "0.0.0.0"]
