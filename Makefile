@@ -9,7 +9,7 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test check lint types contracts tests browser robot bench-drag lock clean
+.PHONY: run test check lint types contracts tests browser robot bench-drag bench-start pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -38,7 +38,13 @@ robot: $(dev_ok)              ## rebuild robot_description/meshes from the numbe
 	$(bin)/python -m robot_description.cad
 
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
-	$(bin)/python benchmarks/drag_to_frame.py $(ARGS)
+	$(bin)/python -m benchmarks.drag_to_frame $(ARGS)
+
+bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
+	$(bin)/python -m benchmarks.start_and_idle $(ARGS)
+
+pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
+	$(bin)/python -m docs.pictures
 
 lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \

@@ -1,4 +1,4 @@
-"""``katana450 serve``: put the parts together and run until told to stop."""
+"""``katana450 serve``: open the port, put the parts together, run until told to stop."""
 
 from __future__ import annotations
 
@@ -8,30 +8,13 @@ import sys
 import threading
 from types import FrameType
 
-import numpy as np
-
-from app.control.session import Session
-from app.drivers.simulated import SimulatedDriver
-from app.robot.model import load
-from app.runtime.clock import MonotonicClock
-from app.runtime.loop import ControlLoop
-from app.runtime.mailbox import Mailbox
 from app.settings import Settings
 from app.view.server import open_server
-from app.view.view import View
 
 
 def serve(settings: Settings) -> int:
     """Run the app until SIGINT or SIGTERM; returns the exit status."""
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
-    # The server comes first: a busy port should be told at once.
-    server = open_server(settings.host, settings.port)
-    model = load()
-    session = Session(model.arm, np.array(settings.ready))
-    driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
-    mailbox = Mailbox(session.check)
-    loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
-    view = View(server, model, loop, mailbox, settings.frame_rate)
     stopping = threading.Event()
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
@@ -39,13 +22,17 @@ def serve(settings: Settings) -> int:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
-    loop.start()
-    view.start()
-    print(f"katana450 is ready: http://{_shown(settings.host)}:{server.get_port()}", flush=True)
-    print("Open it in a browser and drag the handle at the gripper. Ctrl-C stops.", flush=True)
+    server = open_server(settings.host, settings.port)
+    url = f"http://{_shown(settings.host)}:{server.get_port()}"
+    print(f"Open {url} in a browser.", flush=True)
+    # The libraries that read the robot take most of a second: the page loads in the meantime.
+    from app.cli.assembly import Assembly
+
+    assembly = Assembly(server, settings)
+    assembly.start()
+    print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
     stopping.wait()
-    view.stop()
-    loop.stop()
+    assembly.stop()
     return 0
 
 

@@ -138,9 +138,8 @@ SKY = (247, 249, 251)
 
 
 def furnish(server: viser.ViserServer) -> None:
-    """The room: floor, light, where a person first looks from."""
+    """The room: floor and light."""
     scene = server.scene
-    scene.set_up_direction("+z")
     scene.add_grid(
         "/floor",
         infinite_grid=True,
@@ -159,9 +158,6 @@ def furnish(server: viser.ViserServer) -> None:
     )
     scene.set_background_image(_gradient(SKY, FLOOR), format="png")
     scene.configure_environment_map("studio", environment_intensity=0.35)
-    server.initial_camera.position = (0.98, -0.82, 0.62)
-    server.initial_camera.look_at = (0.17, 0.0, 0.25)
-    server.initial_camera.fov = float(np.deg2rad(40.0))
 
 
 def _gradient(top: tuple[int, int, int], bottom: tuple[int, int, int]) -> npt.NDArray[np.uint8]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
+import math
 import socket
 
 import viser
@@ -10,21 +13,39 @@ import viser
 from app.errors import ConfigurationError
 from app.view.guard import Guard
 
+BRAND = (36, 119, 212)
+
 
 def open_server(host: str, port: int) -> viser.ViserServer:
-    """A guarded viser server on ``host``:``port``; port 0 takes any free one.
+    """A guarded viser server on ``host``:``port``, its scene still empty; port 0 takes a free one.
 
     Raises:
         ConfigurationError: the port is busy, or cannot be had; says which and what to do.
     """
     _check_free(host, port)
-    server = viser.ViserServer(host=host, port=port, label="Katana450", verbose=False)
+    # What viser prints of itself here would stand between a person and our own line.
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=host, port=port, label="Katana450", verbose=False)
     # viser takes the next port when another program was quicker; a person would look in vain.
     if port not in (0, server.get_port()):
         server.stop()
         raise ConfigurationError(_busy(host, port))
     Guard(server)
+    _dress(server)
     return server
+
+
+def _dress(server: viser.ViserServer) -> None:
+    """What a page takes over when it connects, and so must stand before the first one does."""
+    server.gui.configure_theme(
+        control_width="medium", show_logo=False, show_share_button=False, brand_color=BRAND
+    )
+    server.gui.set_panel_label("Katana450")
+    server.gui.main_panel.dock_right()
+    server.scene.set_up_direction("+z")
+    server.initial_camera.position = (0.98, -0.82, 0.62)
+    server.initial_camera.look_at = (0.17, 0.0, 0.25)
+    server.initial_camera.fov = math.radians(40.0)
 
 
 def _check_free(host: str, port: int) -> None:

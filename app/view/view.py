@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import threading
 import time
 
@@ -19,8 +21,6 @@ from app.runtime.mailbox import Mailbox
 from app.view.gizmo import Gizmo
 from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.scene import ArmNodes, Gap, GhostNodes, furnish
-
-BRAND = (36, 119, 212)
 
 GHOST_COLOURS: dict[Status, tuple[int, int, int]] = {
     Status.OK: (64, 156, 255),
@@ -51,11 +51,6 @@ class View:
         self._interval = 1.0 / frame_rate
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
-        server.gui.configure_theme(
-            control_width="medium", show_logo=False, show_share_button=False, brand_color=BRAND
-        )
-        server.gui.set_panel_label("Katana450")
-        server.gui.main_panel.dock_right()
         furnish(server)
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
@@ -74,7 +69,9 @@ class View:
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
-        self._server.stop()
+        # viser would say goodbye in its own words.
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
 
     def _put_from_gizmo(self, command: Command) -> None:
         try:

@@ -87,6 +87,13 @@ class AppServer:
         """Whether the process lives."""
         return self._process is not None and self._process.poll() is None
 
+    @property
+    def pid(self) -> int:
+        """The process's number. Raises ServerError if it does not run."""
+        if self._process is None:
+            raise ServerError(f"{self._name} does not run")
+        return self._process.pid
+
     def start(self) -> None:
         """Start the process and return when it is ready.
 
@@ -138,6 +145,10 @@ class AppServer:
                     f"It printed:\n{self.output}"
                 ) from error
         self._collect()
+
+    def close(self) -> None:
+        """The same as `stop`, for `contextlib.closing`."""
+        self.stop()
 
     def kill(self) -> None:
         """End the process and its children at once, without a farewell (SIGKILL)."""

@@ -45,6 +45,7 @@ def test_it_serves_the_page_on_this_machine_only() -> None:
 
 def test_a_busy_port_is_told_with_the_way_out() -> None:
     with socket.socket() as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         other.bind(("127.0.0.1", free_port()))
         other.listen()
         port = other.getsockname()[1]

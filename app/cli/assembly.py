@@ -1,0 +1,37 @@
+"""The parts of a running app, put together."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.control.session import Session
+from app.drivers.simulated import SimulatedDriver
+from app.robot.model import load
+from app.runtime.clock import MonotonicClock
+from app.runtime.loop import ControlLoop
+from app.runtime.mailbox import Mailbox
+from app.settings import Settings
+from app.view.view import View
+
+
+class Assembly:
+    """A simulated arm, its control loop, and the view of it on a server that is open already."""
+
+    def __init__(self, server: viser.ViserServer, settings: Settings) -> None:
+        model = load()
+        session = Session(model.arm, np.array(settings.ready))
+        driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
+        mailbox = Mailbox(session.check)
+        self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
+        self._view = View(server, model, self._loop, mailbox, settings.frame_rate)
+
+    def start(self) -> None:
+        """Run the control loop and the view in threads of their own."""
+        self._loop.start()
+        self._view.start()
+
+    def stop(self) -> None:
+        """End both; the server closes with the view."""
+        self._view.stop()
+        self._loop.stop()
