@@ -271,6 +271,17 @@ def test_every_browser_sees_the_same_arm_and_may_move_it(
     assert other.page.errors == []
 
 
+def come_back(robot: Robot, server: AppServer) -> None:
+    """Start the server anew, wait for the page, and see that nothing of the old motion is left."""
+    robot.page.wait_lost()
+    robot.since = time.time()
+    server.restart()
+    robot.page.wait_until(lambda: robot.page.connected, "the page to come back", seconds=20.0)
+    robot.page.wait_ready(("/arm", MOVE))
+    robot.page.wait_until(lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders at home")
+    robot.settle()
+
+
 def test_killed_and_restarted_the_app_comes_back_whole(
     open_page: OpenPage, model: RobotModel, artefacts: Path
 ) -> None:
@@ -279,18 +290,8 @@ def test_killed_and_restarted_the_app_comes_back_whole(
         robot.page.drag_slider("Axis 1", 70.0)
         robot.settle()
         server.kill()
-        robot.page.wait_lost()
-        robot.since = time.time()
-        server.restart()
-        robot.page.wait_until(lambda: robot.page.connected, "the page to come back", seconds=20.0)
-        robot.page.wait_ready(("/arm", MOVE))
-        # A new arm stands at home: nothing of the old motion is left.
-        robot.page.wait_until(
-            lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders of the new server"
-        )
-        robot.settle()
-        sliders = robot.page.page.get_by_role("slider").count()
-        assert sliders == len(AXES) + 1
+        come_back(robot, server)
+        assert robot.page.page.get_by_role("slider").count() == len(AXES) + 1
         robot.page.drag_arrow(MOVE, "z", 0.05)
         robot.settle()
         robot.page.screenshot(artefacts / "app-restarted.png")
@@ -305,11 +306,4 @@ def test_killed_in_mid_drag_the_app_comes_back_at_rest(
             grip.sweep(0.05, 4)
             server.kill()
             robot.page.wait_lost()
-        robot.since = time.time()
-        server.restart()
-        robot.page.wait_until(lambda: robot.page.connected, "the page to come back", seconds=20.0)
-        robot.page.wait_ready(("/arm", MOVE))
-        robot.page.wait_until(
-            lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders of the new server"
-        )
-        robot.settle()
+        come_back(robot, server)
