@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
+import signal
 import threading
 
 import viser
@@ -86,6 +87,8 @@ def main() -> None:
     add_gizmo(server)
     add_slider(server)
     print(f"bare viser app is ready: http://127.0.0.1:{port}", flush=True)
+    # Python leaves Ctrl-C ignored where it was started so, in the background of a shell.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with contextlib.suppress(KeyboardInterrupt):
         threading.Event().wait()
     server.stop()
