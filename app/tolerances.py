@@ -38,7 +38,7 @@ ON_AXIS: Final = 1e-9
 
 # [1] Distance of the tool point from axis 1, to the length of the arm, below which the direction of
 # the tool tells theta1 better than its place does.
-NEAR_AXIS_1: Final = 0.02
+NEAR_AXIS_1: Final = 1e-3
 
 # [rad] Step of theta1 at which the search for the nearest point beside axis 1 has settled.
 ALIGNED: Final = 1e-13
