@@ -6,9 +6,8 @@ import logging
 import signal
 import sys
 import threading
+from pathlib import Path
 from types import FrameType
-
-import numpy as np
 
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
@@ -19,15 +18,21 @@ from app.runtime.mailbox import Mailbox
 from app.settings import Settings
 from app.view.server import open_server
 from app.view.view import View
+from robot_description import URDF_PATH
 
 
-def serve(settings: Settings) -> int:
-    """Run the app until SIGINT or SIGTERM; returns the exit status."""
+def serve(settings: Settings, urdf: Path = URDF_PATH, tool: str | None = None) -> int:
+    """Run the app until SIGINT or SIGTERM; returns the exit status.
+
+    ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``.
+    """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
     # The server comes first: a busy port should be told at once.
     server = open_server(settings.host, settings.port)
-    model = load()
-    session = Session(model.arm, np.array(settings.ready))
+    model = load(urdf, tool)
+    for note in model.notes:
+        print(f"katana450: {note}", file=sys.stderr)
+    session = Session(model.arm, model.ready(settings.ready))
     driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
     mailbox = Mailbox(session.check)
     loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)

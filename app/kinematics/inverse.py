@@ -11,6 +11,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from app import tolerances
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.geometry.se3 import Rows
@@ -61,6 +62,16 @@ class Solution:
     def rotation_error(self) -> float:
         """Angle [rad] between the same two."""
         return self._measured()[1]
+
+    @property
+    def exact(self) -> bool:
+        """Whether the arm takes the asked pose there, to rounding, that of its file included."""
+        arm = Solver.of(self._chain).arm
+        rounding = 2.0 * (arm.skew * arm.reach + arm.gap)
+        return (
+            self.position_error <= tolerances.SAME_POSITION + rounding
+            and self.rotation_error <= tolerances.SAME_ROTATION + 4.0 * arm.skew
+        )
 
     def _measured(self) -> tuple[float, float]:
         if self._errors is None:
