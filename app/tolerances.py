@@ -8,6 +8,10 @@ from typing import Final
 # rotation: single-precision numbers and rounded text pass, a scale or a shear does not.
 ROTATION_INPUT: Final = 1e-6
 
+# How far from orthonormal a rotation is that a few products of rotations in double precision made:
+# finding the nearest one would only exchange this rounding for its own.
+ROTATION_EXACT: Final = 4e-15
+
 # How far from 0 0 0 1 the last row of a pose may be: rounding of a product of poses, no more.
 POSE_LAST_ROW: Final = 1e-9
 
@@ -17,13 +21,27 @@ SCREW: Final = 1e-9
 # Cosine of the pitch below which roll and yaw turn about one axis and only their sum is known.
 GIMBAL_LOCK: Final = 1e-9
 
-# [1, m] How exactly the axes of a described arm must cross, be square or parallel. A rounded number
-# in a description file shows up far above this, rounding of double precision far below.
-ARM_GEOMETRY: Final = 1e-9
+# [rad], [m] How far the axes of a described arm may be off parallel, square or crossing and still
+# be meant so: a file with five decimals passes, a real offset does not.
+FAMILY_ANGLE: Final = 1e-4
+FAMILY_LENGTH: Final = 1e-5
+
+# [rad, m] Up to here nothing of the above is worth a word.
+FAMILY_EXACT: Final = 1e-9
+
+# [1, m] What is left of a 0 or a 1 after a few products of matrices in double precision.
+ROUNDING: Final = 1e-15
 
 # [m] Distance below which a point counts as lying on a rotation axis: its direction seen from the
 # axis is then known to fewer digits than a joint encoder resolves.
 ON_AXIS: Final = 1e-9
+
+# [1] Distance of the tool point from axis 1, to the length of the arm, below which the direction of
+# the tool tells theta1 better than its place does.
+NEAR_AXIS_1: Final = 1e-3
+
+# [rad] Step of theta1 at which the search for the nearest point beside axis 1 has settled.
+ALIGNED: Final = 1e-13
 
 # [m, or the unit of the plane's d] Misfit up to which a subproblem's answer counts as exact.
 SUBPROBLEM_EXACT: Final = 1e-9

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+import sys
+from pathlib import Path
+
 import viser
 
 from app.control.session import Session
@@ -18,9 +20,14 @@ from app.view.view import View
 class Assembly:
     """A simulated arm, its control loop, and the view of it on a server that is open already."""
 
-    def __init__(self, server: viser.ViserServer, settings: Settings) -> None:
-        model = load()
-        session = Session(model.arm, np.array(settings.ready))
+    def __init__(
+        self, server: viser.ViserServer, settings: Settings, urdf: Path, tool: str | None
+    ) -> None:
+        """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``."""
+        model = load(urdf, tool)
+        for note in model.notes:
+            print(f"katana450: {note}", file=sys.stderr)
+        session = Session(model.arm, model.ready(settings.ready))
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)

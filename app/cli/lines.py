@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
@@ -24,9 +25,12 @@ Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 class Kinematics:
     """Forward and inverse kinematics of the arm in the URDF, on plain JSON values."""
 
-    def __init__(self, *, in_base_frame: bool) -> None:
-        """``in_base_frame``: poses are in the base frame on the table, else in {S}."""
-        model = load()
+    def __init__(self, urdf: Path, tool: str | None, *, in_base_frame: bool) -> None:
+        """``in_base_frame``: poses are in the base frame on the table, else in {S}.
+
+        ``urdf``, ``tool``: the arm, and the link that is its default tool; see ``load``.
+        """
+        model = load(urdf, tool)
         self._arm = model.arm
         self._T_frame_shoulder = model.T_base_shoulder if in_base_frame else np.eye(4)
 
@@ -46,7 +50,8 @@ class Kinematics:
         T = se3.validated(_numbers(request, "T"), "T")
         T_shoulder = se3.inverse(self._T_frame_shoulder) @ T
         nearest = project(chain, T_shoulder, within_limits=False).T
-        solutions = inverse(chain, nearest)
+        # With axes that do not cross, not every branch reaches every pose.
+        solutions = [solution for solution in inverse(chain, nearest) if solution.exact]
         reached = [forward(chain, solution.q) for solution in solutions]
         return {
             "solutions": [

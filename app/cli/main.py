@@ -6,9 +6,11 @@ import argparse
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from app.errors import KatanaError
 from app.settings import Settings
+from robot_description import URDF_PATH
 
 FRAMES = ("shoulder", "base")
 
@@ -21,10 +23,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "serve":
             from app.cli.serve import serve
 
-            return serve(Settings(host=options.host, port=options.port))
+            settings = Settings(host=options.host, port=options.port)
+            return serve(settings, options.urdf, options.tool)
         from app.cli.lines import Kinematics, answer_lines
 
-        kinematics = Kinematics(in_base_frame=options.frame == "base")
+        in_base_frame = options.frame == "base"
+        kinematics = Kinematics(options.urdf, options.tool, in_base_frame=in_base_frame)
         answer_lines(kinematics.fk if options.command == "fk" else kinematics.ik)
         return 0
     except KatanaError as error:
@@ -66,6 +70,17 @@ def _parser() -> argparse.ArgumentParser:
             default=FRAMES[0],
             help="coordinates of T: the paper's frame {S} at the shoulder, or the base on the "
             "table (default: %(default)s)",
+        )
+    for command in commands.choices.values():
+        command.add_argument(
+            "--urdf",
+            type=Path,
+            default=URDF_PATH,
+            metavar="FILE",
+            help="another arm: pan, three parallel axes, roll (default: the Katana450)",
+        )
+        command.add_argument(
+            "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
         )
     return parser
 

@@ -6,14 +6,19 @@ import logging
 import signal
 import sys
 import threading
+from pathlib import Path
 from types import FrameType
 
 from app.settings import Settings
 from app.view.server import open_server
+from robot_description import URDF_PATH
 
 
-def serve(settings: Settings) -> int:
-    """Run the app until SIGINT or SIGTERM; returns the exit status."""
+def serve(settings: Settings, urdf: Path = URDF_PATH, tool: str | None = None) -> int:
+    """Run the app until SIGINT or SIGTERM; returns the exit status.
+
+    ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
+    """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
     stopping = threading.Event()
 
@@ -28,7 +33,7 @@ def serve(settings: Settings) -> int:
     # The libraries that read the robot take most of a second: the page loads in the meantime.
     from app.cli.assembly import Assembly
 
-    assembly = Assembly(server, settings)
+    assembly = Assembly(server, settings, urdf, tool)
     assembly.start()
     print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
     stopping.wait()

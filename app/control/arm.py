@@ -13,11 +13,22 @@ from app.kinematics.chain import Chain
 
 @dataclass(frozen=True)
 class Gripper:
-    """The driven finger joint: limits [rad], greatest speed [rad/s]; ``lower`` is closed."""
+    """The driven finger joint: limits [rad], greatest speed [rad/s]; ``lower`` is closed.
+
+    That of an arm without fingers has nowhere to go.
+    """
 
     lower: float
     upper: float
     speed: float
+
+    @property
+    def moves(self) -> bool:
+        """Whether there is anything to open."""
+        return self.lower < self.upper
+
+
+NO_GRIPPER = Gripper(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +39,7 @@ class Arm:
         chain: the joints in frame {S}; its ``M`` is that of ``default_tool``.
         tools: home configuration M, (4, 4) in {S}, of each named tool frame.
         default_tool: a key of ``tools``.
-        gripper: the finger joint.
+        gripper: the finger joint, or ``NO_GRIPPER``.
     """
 
     chain: Chain

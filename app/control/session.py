@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -13,10 +12,10 @@ from app.control.arm import Arm
 from app.control.findings import of_joints, of_projection
 from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
 from app.errors import InputError
-from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import branch_of
 from app.kinematics.forward import forward
+from app.kinematics.freedoms import pitch_and_roll, tool_pose
 from app.kinematics.inverse import inverse
 from app.kinematics.projection import project
 from app.motion.approach import approach
@@ -134,8 +133,9 @@ class Session:
         """The tool target that a drag starts from: the last one wished, else where the goal is."""
         if isinstance(state.target, ToolTarget):
             return state.target
-        T = forward(self.arm.chain_to(state.tool), state.goal)
-        return ToolTarget(frozen(T[:3, 3]), *pitch_and_roll(state.goal))
+        chain = self.arm.chain_to(state.tool)
+        T = forward(chain, state.goal)
+        return ToolTarget(frozen(T[:3, 3]), *pitch_and_roll(chain, state.goal))
 
     def _aim(self, state: State, target: Target) -> State:
         """Make ``target`` the target, and the nearest the arm can do the goal."""
@@ -165,16 +165,9 @@ class Session:
 
     def _pose(self, state: State, target: ToolTarget) -> FloatArray:
         """The pose in {S} that five numbers mean: the tool lies in the plane through axis 1."""
-        x, y, _ = target.position
-        if math.hypot(x, y) < self._ON_AXIS:
-            azimuth = float(state.goal[0])
-        else:
-            azimuth = math.atan2(y, x) + (0.0 if state.branch.shoulder == "front" else math.pi)
-        R = so3.rotation_z(azimuth) @ so3.rotation_y(target.pitch) @ so3.rotation_x(target.roll)
-        return se3.from_rotation_translation(R, target.position)
-
-    _ON_AXIS = 1e-9
-    """[m] Nearer to axis 1 than this the direction to the tool point means nothing."""
+        chain = self.arm.chain_to(state.tool)
+        shoulder = state.branch.shoulder
+        return tool_pose(chain, target.position, target.pitch, target.roll, shoulder, state.goal)
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper
@@ -182,8 +175,3 @@ class Session:
         others = tuple(f for f in state.findings if f.reason is not Reason.GRIPPER_LIMIT)
         held = (Finding(Reason.GRIPPER_LIMIT, goal),) if goal != angle else ()
         return replace(state, gripper_goal=goal, findings=others + held)
-
-
-def pitch_and_roll(q: FloatArray) -> tuple[float, float]:
-    """Pitch below the horizontal and roll [rad] of a pan, three parallel, roll arm at ``q``."""
-    return float(q[1] + q[2] + q[3]), float(q[4])

@@ -17,6 +17,9 @@ from app.errors import InputError
 from app.geometry import so3
 from app.geometry.arrays import FloatArray, finite_array
 
+Rows = list[list[float]]
+"""A matrix as nested lists of floats, which beat arrays for one pose at a time."""
+
 
 def hat(V: npt.ArrayLike) -> FloatArray:
     """The (4, 4) matrix of the twist V = (omega, v) (6,)."""
@@ -91,8 +94,39 @@ def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
     Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, or its
     rotation is none.
     """
+    return np.array(validated_rows(T, name))
+
+
+def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
+    """What `validated` returns, as nested lists of floats."""
+    if type(T) is np.ndarray and T.dtype == np.float64 and T.shape == (4, 4):
+        rows: Rows = T.tolist()
+        if _is_clean(rows):
+            return rows
     M = finite_array(T, (4, 4), name)
     if np.abs(M[3] - (0.0, 0.0, 0.0, 1.0)).max() > tolerances.POSE_LAST_ROW:
         row = " ".join(f"{x:g}" for x in M[3])
         raise InputError(f"{name} has the last row {row}; a pose ends in 0 0 0 1.")
-    return from_rotation_translation(so3.validated(M[:3, :3], f"The rotation of {name}"), M[:3, 3])
+    R = so3.validated(M[:3, :3], f"The rotation of {name}")
+    clean: Rows = from_rotation_translation(R, M[:3, 3]).tolist()
+    return clean
+
+
+def _is_clean(rows: Rows) -> bool:
+    """Whether the rows are those of a pose as well as double precision can write it.
+
+    On plain floats, because this stands before every inverse kinematics. NaN fails every test.
+    """
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), last = rows
+    exact = tolerances.ROTATION_EXACT
+    return (
+        last == [0.0, 0.0, 0.0, 1.0]
+        and -exact <= a * a + d * d + g * g - 1.0 <= exact
+        and -exact <= b * b + e * e + h * h - 1.0 <= exact
+        and -exact <= a * b + d * e + g * h <= exact
+        # The third axis is right-handed: unit length and squareness follow.
+        and -exact <= d * h - g * e - c <= exact
+        and -exact <= g * b - a * h - f <= exact
+        and -exact <= a * e - d * b - i <= exact
+        and x - x == y - y == z - z == 0.0
+    )

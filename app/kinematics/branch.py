@@ -21,10 +21,10 @@ Elbow = Literal["up", "down"]
 class Branch:
     """A region of the joint space that the arm leaves only through a singularity.
 
-    shoulder: "front" when the tool point's radial coordinate in the arm's vertical plane,
-    r = x cos(theta1) + y sin(theta1), is >= 0. elbow: "up" when theta3 >= 0, which puts the elbow
-    above the line from shoulder to wrist while the arm faces front. The regions meet where r = 0
-    or sin(theta3) = 0.
+    Of the canonical arm (see app/kinematics/arm.py; the Katana is its own): shoulder: "front" when
+    the tool point's radial coordinate in the arm's plane, r = x cos(alpha1) + y sin(alpha1) from
+    axis 1, is >= 0. elbow: "up" when sin(alpha3) >= 0, which puts the elbow above the line from
+    shoulder to wrist while the arm faces front. The regions meet where r = 0 or sin(alpha3) = 0.
     """
 
     shoulder: Shoulder
@@ -53,9 +53,10 @@ BRANCHES: Final[tuple[Branch, ...]] = (
 
 def branch_of(chain: Chain, q: npt.ArrayLike) -> Branch:
     """The branch the joint angles `q` (5,) [rad] stand on."""
-    arm_of(chain)
+    arm = arm_of(chain)
     q = chain.check_q(q)
-    x, y, _ = forward(chain, q)[:3, 3]
-    r = x * math.cos(q[0]) + y * math.sin(q[0])
-    elbow_up = math.remainder(q[2], math.tau) >= 0.0
+    alpha1, _, alpha3, _, _ = arm.canonical(q).tolist()
+    x, y = arm.pose(forward(chain, q))[:2, 3].tolist()
+    r = x * math.cos(alpha1) + y * math.sin(alpha1)
+    elbow_up = math.remainder(alpha3, math.tau) >= 0.0
     return Branch("front" if r >= 0.0 else "back", "up" if elbow_up else "down")

@@ -27,11 +27,22 @@ class PlaneOrientation(NamedTuple):
     z: float
 
     @staticmethod
-    def of(R: FloatArray, theta1: float) -> PlaneOrientation:
-        """That of the rotation `R` (3, 3) in {S}, with the arm's plane at `theta1`."""
-        w, x, y, z = (float(part) for part in so3.to_quaternion(R))
+    def of(R: FloatArray) -> PlaneOrientation:
+        """That of the rotation `R` (3, 3), with the arm's plane at theta1 = 0."""
+        w, x, y, z = so3.to_quaternion(R).tolist()
+        return PlaneOrientation(w, x, y, z)
+
+    def seen_from(self, theta1: float) -> PlaneOrientation:
+        """The same orientation with the arm's plane at `theta1`: Rz(theta1)^T A."""
+        w, x, y, z = self
         c, s = math.cos(0.5 * theta1), math.sin(0.5 * theta1)
         return PlaneOrientation(c * w + s * z, c * x + s * y, c * y - s * x, c * z - s * w)
+
+    def tilted(self, tilt: float) -> PlaneOrientation:
+        """Ry(tilt) A: what phi + tilt is to this one, phi is to A."""
+        w, x, y, z = self
+        c, s = math.cos(0.5 * tilt), math.sin(0.5 * tilt)
+        return PlaneOrientation(c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x)
 
     def best(self) -> tuple[float, float]:
         """The nearest (phi, psi): the top singular vectors of the 2x2 matrix, in closed form."""

@@ -1,8 +1,8 @@
 """Axes 2, 3 and 4 as a limited planar 3R arm: where its tool point can be, and at which pitch.
 
-The plane is the arm's vertical one: u outward from axis 1 (the radial coordinate), v downward, so
-that theta2, theta3, theta4 turn u towards v. The pitch phi = theta2 + theta3 + theta4 is the tool's
-angle below the horizontal. Lengths in m, angles in rad.
+The plane is that of the canonical arm: its origin the shoulder, u outward from axis 1, v along it
+downward, so that theta2, theta3, theta4 (here the canonical angles) turn u towards v. phi = theta2
++ theta3 + theta4 is the angle of the last link below the horizontal. Lengths in m, angles in rad.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from app import tolerances
-from app.kinematics.subproblems import wrapped
+from app.kinematics.turns import wrapped
 
 
 class Interval(NamedTuple):
@@ -94,9 +94,10 @@ def _meeting(
 class PlanarArm:
     """A planar 3R arm on one branch.
 
-    l1, l2, l3: link lengths [m]. theta2, theta4: their limits. theta3: its limits cut to the
-    elbow's side of the stretched arm; an end at 0 or pi is that singularity, not a limit. side: +1
-    where the tool point must keep u >= 0, -1 where u <= 0.
+    l1, l2, l3: link lengths [m]. theta2, theta4: their limits. theta3: its limits cut to one side
+    of the stretched and of the folded arm; an end there is that singularity, not a limit. bend: +1
+    where that side is the elbow up, -1 where it is down. axis: u of axis 1 [m]. side: +1 where the
+    tool point must keep u >= axis, -1 where u <= axis.
     """
 
     l1: float
@@ -105,7 +106,13 @@ class PlanarArm:
     theta2: Interval
     theta3: Interval
     theta4: Interval
+    bend: int
+    axis: float
     side: int
+
+    def behind(self, u: float) -> float:
+        """How far [m] a point lies across axis 1 from the arm's side; negative on its side."""
+        return (self.axis - u) * self.side
 
     def tool(self, posture: Posture) -> tuple[float, float]:
         """(u, v) [m] of the tool point."""
@@ -126,7 +133,7 @@ class PlanarArm:
         if min(stretched, folded) < -tolerances.RADICAND * far * far:
             return None
         bend = 2.0 * math.atan2(math.sqrt(max(stretched, 0.0)), math.sqrt(max(folded, 0.0)))
-        theta3 = bend if self.theta3.upper > 0.0 else -bend
+        theta3 = self.bend * bend
         theta2 = math.atan2(wv, wu) - _joined(self.l1, self.l2, theta3).bearing
         return self._posture(theta2, theta3, phi - theta2 - theta3)
 
@@ -167,7 +174,7 @@ class PlanarArm:
 
         def misplaced(posture: Posture) -> tuple[bool, float]:
             pu, pv = self.tool(posture)
-            wrong_side = pu * self.side < -tolerances.PLANAR_LIMIT_SLACK
+            wrong_side = self.behind(pu) > tolerances.PLANAR_LIMIT_SLACK
             return wrong_side, math.hypot(pu - u, pv - v)
 
         best = min(self._stationary(u, v, on_axis=False), key=lambda p: misplaced(p)[1])
@@ -220,15 +227,16 @@ class PlanarArm:
     def _directions(
         self, center: tuple[float, float], radius: float, u: float, v: float, on_axis: bool
     ) -> tuple[float, ...]:
-        """From `center`: towards (u, v), and if asked to where the circle crosses axis 1, u = 0."""
+        """From `center`: towards (u, v), and if asked to where the circle crosses axis 1."""
         towards = math.atan2(v - center[1], u - center[0])
-        if not on_axis or abs(center[0]) > radius:
+        out = self.axis - center[0]
+        if not on_axis or abs(out) > radius:
             return (towards,)
-        across = math.sqrt((radius - center[0]) * (radius + center[0]))
-        return towards, math.atan2(across, -center[0]), math.atan2(-across, -center[0])
+        across = math.sqrt((radius - out) * (radius + out))
+        return towards, math.atan2(across, out), math.atan2(-across, out)
 
     def _singular(self, theta3: float) -> bool:
-        return theta3 == 0.0 or abs(theta3) == math.pi
+        return abs(math.remainder(theta3, math.pi)) <= tolerances.ROUNDING
 
     def _if_fits(
         self, theta2: float, theta3: float, theta4: float, stretched: bool = False

@@ -24,6 +24,7 @@ from app.geometry.vectors import (
     scale,
     sub,
 )
+from app.kinematics.turns import wrapped
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +47,6 @@ class RotationPairs:
     pairs: tuple[tuple[float, float], ...]
     exact: bool
     free: bool = False
-
-
-def wrapped(theta: float) -> float:
-    """`theta` [rad] in (-pi, pi]."""
-    theta = math.remainder(theta, math.tau)
-    return math.pi if theta == -math.pi else theta
 
 
 def _sqrt(radicand: float) -> float:

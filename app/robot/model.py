@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,18 +11,29 @@ from typing import Any
 import numpy as np
 import yourdfpy
 
-from app.control.arm import Arm, Gripper
+from app.control.arm import NO_GRIPPER, Arm, Gripper
 from app.errors import RobotDescriptionError
 from app.geometry import screws, se3
 from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
+from app.kinematics.turns import in_limits_turn
+from app.robot.visual import Visual, rods, visuals_of
 from robot_description import URDF_PATH
 
 SHOULDER_FRAME = "shoulder_frame"
 """The link that is the paper's frame {S}."""
 
 TOOL_FRAMES = ("tcp", "grasp", "flange")
-"""Links that targets can be set for; the first is the default."""
+"""Links that targets can be set for where the file has them; the first is the default."""
+
+TURNING = ("revolute", "continuous")
+"""Types of joint an arm is made of; a continuous one is given half a turn either way."""
+
+FIVE = 5
+
+READY_ROOM = 0.05
+"""Share of a joint's range that the ready posture keeps from its limits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +45,8 @@ class Body:
         T_parent_body: (4, 4) where it sits at zero [m].
         joint: the movable joint it hangs on, or None when it is fixed.
         axis: (3,) unit direction of that joint in the body's own frame.
-        meshes: GLB files in the body's own frame.
+        visuals: its shapes.
+        moves: whether it hangs, directly or not, on a movable joint.
     """
 
     name: str
@@ -41,7 +54,8 @@ class Body:
     T_parent_body: FloatArray
     joint: str | None
     axis: FloatArray
-    meshes: tuple[Path, ...]
+    visuals: tuple[Visual, ...]
+    moves: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +67,7 @@ class RobotModel:
         T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table.
         bodies: every link, parents first.
         fingers: driven and following finger joints: angle = factor * driven + offset.
+        notes: sentences for a person on what was taken for granted in the file.
     """
 
     name: str
@@ -60,6 +75,17 @@ class RobotModel:
     T_base_shoulder: FloatArray
     bodies: tuple[Body, ...]
     fingers: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...] = ()
+
+    def ready(self, posture: Sequence[float]) -> FloatArray:
+        """The joint angles (5,) [rad] nearest inside the limits to a posture of the canonical arm.
+
+        ``posture``: (5,) [rad]; for the Katana these are its joint angles.
+        """
+        chain = self.arm.chain
+        q = in_limits_turn(chain, arm_of(chain).joints(posture))
+        room = READY_ROOM * (chain.upper - chain.lower)
+        return np.clip(q, chain.lower + room, chain.upper - room)
 
     def joint_angles(self, q: FloatArray, gripper: float) -> dict[str, float]:
         """Every movable joint's angle [rad] for arm joints (n,) and the driven finger joint."""
@@ -69,8 +95,13 @@ class RobotModel:
         return angles
 
 
-def load(path: Path = URDF_PATH) -> RobotModel:
+def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     """Read a URDF file.
+
+    Args:
+        path: of the file; the arm in it is any member of the family in app/kinematics/arm.py.
+        tool: link that targets are set for by default; else the first of TOOL_FRAMES there is,
+            else the last link that hangs on five turning joints.
 
     Raises:
         RobotDescriptionError: the file cannot be read, or lacks what an arm needs; says what.
@@ -82,47 +113,103 @@ def load(path: Path = URDF_PATH) -> RobotModel:
         frames = {link: np.asarray(urdf.get_transform(link)) for link in urdf.link_map}
     except Exception as error:
         raise RobotDescriptionError(f"{path} is not a robot description: {error}") from error
-    for needed in (SHOULDER_FRAME, *TOOL_FRAMES):
-        if needed not in frames:
-            raise RobotDescriptionError(f"{path.name} has no link {needed!r}.")
 
-    driven = _driven_joints(urdf, TOOL_FRAMES[0])
-    fingers = [j for j in urdf.joint_map.values() if j.type == "revolute" and j.name not in driven]
-    T_shoulder_base = se3.inverse(frames[SHOULDER_FRAME])
-    tools = {tool: frozen(T_shoulder_base @ frames[tool]) for tool in TOOL_FRAMES}
+    links = _tools(urdf, path, tool)
+    driven = _driven_joints(urdf, links[0])
     joints = [urdf.joint_map[name] for name in driven]
+    T_base_shoulder = _shoulder_frame(frames, joints)
+    T_shoulder_base = se3.inverse(T_base_shoulder)
+    tools = {link: frozen(T_shoulder_base @ frames[link]) for link in links}
     chain = Chain(
-        M=tools[TOOL_FRAMES[0]],
-        S=np.column_stack(
-            [_screw(joint, T_shoulder_base @ frames[joint.child]) for joint in joints]
-        ),
+        M=tools[links[0]],
+        S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
         lower=np.array([_limit(joint, "lower") for joint in joints]),
         upper=np.array([_limit(joint, "upper") for joint in joints]),
         speed=np.array([_limit(joint, "velocity") for joint in joints]),
         names=tuple(driven),
     )
+    others = [j for j in urdf.joint_map.values() if j.name not in driven and j.type != "fixed"]
+    fingers = [joint for joint in others if joint.type == "revolute"]
+    notes = [*arm_of(chain).notes]
+    notes += [
+        f"Joint {j.name!r} is {j.type} and stays at zero." for j in others if j not in fingers
+    ]
+    bodies, missing = _bodies(urdf, path, frames)
     return RobotModel(
         name=urdf.robot.name,
-        arm=Arm(chain, tools, TOOL_FRAMES[0], _gripper(path, fingers)),
-        T_base_shoulder=frozen(frames[SHOULDER_FRAME]),
-        bodies=tuple(_bodies(urdf, path, frames)),
+        arm=Arm(chain, tools, links[0], _gripper(path, fingers)),
+        T_base_shoulder=frozen(T_base_shoulder),
+        bodies=bodies,
         fingers=_follow(fingers),
+        notes=(*notes, *(f"There is no mesh at {mesh}." for mesh in missing)),
     )
+
+
+def _tools(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> list[str]:
+    """The tool links, the default one first."""
+    if tool is not None and tool not in urdf.link_map:
+        raise RobotDescriptionError(
+            f"{path.name} has no link {tool!r}; its links are {', '.join(urdf.link_map)}."
+        )
+    known = [link for link in TOOL_FRAMES if link in urdf.link_map]
+    if tool is not None:
+        return [tool, *(link for link in known if link != tool)]
+    if known:
+        return known
+    turning = {link: _joints_to(urdf, link) for link in urdf.link_map}
+    five = [
+        link
+        for link, joints in turning.items()
+        if sum(joint.type in TURNING for joint in joints) == FIVE
+        and all(joint.type in (*TURNING, "fixed") for joint in joints)
+    ]
+    if not five:
+        raise RobotDescriptionError(
+            f"{path.name} has no link that hangs on five turning joints; "
+            f"its joints are {', '.join(urdf.joint_map)}."
+        )
+    return [max(five, key=lambda link: len(turning[link]))]
+
+
+def _joints_to(urdf: yourdfpy.URDF, link: str) -> list[Any]:
+    """The joints from the root to ``link``, in that order."""
+    by_child = {joint.child: joint for joint in urdf.joint_map.values()}
+    joints: list[Any] = []
+    while link in by_child:
+        joints.append(by_child[link])
+        link = by_child[link].parent
+    return joints[::-1]
 
 
 def _driven_joints(urdf: yourdfpy.URDF, tool: str) -> list[str]:
     """The movable joints from the root to ``tool``, in that order."""
-    by_child = {joint.child: joint for joint in urdf.joint_map.values()}
     names: list[str] = []
-    link = tool
-    while link in by_child:
-        joint = by_child[link]
-        if joint.type == "revolute":
+    for joint in _joints_to(urdf, tool):
+        if joint.type in TURNING:
             names.append(joint.name)
         elif joint.type != "fixed":
-            raise RobotDescriptionError(f"Joint {joint.name!r} is {joint.type}, not revolute.")
-        link = joint.parent
-    return names[::-1]
+            raise RobotDescriptionError(
+                f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}."
+            )
+    if len(names) != FIVE:
+        raise RobotDescriptionError(
+            f"Link {tool!r} hangs on {len(names)} turning joints ({', '.join(names)}); "
+            "the tool of a five-axis arm hangs on five. Name another link with --tool."
+        )
+    return names
+
+
+def _shoulder_frame(frames: Mapping[str, FloatArray], joints: list[Any]) -> FloatArray:
+    """{S}: the link of that name, else parallel to the root where axis 1 passes axis 2."""
+    if SHOULDER_FRAME in frames:
+        return frames[SHOULDER_FRAME]
+    one, two = (_screw(joint, frames[joint.child]) for joint in joints[:2])
+    p1, p2 = screws.point_on(one), screws.point_on(two)
+    # The foot on axis 1 of the common normal of the two lines.
+    normal = np.cross(one[:3], two[:3])
+    size = float(normal @ normal)
+    along = float(np.cross(p2 - p1, two[:3]) @ normal) / size if size > 0.0 else 0.0
+    return se3.from_rotation_translation(np.eye(3), p1 + along * one[:3])
 
 
 def _screw(joint: Any, T_shoulder_child: FloatArray) -> FloatArray:
@@ -132,6 +219,8 @@ def _screw(joint: Any, T_shoulder_child: FloatArray) -> FloatArray:
 
 
 def _limit(joint: Any, which: str) -> float:
+    if joint.type == "continuous" and which in ("lower", "upper"):
+        return math.pi if which == "upper" else -math.pi
     value = None if joint.limit is None else getattr(joint.limit, which)
     if value is None:
         raise RobotDescriptionError(f"Joint {joint.name!r} has no {which} limit.")
@@ -140,12 +229,14 @@ def _limit(joint: Any, which: str) -> float:
 
 def _gripper(path: Path, fingers: list[Any]) -> Gripper:
     leaders = [joint for joint in fingers if joint.mimic is None]
-    if len(leaders) != 1:
+    if not leaders:
+        return NO_GRIPPER
+    if len(leaders) > 1:
         raise RobotDescriptionError(
-            f"{path.name} has {len(leaders)} driven finger joints; one is needed."
+            f"{path.name} has {len(leaders)} driven finger joints "
+            f"({', '.join(joint.name for joint in leaders)}); let all but one mimic that one."
         )
-    leader = leaders[0]
-    return Gripper(*(_limit(leader, which) for which in ("lower", "upper", "velocity")))
+    return Gripper(*(_limit(leaders[0], which) for which in ("lower", "upper", "velocity")))
 
 
 def _follow(fingers: list[Any]) -> dict[str, tuple[float, float]]:
@@ -157,32 +248,34 @@ def _follow(fingers: list[Any]) -> dict[str, tuple[float, float]]:
     }
 
 
-def _bodies(urdf: yourdfpy.URDF, path: Path, frames: Mapping[str, FloatArray]) -> list[Body]:
+def _bodies(
+    urdf: yourdfpy.URDF, path: Path, frames: Mapping[str, FloatArray]
+) -> tuple[tuple[Body, ...], list[Path]]:
+    """Every link, parents first, and the meshes that were not found."""
     by_child = {joint.child: joint for joint in urdf.joint_map.values()}
-    bodies: list[Body] = []
-    known: set[str] = set()
+    bodies: dict[str, Body] = {}
+    missing: list[Path] = []
 
     def add(link: str) -> None:
-        if link in known:
+        if link in bodies:
             return
         joint = by_child.get(link)
         if joint is None:
-            T, name, axis = np.eye(4), None, np.array([0.0, 0.0, 1.0])
+            parent, T, name, axis = None, np.eye(4), None, np.array([0.0, 0.0, 1.0])
         else:
-            add(joint.parent)
-            T = se3.inverse(frames[joint.parent]) @ frames[link]
-            name = joint.name if joint.type == "revolute" else None
+            parent = joint.parent
+            add(parent)
+            T = se3.inverse(frames[parent]) @ frames[link]
+            name = joint.name if joint.type in TURNING else None
             axis = np.asarray(joint.axis, dtype=float)
-        known.add(link)
-        meshes = tuple(
-            (path.parent / visual.geometry.mesh.filename).resolve()
-            for visual in urdf.link_map[link].visuals
-            if visual.geometry.mesh is not None
-        )
-        bodies.append(
-            Body(link, joint.parent if joint else None, frozen(T), name, frozen(axis), meshes)
-        )
+        visuals, absent = visuals_of(urdf.link_map[link], urdf.robot.materials, path.parent)
+        missing.extend(absent)
+        if not visuals:
+            ends = [j.origin for j in urdf.joint_map.values() if j.parent == link]
+            visuals = rods([origin[:3, 3] for origin in ends if origin is not None])
+        moves = name is not None or (parent is not None and bodies[parent].moves)
+        bodies[link] = Body(link, parent, frozen(T), name, frozen(axis), visuals, moves)
 
     for link in urdf.link_map:
         add(link)
-    return bodies
+    return tuple(bodies.values()), missing

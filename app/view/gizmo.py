@@ -15,10 +15,10 @@ import numpy as np
 import viser
 
 from app.control.commands import Command, MoveTool, Settle, TurnTool
-from app.control.session import pitch_and_roll
 from app.control.state import State, ToolTarget
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.freedoms import pitch_and_roll, pitched_frame
 from app.robot.model import RobotModel
 from app.view.guard import WORKSPACE
 
@@ -93,11 +93,13 @@ class Gizmo:
         """Go where the goal of ``state`` is, ``T`` (4, 4) in the base frame, unless held."""
         if not self._held:
             _place(self._move, T[:3, 3])
+        chain = self._model.arm.chain_to(state.tool)
+        pitched = self._model.T_base_shoulder[:3, :3] @ pitched_frame(chain, state.goal)
         if "pitch" not in self._held:
-            pitch, _ = pitch_and_roll(state.goal)
-            _turn(self._pitch, so3.rotation_z(float(state.goal[0])) @ so3.rotation_y(pitch))
+            _turn(self._pitch, pitched)
         if "roll" not in self._held:
-            _turn(self._roll, T[:3, :3])
+            _, roll = pitch_and_roll(chain, state.goal)
+            _turn(self._roll, pitched @ so3.rotation_x(roll))
 
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
         if event.phase == "start":
@@ -134,7 +136,8 @@ class Gizmo:
             if isinstance(wish, ToolTarget):
                 pitch, roll = wish.pitch, wish.roll
             else:
-                pitch, roll = pitch_and_roll(state.goal)
+                chain = self._model.arm.chain_to(state.tool)
+                pitch, roll = pitch_and_roll(chain, state.goal)
             self._turns[ring] = _Turn(R, pitch, roll)
             self._held.add(ring)
             return None

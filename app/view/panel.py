@@ -55,7 +55,7 @@ class Panel:
         self._readout = self._gui.add_html(readout.page(model, state))
         with self._gui.add_folder("Joints"):
             self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
-            self._gripper = self._finger(state)
+            self._gripper = self._finger(state) if model.arm.gripper.moves else None
         self._gestures = self._gui.add_button_group(
             "Drive",
             tuple(GESTURES),
@@ -75,7 +75,8 @@ class Panel:
         if caught_up:
             for slider, angle in zip(self._sliders, state.goal, strict=True):
                 _set(slider, math.degrees(angle))
-            _set(self._gripper, self._opening(state.gripper_goal))
+            if self._gripper is not None:
+                _set(self._gripper, self._opening(state.gripper_goal))
             if self._tool.value != state.tool:
                 self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
         if now - self._told_at >= READOUT_INTERVAL or not state.moving:

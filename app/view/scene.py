@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 import viser
 
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.robot.model import Body, RobotModel
+from app.robot.visual import Visual
 
 ANGLE_WORTH_SENDING = 1e-7
 """[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
@@ -55,13 +54,25 @@ class FrameTree:
 
 
 class ArmNodes(FrameTree):
-    """The arm itself: the GLB files as they are, so that normals and materials are kept."""
+    """The arm itself: GLB files as they are, so that normals and materials are kept."""
 
     def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
         super().__init__(server, "/arm", model)
         for body in model.bodies:
-            for number, mesh in enumerate(body.meshes):
-                server.scene.add_glb(f"{self.path[body.name]}/shape{number}", mesh.read_bytes())
+            for number, visual in enumerate(body.visuals):
+                name = f"{self.path[body.name]}/shape{number}"
+                if visual.glb is not None:
+                    server.scene.add_glb(
+                        name,
+                        visual.glb.read_bytes(),
+                        wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
+                        position=visual.T_body_visual[:3, 3],
+                    )
+                else:
+                    mesh = visual.mesh
+                    server.scene.add_mesh_simple(
+                        name, mesh.vertices, mesh.faces, color=visual.colour, flat_shading=True
+                    )
 
 
 COAT = 1e-3
@@ -83,15 +94,15 @@ class GhostNodes(FrameTree):
         self._shapes = [
             server.scene.add_mesh_simple(
                 f"{self.path[body.name]}/shape{number}",
-                *_surface(mesh),
+                *_surface(visual),
                 color=colour,
                 opacity=self.OPACITY,
                 cast_shadow=False,
                 receive_shadow=False,
             )
             for body in model.bodies
-            for number, mesh in enumerate(body.meshes)
-            if body.joint is not None or body.name == "gripper_link"
+            for number, visual in enumerate(body.visuals)
+            if body.moves
         ]
 
     def show(self, visible: bool, colour: tuple[int, int, int]) -> None:
@@ -125,9 +136,9 @@ class Gap:
                 self._line.points = ends
 
 
-def _surface(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Vertices (n, 3) [m] and faces (m, 3) of a GLB file, its materials forgotten."""
-    mesh = trimesh.load_scene(path).to_mesh()
+def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Vertices (n, 3) [m] and faces (m, 3) of a shape, its materials forgotten."""
+    mesh = visual.mesh.copy()
     # One vertex a corner: half of what goes over the wire.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     return mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
+from tests.kinematics.family import random_member
 
 
 def test_lengths_are_read_off_the_chain(chain: Chain, lengths: FloatArray) -> None:
@@ -26,31 +28,79 @@ def _with_axis(chain: Chain, i: int, direction: list[float], point: list[float])
     return dataclasses.replace(chain, S=S)
 
 
-def test_other_arms_are_refused_with_the_axis_and_the_amount(chain: Chain) -> None:
-    x, y, z = np.eye(3).tolist()
-    origin, elbow, wrist = [0.0] * 3, [0.19, 0.0, 0.0], [0.329, 0.0, 0.0]
+def test_other_arms_are_refused_with_the_axis_the_amount_and_what_is_needed(chain: Chain) -> None:
+    _, y, z = np.eye(3).tolist()
+    elbow, wrist = [0.19, 0.0, 0.0], [0.329, 0.0, 0.0]
     tilt = [0.0, 1.0, 1e-3]
     cases = [
-        (_with_axis(chain, 0, z, [0.0, 0.02, 0.0]), r"axis 1 .* by 0.02 m"),
-        (_with_axis(chain, 0, y, origin), r"axis 1 must point along \+z"),
-        (_with_axis(chain, 1, y, [0.02, 0.0, 0.0]), r"axis 2 must cross axis 1 .* 0.02 m"),
-        (_with_axis(chain, 2, tilt, elbow), r"axis 3 must point along \+y .* 0.001 rad"),
-        (_with_axis(chain, 2, y, [0.19, 0.0, 0.03]), r"axis 3 must be level .* 0.03 m"),
-        (_with_axis(chain, 3, y, [0.329, 0.0, -0.01]), r"axis 4 must be level .* -0.01 m"),
-        (_with_axis(chain, 3, y, elbow), r"wrist must lie farther"),
-        (_with_axis(chain, 4, x, [0.0, 0.0, 0.005]), r"axis 5 must cross axis 4 .* 0.005 m"),
-        (_with_axis(chain, 4, z, wrist), r"axis 5 must point along \+x"),
-        (chain.with_tool(se3.from_rotation_translation(np.eye(3), [0.6, 0.01, 0.0])), "0.01 m"),
-        (chain.with_tool(se3.from_rotation_translation(np.eye(3), [0.3, 0.0, 0.0])), "tool point"),
-        (
-            chain.with_tool(se3.from_rotation_translation(so3.rotation_y(0.1), [0.6, 0.0, 0.0])),
-            "x axis",
-        ),
-        (dataclasses.replace(chain, lower=np.array([-3.0, -2.0, 0.1, -2.0, -2.0])), "axis 3"),
+        (_with_axis(chain, 0, y, [0.0] * 3), r"axis 2 must be square to axis 1 and is 90 deg off"),
+        (_with_axis(chain, 0, tilt, [0.0] * 3), r"axis 2 must be square to axis 1"),
+        (_with_axis(chain, 2, tilt, elbow), r"axis 3 must be parallel to axis 2 .* 0\.0573 deg"),
+        (_with_axis(chain, 3, z, wrist), r"axis 4 must be parallel to axis 2 .* 90 deg"),
+        (_with_axis(chain, 4, y, wrist), r"axis 5 must be square to axis 4 .* 90 deg"),
+        (_with_axis(chain, 2, y, [0.0, 0.3, 0.0]), r"axes 2 and 3 are 0 mm apart"),
+        (_with_axis(chain, 3, y, elbow), r"axes 3 and 4 are 0 mm apart"),
+        (chain.with_tool(se3.from_rotation_translation(np.eye(3), wrist)), r"axis 4 and the tool"),
     ]
     for other, words in cases:
         with pytest.raises(RobotDescriptionError, match=words):
             arm_of(other)
+
+
+def test_every_fault_is_named_at_once(chain: Chain) -> None:
+    wrong = _with_axis(chain, 2, [0.0, 1.0, 0.1], [0.19, 0.0, 0.0])
+    wrong = _with_axis(wrong, 4, [1.0, 0.2, 0.0], [0.4, 0.0, 0.0])
+    with pytest.raises(
+        RobotDescriptionError, match=r"axis 3 .* 5\.71 deg off; axis 5 .* 11\.3 deg"
+    ):
+        arm_of(wrong)
+
+
+def test_the_rounding_of_a_file_is_taken_and_told(chain: Chain) -> None:
+    assert arm_of(chain).notes == ()
+    rounded = _with_axis(chain, 2, [0.0, 1.0, 3.7e-6], [0.19, 0.0, 0.0])
+    rounded = rounded.with_tool(
+        chain.M + np.array([[0.0] * 4, [0, 0, 0, 8e-6], [0.0] * 4, [0] * 4])
+    )
+    arm = arm_of(rounded)
+    assert arm.skew == pytest.approx(3.7e-6)
+    assert arm.gap == pytest.approx(8e-6)
+    assert ["0.00021 deg" in note or "0.008 mm" in note for note in arm.notes] == [True, True]
+    T = forward(rounded, [0.3, -0.8, 1.0, 0.4, 0.5])
+    for s in inverse(rounded, T):
+        assert 1e-9 < s.position_error < 2e-5
+        assert s.rotation_error < 1e-4
+
+
+def test_offsets_are_read_off_any_member(rng: np.random.Generator) -> None:
+    for _ in range(200):
+        chain, offsets = random_member(rng)
+        arm = arm_of(chain)
+        l1, l2, l3 = offsets.links
+        assert [arm.l1, arm.l2] == pytest.approx([l1, l2], abs=1e-14)
+        assert arm.l3 == pytest.approx(math.hypot(l3, offsets.roll_offset), abs=1e-14)
+        assert abs(arm.a) == pytest.approx(abs(offsets.radial), abs=1e-14)
+        assert abs(arm.d) == pytest.approx(abs(offsets.lateral), abs=1e-14)
+        assert math.tan(abs(arm.tilt)) == pytest.approx(abs(offsets.roll_offset) / l3, abs=1e-13)
+        assert arm.off_axis < 1e-14
+
+
+def test_the_canonical_arm_moves_as_the_chain_does(rng: np.random.Generator) -> None:
+    for _ in range(200):
+        chain, _ = random_member(rng)
+        arm = arm_of(chain)
+        q = rng.uniform(chain.lower, chain.upper)
+        one, two, three, four, five = arm.canonical(q).tolist()
+        phi = two + three + four
+        u = arm.a + arm.l1 * math.cos(two) + arm.l2 * math.cos(two + three) + arm.l3 * math.cos(phi)
+        v = arm.l1 * math.sin(two) + arm.l2 * math.sin(two + three) + arm.l3 * math.sin(phi)
+        R = so3.rotation_z(one)
+        T_C_K = se3.from_rotation_translation(
+            R @ so3.rotation_y(phi - arm.tilt) @ so3.rotation_x(five), R @ [u, arm.d, -v]
+        )
+        T = se3.inverse(arm.T_C_S) @ T_C_K @ arm.T_K_tool
+        np.testing.assert_allclose(T, forward(chain, q), atol=3e-15)
+        np.testing.assert_allclose(arm.joints(arm.canonical(q)), q, atol=1e-15)
 
 
 def test_an_arm_of_four_joints_is_refused(chain: Chain) -> None:

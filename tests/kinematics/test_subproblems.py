@@ -13,8 +13,8 @@ from app.kinematics.subproblems import (
     subproblem2,
     subproblem3,
     subproblem4,
-    wrapped,
 )
+from app.kinematics.turns import wrapped
 
 CASES = 60
 SCAN = np.linspace(-math.pi, math.pi, 7201)

@@ -1,0 +1,186 @@
+"""The closed form for one pose at a time, on plain floats: microseconds for every branch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from app import tolerances
+from app.geometry.se3 import Rows
+from app.kinematics.arm import Five, FiveAxisArm, arm_of
+from app.kinematics.chain import Chain
+from app.kinematics.closed_form import Functions, closed_form
+from app.kinematics.turns import in_turn
+
+FourBranches = tuple[Five, Five, Five, Five]
+
+
+def _distance(u: float, v: float, near: float, far: float) -> float:
+    rho = math.sqrt(u * u + v * v)
+    return near if rho < near else far if rho > far else rho
+
+
+_FLOATS: Final = Functions(math.atan2, math.sqrt, math.sin, math.cos, _distance)
+
+
+class Solver(NamedTuple):
+    """Inverse kinematics of one chain without checks, for loops over many poses.
+
+    arm: the canonical arm. solve(rows, theta1=0.0): `rows` are those of a pose T_S_tool (4, 4) [m],
+    T.tolist(), its rotation orthonormal; theta1 [rad] is taken where the pose leaves it free. The
+    joint angles [rad] come back in the order of BRANCHES, each in the turn inside its limits if
+    there is one, else in [-pi, pi]. inside(q): whether every angle is inside its limits.
+    """
+
+    arm: FiveAxisArm
+    solve: Callable[..., FourBranches]
+    inside: Callable[[Five], bool]
+
+    @staticmethod
+    def of(chain: Chain) -> Solver:
+        """That of `chain`, made once a chain; RobotDescriptionError as `arm_of`."""
+        return _solver(chain)
+
+
+@lru_cache(maxsize=64)
+def _solver(chain: Chain) -> Solver:
+    arm = arm_of(chain)
+    return Solver(arm, _solve(chain, arm), _inside(chain))
+
+
+Facing = tuple[float, float, float, float, float, float, float, float]
+
+
+def facing_near_axis_1(
+    arm: FiveAxisArm, x: float, y: float, r11: float, r21: float, free: float
+) -> Facing:
+    """(alpha1, cos, sin, u) facing the tool point at (x, y), and with the back to it.
+
+    Sound everywhere, but meant for a tool point near axis 1 (or near the cylinder of radius d about
+    it, which no tool point enters), where its place tells little of alpha1: the direction of the
+    tool's x axis (r11, r21) tells more, where it agrees. Neither does with the tool upright on axis
+    1: alpha1 is then `free`.
+    """
+    d, rounding = arm.d, 2.0 * tolerances.ROUNDING * arm.reach
+    rho, flat = math.hypot(x, y), math.hypot(r11, r21)
+    on_axis = rho <= tolerances.ON_AXIS
+    if flat > tolerances.ON_AXIS:
+        c, s = r11 / flat, r21 / flat
+        if abs(c * y - s * x + d) < abs(c * y - s * x - d):
+            c, s = -c, -s
+        if on_axis or abs(c * y - s * x - d) <= rounding:
+            u = c * x + s * y
+            front, back = (c, s, u), _opposite(d, x, y, rho, c, s, u)
+            if u < -rounding:
+                front, back = back, front
+            return _with_angle(*front) + _with_angle(*back)
+    elif on_axis:
+        c, s = math.cos(free), math.sin(free)
+        return free, c, s, 0.0, free + math.pi, -c, -s, 0.0
+    sine = min(max(d / rho, -1.0), 1.0)
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    x, y = x / rho, y / rho
+    return _with_angle(x * cosine + y * sine, y * cosine - x * sine, rho * cosine) + _with_angle(
+        y * sine - x * cosine, -y * cosine - x * sine, -rho * cosine
+    )
+
+
+def _opposite(
+    d: float, x: float, y: float, rho: float, c: float, s: float, u: float
+) -> tuple[float, float, float]:
+    """The other plane at the distance d from axis 1 that holds the tool point."""
+    if d == 0.0 or rho <= tolerances.ON_AXIS:
+        return -c, -s, -u
+    c, s = d * y - u * x, -d * x - u * y
+    scale = 1.0 / math.hypot(c, s)
+    return c * scale, s * scale, -u
+
+
+def _with_angle(c: float, s: float, u: float) -> tuple[float, float, float, float]:
+    return math.atan2(s, c), c, s, u
+
+
+def _solve(chain: Chain, arm: FiveAxisArm) -> Callable[..., FourBranches]:
+    orient, reach = closed_form(arm, _FLOATS)
+    a = arm.a
+    in_line = arm.d == 0.0
+    near = tolerances.NEAR_AXIS_1 * arm.reach
+    atan2, hypot, remainder, pi, tau = math.atan2, math.hypot, math.remainder, math.pi, math.tau
+    across = pi + 2.0 * arm.tilt
+    turned = _turned(chain, arm)
+    is_canonical, pose = arm.is_canonical, arm.pose
+
+    def solve(rows: Rows, theta1: float = 0.0) -> FourBranches:
+        if not is_canonical:
+            rows = pose(np.array(rows)).tolist()
+            theta1 *= arm.signs[0]
+        (r11, _, _, x), (r21, _, _, y), (_, _, _, z), _ = rows
+        u = hypot(x, y)
+        if in_line and u > near:
+            one, c, s = atan2(y, x), x / u, y / u
+            other = one - pi if one > 0.0 else one + pi
+        else:
+            one, c, s, u, other, c2, s2, u2 = facing_near_axis_1(arm, x, y, r11, r21, theta1)
+        phi, five, lu, lv, lu2, lv2 = orient(c, s, rows)
+        if in_line:
+            # The plane is the same, seen from behind.
+            u2, phi2 = -u, across - phi
+            five2 = five - pi if five > 0.0 else five + pi
+        else:
+            phi2, five2, lu2, lv2, _, _ = orient(c2, s2, rows)
+        up, down, bend = reach(u - a - lu, -z - lv)
+        up2, down2, bend2 = reach(u2 - a - lu2, -z - lv2)
+        up = up if -pi <= up <= pi else remainder(up, tau)
+        down = down if -pi <= down <= pi else remainder(down, tau)
+        up2 = up2 if -pi <= up2 <= pi else remainder(up2, tau)
+        down2 = down2 if -pi <= down2 <= pi else remainder(down2, tau)
+        a4, b4 = phi - up - bend, phi - down + bend
+        c4, d4 = phi2 - up2 - bend2, phi2 - down2 + bend2
+        front_up = (one, up, bend, a4 if -pi <= a4 <= pi else remainder(a4, tau), five)
+        front_down = (one, down, -bend, b4 if -pi <= b4 <= pi else remainder(b4, tau), five)
+        back_up = (other, up2, bend2, c4 if -pi <= c4 <= pi else remainder(c4, tau), five2)
+        back_down = (other, down2, -bend2, d4 if -pi <= d4 <= pi else remainder(d4, tau), five2)
+        if turned is None:
+            return front_up, front_down, back_up, back_down
+        return turned(front_up), turned(front_down), turned(back_up), turned(back_down)
+
+    return solve
+
+
+def _turned(chain: Chain, arm: FiveAxisArm) -> Callable[[Five], Five] | None:
+    """From canonical angles within a turn to joint angles in theirs; None where they are equal."""
+    lower, upper = chain.lower.tolist(), chain.upper.tolist()
+    limits = tuple(zip(arm.signs, arm.shifts, lower, upper, strict=True))
+    if all(limit[:2] == (1.0, 0.0) and max(-limit[2], limit[3]) <= math.pi for limit in limits):
+        return None
+
+    def turned(alpha: Five) -> Five:
+        one, two, three, four, five = (
+            in_turn(sign * (angle - shift), a, b)
+            for angle, (sign, shift, a, b) in zip(alpha, limits, strict=True)
+        )
+        return one, two, three, four, five
+
+    return turned
+
+
+def _inside(chain: Chain) -> Callable[[Five], bool]:
+    slack = tolerances.LIMIT_SLACK
+    a1, a2, a3, a4, a5 = (chain.lower - slack).tolist()
+    b1, b2, b3, b4, b5 = (chain.upper + slack).tolist()
+
+    def inside(q: Five) -> bool:
+        q1, q2, q3, q4, q5 = q
+        return bool(
+            a1 <= q1 <= b1
+            and a2 <= q2 <= b2
+            and a3 <= q3 <= b3
+            and a4 <= q4 <= b4
+            and a5 <= q5 <= b5
+        )
+
+    return inside

@@ -1,0 +1,44 @@
+"""Which of the angles that differ by whole turns to take. Angles in rad."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from app import tolerances
+from app.geometry.arrays import FloatArray
+from app.kinematics.chain import Chain
+
+
+def wrapped(theta: float) -> float:
+    """`theta` in (-pi, pi]."""
+    theta = math.remainder(theta, math.tau)
+    return math.pi if theta == -math.pi else theta
+
+
+def in_turn(theta: float, lower: float, upper: float) -> float:
+    """`theta` in the turn between the limits if there is one, else in (-pi, pi]."""
+    theta = wrapped(theta)
+    slack = tolerances.LIMIT_SLACK
+    for turned in (theta, theta - math.tau, theta + math.tau):
+        if lower - slack <= turned <= upper + slack:
+            return turned
+    return theta
+
+
+def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:
+    """`q` (n,), each angle in the turn inside its limits if there is one, else wrapped."""
+    limits = zip(q.tolist(), chain.lower.tolist(), chain.upper.tolist(), strict=True)
+    return np.array([in_turn(theta, lower, upper) for theta, lower, upper in limits])
+
+
+def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatArray:
+    """`q` (n,), each angle in that turn nearest to `hint` (n,) which is inside its limits.
+
+    Only limits wider than a turn leave this choice.
+    """
+    if hint is None or not (chain.upper - chain.lower > math.tau).any():
+        return q
+    other = q + math.tau * np.round((hint - q) / math.tau)
+    return np.where((other >= chain.lower) & (other <= chain.upper), other, q)

@@ -1,0 +1,79 @@
+"""The inverse of any member of the family by the Paden-Kahan subproblems on its own screw axes.
+
+The specification the closed form is held to: it knows no canonical arm, only axes and points, and
+follows the paper's eq. (12) to (29) with both shoulders and both elbows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.geometry import screws, se3
+from app.geometry.arrays import FloatArray
+from app.geometry.vectors import Vector, add, dot, norm, rotate, scale, sub, vector
+from app.kinematics.chain import Chain
+from app.kinematics.subproblems import subproblem1, subproblem3, subproblem4
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+Line = tuple[Vector, Vector]
+
+
+def _foot(p: Vector, line: Line) -> Vector:
+    """The point of the line nearest to `p`."""
+    omega, r = line
+    return add(r, scale(dot(sub(p, r), omega), omega))
+
+
+def solve(chain: Chain, T: FloatArray) -> list[FloatArray]:
+    """Joint vectors (5,) [rad] for the pose `T`, every branch that reaches it, in no order."""
+    lines: list[Line] = [
+        (vector(chain.S[:3, i]), vector(screws.point_on(chain.S[:, i]))) for i in range(5)
+    ]
+    one, two, three, four, five = lines
+    tool = _foot(vector(chain.M[:3, 3]), five)
+    wrist = _foot(tool, four)
+    shoulder = _foot(tool, two)
+    G = T @ se3.inverse(chain.M)
+
+    def moved(p: Vector) -> Vector:
+        return vector(G[:3, :3] @ p + G[:3, 3])
+
+    along = vector(G[:3, :3] @ five[0])
+    found: list[FloatArray] = []
+    backwards = scale(-1.0, one[0])
+    turns = subproblem4(backwards, one[1], moved(tool), two[0], dot(two[0], tool))
+    for theta1 in turns.angles:
+        seen = rotate(moved(tool), *one, -theta1)
+        direction = rotate(along, one[0], ORIGIN, -theta1)
+        pitch = subproblem1(two[0], ORIGIN, five[0], direction).angles[0]
+        w = add(seen, rotate(sub(wrist, tool), two[0], ORIGIN, pitch))
+        bends = subproblem3(*three, wrist, shoulder, norm(sub(w, shoulder)))
+        for theta3 in bends.angles if bends.exact else ():
+            bent = rotate(wrist, *three, theta3)
+            theta2 = subproblem1(*two, bent, w).angles[0]
+            before = [(three, theta3), (two, theta2), (one, theta1)]
+            theta4 = subproblem1(*four, tool, _undone(moved(tool), before)).angles[0]
+            before = [(four, theta4), *before]
+            beside = add(tool, four[0])
+            theta5 = subproblem1(*five, beside, _undone(moved(beside), before)).angles[0]
+            found.append(np.array([theta1, theta2, theta3, theta4, theta5]))
+    return found
+
+
+def _undone(p: Vector, turns: list[tuple[Line, float]]) -> Vector:
+    """`p` with the turns about the lines taken back, the last one first."""
+    for line, theta in reversed(turns):
+        p = rotate(p, *line, -theta)
+    return p
+
+
+def same(qa: FloatArray, qb: FloatArray, within: float) -> bool:
+    """Whether two joint vectors are equal but for whole turns."""
+    return bool(np.abs(np.exp(1j * np.asarray(qa)) - np.exp(1j * np.asarray(qb))).max() < within)
+
+
+def matched(a: list[FloatArray], b: list[FloatArray], within: float) -> bool:
+    """Whether each of `a` is one of `b` and the other way round."""
+    return all(any(same(x, y, within) for y in b) for x in a) and all(
+        any(same(x, y, within) for x in a) for y in b
+    )

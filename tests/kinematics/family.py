@@ -1,0 +1,107 @@
+"""Random members of the family of arms, made from their offsets and from nothing of the app's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry import screws, se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.chain import Chain
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What a member is made of; lengths in m, angles in rad.
+
+    radial, lateral: of the shoulder from axis 1. links: axes 2 to 3 to 4, and 4 to the foot of the
+    tool point on the roll axis. bearings: of the links and of the roll axis above the horizontal at
+    q = 0. roll_offset: of axis 4 from the roll axis, in the plane. signs: of the axes.
+    """
+
+    radial: float
+    lateral: float
+    links: tuple[float, float, float]
+    bearings: tuple[float, float, float]
+    roll_offset: float
+    signs: tuple[int, int, int, int, int]
+
+    @property
+    def size(self) -> float:
+        return abs(self.radial) + abs(self.lateral) + sum(self.links) + abs(self.roll_offset)
+
+
+def random_offsets(rng: np.random.Generator, *, lateral: bool) -> Offsets:
+    """Each offset is there or not, so that arms with few are met as well."""
+    there = rng.random(4) < 0.7
+    low, middle, high = rng.uniform(-math.pi, math.pi, 3) * there[0]
+    one, two, three, four, five = rng.choice((-1, 1), size=5).tolist()
+    return Offsets(
+        radial=float(rng.uniform(-0.08, 0.12) * there[1]),
+        lateral=float(rng.uniform(-0.06, 0.06) * there[2]) if lateral else 0.0,
+        links=(
+            float(rng.uniform(0.08, 0.3)),
+            float(rng.uniform(0.08, 0.3)),
+            float(rng.uniform(0.05, 0.3)),
+        ),
+        bearings=(float(low), float(middle), float(high)),
+        roll_offset=float(rng.uniform(-0.05, 0.05) * there[3]),
+        signs=(one, two, three, four, five),
+    )
+
+
+def random_pose(rng: np.random.Generator, spread: float) -> FloatArray:
+    return se3.from_rotation_translation(
+        so3.exp(rng.normal(size=3) * 2.0), spread * rng.normal(size=3)
+    )
+
+
+def member(offsets: Offsets, T_S_base: FloatArray, T_foot_tool: FloatArray) -> Chain:
+    """The chain with axis 1 along z of {base} and the arm's plane at its x at q = 0.
+
+    T_foot_tool: the tool frame from the foot of its point on the roll axis, x along that axis.
+    Limits are a turn wide.
+    """
+
+    def along(length: float, angle: float) -> FloatArray:
+        return length * np.array([math.cos(angle), 0.0, math.sin(angle)])
+
+    one, two, roll = offsets.bearings
+    l1, l2, l3 = offsets.links
+    shoulder = np.array([offsets.radial, offsets.lateral, 0.0])
+    elbow = shoulder + along(l1, one)
+    wrist = elbow + along(l2, two)
+    foot = wrist + along(l3, roll) + along(offsets.roll_offset, roll + math.pi / 2.0)
+    y, z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    # A point on axis 1 or 2 may be any.
+    lines = [
+        (z, 0.3 * z),
+        (y, shoulder - 0.2 * y),
+        (y, elbow),
+        (y, wrist),
+        (along(1.0, roll), foot),
+    ]
+    S = np.column_stack(
+        [
+            screws.revolute(sign * omega, r)
+            for sign, (omega, r) in zip(offsets.signs, lines, strict=True)
+        ]
+    )
+    T_base_foot = se3.from_rotation_translation(so3.rotation_y(-roll), foot)
+    return Chain(
+        M=T_S_base @ T_base_foot @ T_foot_tool,
+        S=screws.moved(T_S_base, S),
+        lower=np.full(5, -math.pi),
+        upper=np.full(5, math.pi),
+        speed=np.ones(5),
+        names=("one", "two", "three", "four", "five"),
+    )
+
+
+def random_member(rng: np.random.Generator, *, lateral: bool = True) -> tuple[Chain, Offsets]:
+    """A member with {S} anywhere and the tool turned any way on its roll axis."""
+    offsets = random_offsets(rng, lateral=lateral)
+    turned = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), np.zeros(3))
+    return member(offsets, random_pose(rng, 0.5), turned), offsets

@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.batch import CHUNK, forward_batch, inverse_batch
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.inverse import inverse
+from tests.kinematics.family import random_member
+
+
+def random_q(chain: Chain, rng: np.random.Generator, n: int) -> FloatArray:
+    return rng.uniform(chain.lower, chain.upper, size=(n, 5))
+
+
+def assert_as_one_by_one(chain: Chain, T: FloatArray, angle: float, error: float) -> None:
+    """Angles and errors of every branch within these [rad], [m or rad] of those of `inverse`."""
+    found = inverse_batch(chain, T, residuals=True)
+    assert found.position_error is not None
+    assert found.rotation_error is not None
+    for i, pose in enumerate(T):
+        for b, s in enumerate(inverse(chain, pose)):
+            between = np.angle(np.exp(1j * (found.q[i, b] - s.q)))
+            assert np.abs(between).max() < angle
+            assert found.position_error[i, b] == pytest.approx(s.position_error, abs=error)
+            assert found.rotation_error[i, b] == pytest.approx(s.rotation_error, abs=error)
+            assert found.within_limits[i, b] == s.within_limits
+
+
+def test_forward_is_that_of_each(chain: Chain, rng: np.random.Generator) -> None:
+    for arm in (chain, random_member(rng)[0]):
+        q = random_q(arm, rng, 200)
+        T = forward_batch(arm, q)
+        for i in range(200):
+            np.testing.assert_allclose(T[i], forward(arm, q[i]), atol=2e-15)
+
+
+def test_every_solution_takes_its_pose_over_several_chunks(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    q = random_q(chain, rng, 2 * CHUNK + 17)
+    found = inverse_batch(chain, forward_batch(chain, q), residuals=True)
+    assert found.q.shape == (len(q), 4, 5)
+    assert found.position_error is not None
+    assert found.rotation_error is not None
+    assert found.position_error.max() < 2e-15
+    assert found.rotation_error.max() < 1e-12
+    original = np.abs(found.q - q[:, None]).max(axis=2).min(axis=1)
+    # Next to the stretched arm angles are known to the root of rounding.
+    assert original.max() < 1e-6
+    assert np.median(original) < 1e-14
+    assert 2.0 < found.within_limits.sum(axis=1).mean() < 2.4
+
+
+def test_each_pose_is_solved_as_alone(chain: Chain, rng: np.random.Generator) -> None:
+    assert_as_one_by_one(chain, forward_batch(chain, random_q(chain, rng, 300)), 1e-9, 1e-14)
+
+
+def test_members_of_the_family_are_solved_as_alone(rng: np.random.Generator) -> None:
+    for _ in range(60):
+        arm, _ = random_member(rng)
+        assert_as_one_by_one(arm, forward_batch(arm, random_q(arm, rng, 5)), 1e-6, 1e-11)
+
+
+def test_hard_poses_are_solved_as_alone(chain: Chain, rng: np.random.Generator) -> None:
+    q = random_q(chain, rng, 40)
+    q[:10, 2] = 0.0
+    q[10:20, 2] = math.pi
+    q[20:30, 3] = math.pi / 2 - q[20:30, 1] - q[20:30, 2]
+    T = forward_batch(chain, q)
+    for i in range(30, 40):
+        # The tool point on axis 1.
+        x, _, z = forward(chain, [0.0, *q[i, 1:]])[:3, 3]
+        T[i] = forward(chain, [q[i, 0], q[i, 1] - math.atan2(x, z), *q[i, 2:]])
+        T[i, :2, 3] = 0.0
+    assert_as_one_by_one(chain, T, 1e-7, 1e-12)
+
+
+def test_poses_no_arm_can_take_are_missed_as_alone(chain: Chain, rng: np.random.Generator) -> None:
+    sizes = (0.0, 1e-300, 1e-9, 0.1, 1e3, 1e200)
+    T = np.array(
+        [
+            se3.from_rotation_translation(so3.exp(rng.normal(size=3)), size * rng.normal(size=3))
+            for size in sizes
+            for _ in range(5)
+        ]
+    )
+    found = inverse_batch(chain, T)
+    assert np.isfinite(found.q).all()
+    assert_as_one_by_one(chain, T[:-5], 1e-6, 1e-9)
+
+
+def test_limits_beyond_a_half_turn_decide_the_turn(chain: Chain) -> None:
+    shifted = dataclasses.replace(
+        chain,
+        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]),
+        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]),
+    )
+    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0])
+    found = inverse_batch(shifted, forward(shifted, q)[None])
+    np.testing.assert_allclose(found.q[0, 0], q, atol=1e-12)
+    assert found.within_limits[0, 0]
+
+
+def test_single_precision_is_made_a_rotation_again(chain: Chain, rng: np.random.Generator) -> None:
+    T = forward_batch(chain, random_q(chain, rng, 20)).astype(np.float32).astype(np.float64)
+    assert_as_one_by_one(chain, T, 1e-6, 1e-12)
+
+
+def test_no_pose_has_no_solution(chain: Chain) -> None:
+    assert inverse_batch(chain, np.empty((0, 4, 4))).q.shape == (0, 4, 5)
+    assert forward_batch(chain, np.empty((0, 5))).shape == (0, 4, 4)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "words"),
+    [
+        (lambda T: T * np.nan, "Pose 5000 has nan"),
+        (lambda T: T + np.diag([0.0, 0.0, 0.0, 1e-3]), "Pose 5000 has the last row"),
+        (lambda T: T @ np.diag([1.0, 1.0, 1.1, 1.0]), "Pose 5000 is not a rotation"),
+        (lambda T: T @ np.diag([1.0, 1.0, -1.0, 1.0]), "Pose 5000 is a reflection"),
+    ],
+)
+def test_the_first_pose_that_is_none_is_named(chain: Chain, spoilt: object, words: str) -> None:
+    T = forward_batch(chain, np.zeros((6000, 5)))
+    assert callable(spoilt)
+    T[5000] = spoilt(T[5000])
+    with pytest.raises(InputError, match=words.replace("Pose", ".*Pose")):
+        inverse_batch(chain, T)
+
+
+def test_arrays_of_another_shape_or_kind_are_refused(chain: Chain) -> None:
+    with pytest.raises(InputError, match=r"\(4, 4\); it must be \(N, 4, 4\)"):
+        inverse_batch(chain, np.eye(4))
+    with pytest.raises(InputError, match=r"it must be \(N, 5\)"):
+        forward_batch(chain, np.zeros((3, 4)))
+    with pytest.raises(InputError, match="complex"):
+        forward_batch(chain, np.zeros((3, 5), dtype=complex))
+    with pytest.raises(InputError, match="Joint vector 1 has inf for axis 3"):
+        forward_batch(chain, [[0.0] * 5, [0.0, 0.0, math.inf, 0.0, 0.0]])

@@ -1,0 +1,194 @@
+"""The inverse of every member of the family: the five questions asked of random arms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.arm import arm_of
+from app.kinematics.branch import BRANCHES, branch_of
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.inverse import Solution, inverse
+from app.kinematics.solver import Solver
+from tests.kinematics.by_subproblems import matched, same, solve
+from tests.kinematics.family import Offsets, member, random_member, random_pose
+
+MEMBERS, POSES = 200, 10
+# [m] and [rad]; {S} may stand two metres away, at which forward kinematics is no better.
+POSITION, ROTATION = 1e-14, 1e-12
+
+Case = tuple[Chain, Offsets, FloatArray, FloatArray, tuple[Solution, ...]]
+
+
+@pytest.fixture(scope="module")
+def solved() -> list[Case]:
+    """(member, what it is made of, q, T, inverse(T)) of joint vectors anywhere."""
+    rng = np.random.default_rng(25)
+    result = []
+    for _ in range(MEMBERS):
+        chain, offsets = random_member(rng)
+        for q in rng.uniform(chain.lower, chain.upper, size=(POSES, 5)):
+            T = forward(chain, q)
+            result.append((chain, offsets, q, T, inverse(chain, T)))
+    return result
+
+
+def test_consistency_what_claims_to_take_the_pose_does(solved: list[Case]) -> None:
+    for chain, _, _, T, solutions in solved:
+        for s in solutions:
+            reached = forward(chain, s.q)
+            position = float(np.linalg.norm(reached[:3, 3] - T[:3, 3]))
+            assert s.position_error == pytest.approx(position, abs=1e-15)
+            if s.exact:
+                assert position < POSITION
+                assert s.rotation_error < ROTATION
+
+
+def test_correctness_it_is_what_the_subproblems_give(solved: list[Case]) -> None:
+    for chain, _, _, T, solutions in solved:
+        exact = [s.q for s in solutions if s.exact]
+        specified = [q for q in solve(chain, T) if np.abs(forward(chain, q) - T).max() < 1e-9]
+        assert matched(exact, specified, 1e-6)
+
+
+def test_inclusion_the_original_is_on_its_branch(solved: list[Case]) -> None:
+    for chain, _, q, _, solutions in solved:
+        original = solutions[BRANCHES.index(branch_of(chain, q))]
+        assert original.exact
+        assert same(original.q, q, 1e-7)
+
+
+def test_completeness_as_many_as_the_offsets_leave(solved: list[Case]) -> None:
+    counts: dict[bool, list[int]] = {True: [], False: []}
+    for chain, offsets, _, _, solutions in solved:
+        exact = [s for s in solutions if s.exact]
+        assert len(solutions) == 4
+        assert all(branch_of(chain, s.q) == s.branch for s in exact)
+        if offsets.lateral == offsets.radial == offsets.roll_offset == 0.0:
+            assert len(exact) == 4
+        counts[offsets.lateral != 0.0].append(len(exact))
+    # Beside axis 1 the plane that holds the roll axis is one; through it, it has two sides.
+    assert set(counts[True]) == {2}
+    assert set(counts[False]) == {2, 4}
+
+
+def test_strictness_limits_are_told_right(solved: list[Case]) -> None:
+    for chain, _, _, _, solutions in solved:
+        for s in solutions:
+            inside = bool((np.abs(s.q) <= math.pi + 1e-9).all())
+            assert s.within_limits == inside
+            assert chain.within_limits(s.q) == inside
+
+
+def at_canonical(chain: Chain, alpha: list[float]) -> tuple[FloatArray, FloatArray]:
+    q = arm_of(chain).joints(alpha)
+    return q, forward(chain, q)
+
+
+def assert_exact(chain: Chain, q: FloatArray, T: FloatArray, within: float) -> None:
+    """`q` is found, and every branch that takes the pose takes it exactly.
+
+    Beside axis 1 the other shoulder is left out: it takes next to what the first one does where
+    the two planes nearly meet.
+    """
+    solutions = [s for s in inverse(chain, T) if s.exact]
+    assert any(same(s.q, q, within) for s in solutions)
+    if arm_of(chain).d != 0.0:
+        both = [[s for s in solutions if s.branch.shoulder == side] for side in ("front", "back")]
+        both = [side for side in both if side]
+        solutions = min(both, key=lambda side: max(s.rotation_error for s in side))
+    assert len(solutions) >= 2
+    assert max(s.position_error for s in solutions) < POSITION
+    assert max(s.rotation_error for s in solutions) < ROTATION
+
+
+@pytest.mark.parametrize(
+    ("three", "within"),
+    [(0.0, 1e-6), (1e-9, 1e-6), (math.pi, 1e-6), (math.pi - 1e-7, 1e-6), (1e-4, 1e-9)],
+)
+def test_stretched_and_folded(three: float, within: float, rng: np.random.Generator) -> None:
+    for _ in range(60):
+        chain, _ = random_member(rng)
+        q, T = at_canonical(chain, [*rng.uniform(-3.0, 3.0, 2), three, *rng.uniform(-3.0, 3.0, 2)])
+        assert_exact(chain, q, T, within)
+
+
+@pytest.mark.parametrize("u", [0.0, 1e-15, 1e-12, -1e-9, 1e-7, -1e-5, 1e-3])
+def test_tool_point_on_and_by_axis_1(u: float, rng: np.random.Generator) -> None:
+    """At the distance u from where axis 1, or the cylinder about it, holds the tool point."""
+    tried = 0
+    while tried < 60:
+        chain, _ = random_member(rng)
+        arm = arm_of(chain)
+        two, three, four = rng.uniform(-3.0, 3.0, 3)
+        reach = np.cumsum([two, three, four])
+        lengths = np.array([arm.l1, arm.l2, arm.l3])
+        x, z = lengths @ np.cos(reach), lengths @ np.sin(reach)
+        if math.hypot(x, z) <= abs(u - arm.a):
+            continue
+        tried += 1
+        two += math.acos((u - arm.a) / math.hypot(x, z)) - math.atan2(z, x)
+        q, T = at_canonical(chain, [1.3, two, three, four, 0.6])
+        assert_exact(chain, q, T, 1e-7)
+
+
+@pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2, math.pi / 2 - 1e-10])
+def test_tool_upright(pitch: float, rng: np.random.Generator) -> None:
+    for _ in range(60):
+        chain, _ = random_member(rng)
+        two, three = rng.uniform(-3.0, 3.0, 2)
+        four = pitch + arm_of(chain).tilt - two - three
+        q, T = at_canonical(chain, [0.7, two, three, four, -0.9])
+        assert_exact(chain, q, T, 1e-9)
+
+
+def test_inside_the_lateral_offset_the_least_miss_is_told(rng: np.random.Generator) -> None:
+    offsets = Offsets(0.03, 0.05, (0.2, 0.2, 0.15), (0.0, 0.0, 0.0), 0.0, (1, 1, 1, 1, 1))
+    chain = member(offsets, np.eye(4), np.eye(4))
+    for rho in (0.0, 1e-10, 0.01, 0.049):
+        facing = float(rng.uniform(-3.0, 3.0))
+        p = [rho * math.cos(facing), rho * math.sin(facing), 0.25]
+        T = se3.from_rotation_translation(so3.exp([0.1, 0.2, 0.3]), p)
+        for s in inverse(chain, T):
+            assert s.position_error == pytest.approx(0.05 - rho, abs=1e-9)
+            assert not s.exact
+
+
+def test_a_tool_point_beside_the_roll_axis_is_solved(rng: np.random.Generator) -> None:
+    for _ in range(50):
+        chain, _ = random_member(rng)
+        beside = chain.with_tool(chain.M @ random_pose(rng, 0.05))
+        assert arm_of(beside).off_axis > 1e-4
+        q = rng.uniform(chain.lower, chain.upper)
+        solutions = inverse(beside, forward(beside, q))
+        assert any(s.exact and same(s.q, q, 1e-6) for s in solutions)
+
+
+def test_every_finite_pose_has_finite_angles(rng: np.random.Generator) -> None:
+    for _ in range(30):
+        chain, _ = random_member(rng)
+        arm = arm_of(chain)
+        corners = [so3.from_rpy(*(0.5 * math.pi * rng.integers(-2, 3, size=3))) for _ in range(3)]
+        for R in (*corners, so3.exp(rng.normal(size=3))):
+            for size in (0.0, 1e-300, 1e-12, 0.3, 1e3, 1e300):
+                T_C_K = se3.from_rotation_translation(R, size * rng.normal(size=3) / 3.0)
+                T = se3.inverse(arm.T_C_S) @ T_C_K @ arm.T_K_tool
+                for q in Solver.of(chain).solve(T.tolist()):
+                    assert np.isfinite(q).all()
+
+
+def test_beyond_reach_the_arm_points_the_nearest_way(rng: np.random.Generator) -> None:
+    for _ in range(30):
+        chain, _ = random_member(rng, lateral=False)
+        arm = arm_of(chain)
+        _, T = at_canonical(chain, [0.4, -0.3, 0.0, 0.2, 0.5])
+        T_C_K = arm.pose(T)
+        T_C_K[:3, 3] += 0.2 * np.array(so3.rotation_z(0.4) @ so3.rotation_y(-0.3))[:, 0]
+        away = se3.inverse(arm.T_C_S) @ T_C_K @ arm.T_K_tool
+        misses = [s.position_error for s in inverse(chain, away)]
+        assert any(miss == pytest.approx(0.2, abs=1e-12) for miss in misses)

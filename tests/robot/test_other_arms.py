@@ -1,0 +1,233 @@
+"""Any arm of the family, end to end: read, classified, solved, projected, served."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yourdfpy
+
+from app.control import commands as cmd
+from app.control.session import Session
+from app.errors import RobotDescriptionError
+from app.geometry import se3, so3
+from app.kinematics.arm import arm_of
+from app.kinematics.branch import branch_of
+from app.kinematics.forward import forward
+from app.kinematics.freedoms import pitch_and_roll, pitched_frame
+from app.kinematics.inverse import inverse
+from app.kinematics.projection import project
+from app.robot.model import RobotModel, load
+from app.settings import Settings
+from tests.browser.server import APP, AppServer
+
+ROOT = Path(__file__).resolve().parents[2]
+ARMS = Path(__file__).parent / "arms"
+PINCHER, YOUBOT = ARMS / "pincherx_150.urdf", ARMS / "youbot_arm.urdf"
+
+
+@pytest.fixture(params=[PINCHER, YOUBOT], ids=lambda path: path.stem)
+def path(request: pytest.FixtureRequest) -> Path:
+    return Path(request.param)
+
+
+@pytest.fixture
+def other(path: Path) -> RobotModel:
+    return load(path)
+
+
+def test_the_pincher_is_that_of_its_manual() -> None:
+    model = load(PINCHER)
+    # The manual's home configuration and screw axes, in its base frame.
+    M = se3.from_rotation_translation(np.eye(3), [0.358575, 0.0, 0.25457])
+    np.testing.assert_allclose(model.T_base_shoulder @ model.arm.chain.M, M, atol=1e-12)
+    heights = -np.array([0.10457, 0.25457, 0.25457]) + model.T_base_shoulder[2, 3]
+    np.testing.assert_allclose(model.arm.chain.S[3, 1:4], heights, atol=1e-12)
+    np.testing.assert_allclose(model.arm.chain.S[5, 1:4], [0.0, 0.05, 0.2], atol=1e-12)
+    arm = arm_of(model.arm.chain)
+    assert arm.l1 == pytest.approx(math.hypot(0.05, 0.15))
+    assert arm.shifts[1] == pytest.approx(-math.atan2(0.15, 0.05))
+    assert (arm.a, arm.d, arm.tilt) == (0.0, 0.0, 0.0)
+
+
+def test_the_youbot_is_that_of_its_manual() -> None:
+    model = load(YOUBOT)
+    arm = arm_of(model.arm.chain)
+    assert [arm.a, arm.l1, arm.l2, arm.l3] == pytest.approx([0.033, 0.155, 0.135, 0.2175])
+    assert arm.d == 0.0
+    assert arm.signs[0] == -1.0
+    assert arm.signs[1] == -arm.signs[2] == arm.signs[3]
+    np.testing.assert_allclose(model.T_base_shoulder[:3, 3], [0.0, 0.0, 0.147], atol=1e-15)
+    assert list(model.arm.tools) == ["tip"]
+    assert [note for note in model.notes if "prismatic" in note] == list(model.notes)
+    assert len(model.notes) == 2
+
+
+def test_the_chain_agrees_with_yourdfpy(path: Path, other: RobotModel) -> None:
+    urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    chain = other.arm.chain
+    rng = np.random.default_rng(3)
+    for q in rng.uniform(chain.lower, chain.upper, size=(20, 5)):
+        held = dict.fromkeys(urdf.actuated_joint_names, 0.0)
+        urdf.update_cfg(held | dict(zip(chain.names, q.tolist(), strict=True)))
+        expected = urdf.get_transform(other.arm.default_tool)
+        np.testing.assert_allclose(other.T_base_shoulder @ forward(chain, q), expected, atol=1e-12)
+
+
+def test_every_pose_it_takes_is_solved_and_left_alone(other: RobotModel) -> None:
+    chain = other.arm.chain
+    rng = np.random.default_rng(4)
+    exact = 0
+    for q in rng.uniform(chain.lower, chain.upper, size=(300, 5)):
+        T = forward(chain, q)
+        solutions = inverse(chain, T)
+        assert any(np.abs(s.q - q).max() < 1e-8 for s in solutions if s.within_limits)
+        for s in solutions:
+            if s.exact:
+                exact += 1
+                assert s.position_error < 2e-15
+                assert s.rotation_error < 1e-12
+                assert branch_of(chain, s.q) == s.branch
+        p = project(chain, T, branch=branch_of(chain, q))
+        assert p.position_error < 1e-14
+        assert p.rotation_error < 1e-11
+        assert p.limits == ()
+    assert exact >= 600
+
+
+def test_it_stands_ready_with_room_to_move(other: RobotModel) -> None:
+    chain = other.arm.chain
+    q = other.ready(Settings().ready)
+    assert (q > chain.lower).all()
+    assert (q < chain.upper).all()
+    tool = other.T_base_shoulder @ forward(chain, q)
+    assert tool[0, 3] > 0.1
+    assert abs(tool[1, 3]) < 1e-12
+
+
+def test_dragging_keeps_what_the_hand_does_not_move(other: RobotModel) -> None:
+    chain = other.arm.chain
+    session = Session(other.arm, other.ready(Settings().ready))
+    state = session.begin(session.ready, 0.0, 0.0)
+    start = forward(chain, state.goal)[:3, 3]
+    pitch, roll = pitch_and_roll(chain, state.goal)
+    moved = start + np.array([0.01, 0.03, 0.02])
+    state = session.step(state, [cmd.MoveTool(moved)], 0.01)
+    assert state.findings == ()
+    np.testing.assert_allclose(forward(chain, state.goal)[:3, 3], moved, atol=1e-12)
+    assert pitch_and_roll(chain, state.goal) == pytest.approx((pitch, roll), abs=1e-12)
+    state = session.step(state, [cmd.TurnTool(pitch + 0.1, roll + 0.4)], 0.02)
+    np.testing.assert_allclose(forward(chain, state.goal)[:3, 3], moved, atol=1e-12)
+    assert pitch_and_roll(chain, state.goal) == pytest.approx((pitch + 0.1, roll + 0.4), abs=1e-12)
+    # A positive pitch points the roll axis down.
+    axis = pitched_frame(chain, state.goal)[:, 0]
+    assert math.asin(-axis[2]) == pytest.approx(pitch + 0.1, abs=1e-12)
+
+
+def test_links_without_shapes_are_drawn_as_rods() -> None:
+    bodies = {body.name: body for body in load(YOUBOT).bodies}
+    (rod,) = bodies["upper_arm"].visuals
+    np.testing.assert_allclose(rod.mesh.bounds[:, 2], [0.0, 0.155], atol=1e-9)
+    (box,) = bodies["turret"].visuals
+    assert box.colour == (255, 102, 0)
+    np.testing.assert_allclose(box.mesh.extents, [0.1, 0.08, 0.06], atol=1e-12)
+    np.testing.assert_allclose(box.mesh.bounds.mean(axis=0), [0.0165, 0.0, 0.0], atol=1e-12)
+    assert not bodies["foot"].moves
+    assert bodies["tip"].moves
+
+
+def test_it_is_served(path: Path) -> None:
+    with AppServer((*APP, "--urdf", str(path))) as server:
+        assert server.running
+        assert "Traceback" not in server.output
+
+
+def test_its_kinematics_are_answered_a_line(path: Path, other: RobotModel) -> None:
+    def ask(command: str, request: object, *options: str) -> dict[str, object]:
+        done = subprocess.run(
+            [sys.executable, "-m", "app", command, "--urdf", str(path), *options],
+            input=json.dumps(request) + "\n",
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            timeout=60,
+            check=True,
+        )
+        answer: dict[str, object] = json.loads(done.stdout)
+        return answer
+
+    q = [0.3, -0.2, 0.5, 0.4, 0.7]
+    answer = ask("fk", {"q": q}, "--tool", "hand")
+    hand = load(path, "hand")
+    np.testing.assert_allclose(np.array(answer["T"]), forward(hand.arm.chain, q), atol=1e-15)
+    answer = ask("ik", {"T": forward(other.arm.chain, q).tolist()})
+    solutions = answer["solutions"]
+    assert isinstance(solutions, list)
+    assert any(np.allclose(s["q"], q) for s in solutions)
+    residual = answer["residual_mm"]
+    assert isinstance(residual, float)
+    assert residual < 1e-9
+
+
+def edited(tmp_path: Path, old: str, new: str) -> Path:
+    text = PINCHER.read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "edited.urdf"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('<axis xyz="1 0 0"/>', '<axis xyz="0 1 0"/>', "axis 5 must be square to axis 4"),
+        ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.1 0 0"/>', "axis 3 must be parallel"),
+        ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="fixed">', "five turn"),
+        ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="prismatic">', "five"),
+        ('lower="-1.97222205" ', "", "shoulder"),
+    ],
+)
+def test_an_arm_of_another_kind_is_refused_with_the_reason(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    with pytest.raises(RobotDescriptionError, match=said):
+        load(edited(tmp_path, old, new))
+
+
+def test_a_tool_that_cannot_be_is_refused() -> None:
+    with pytest.raises(RobotDescriptionError, match="no link 'nose'; its links are base, turret"):
+        load(PINCHER, "nose")
+    with pytest.raises(RobotDescriptionError, match=r"hangs on 4 turning joints .* --tool"):
+        load(PINCHER, "wrist")
+
+
+def test_meshes_of_other_formats_are_read_and_absent_ones_told(tmp_path: Path) -> None:
+    trimesh.creation.box(extents=[10.0, 20.0, 30.0]).export(tmp_path / "box.stl")
+    shape = (
+        '<link name="forearm"><visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/>'
+        '<geometry><mesh filename="package://pincher/{}.stl" scale="0.001 0.001 0.001"/>'
+        "</geometry></visual></link>"
+    )
+    model = load(edited(tmp_path, '<link name="forearm"/>', shape.format("box")))
+    (visual,) = next(body for body in model.bodies if body.name == "forearm").visuals
+    np.testing.assert_allclose(visual.mesh.extents, [0.02, 0.01, 0.03], atol=1e-9)
+    np.testing.assert_allclose(visual.mesh.bounds.mean(axis=0), [0.1, 0.0, 0.0], atol=1e-9)
+    assert model.notes == ()
+    absent = load(edited(tmp_path, '<link name="forearm"/>', shape.format("none")))
+    assert [note for note in absent.notes if "none.stl" in note]
+
+
+def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None:
+    own = load()
+    text = (ROOT / "robot_description" / "katana450.urdf").read_text(encoding="utf-8")
+    path = tmp_path / "edited.urdf"
+    path.write_text(text.replace('"shoulder_frame"', '"elsewhere"'), encoding="utf-8")
+    other = load(path)
+    np.testing.assert_allclose(other.T_base_shoulder, own.T_base_shoulder, atol=1e-15)
+    np.testing.assert_allclose(so3.log(other.arm.chain.M[:3, :3]), 0.0, atol=1e-15)
