@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -10,15 +9,14 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.arm import Arm
-from app.control.findings import of_joints, of_projection
+from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
 from app.errors import InputError
-from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
-from app.kinematics.branch import branch_of
+from app.kinematics.branch import Branch, branch_of
 from app.kinematics.forward import forward
-from app.kinematics.inverse import inverse
-from app.kinematics.projection import project
+from app.kinematics.reading import nearest
+from app.kinematics.tracker import leap, track
 from app.motion.approach import approach
 
 LONGEST_STEP = 0.05
@@ -127,6 +125,13 @@ class Session:
                 return replace(state, target=JointTarget(state.goal))
             case cmd.SetTool(name=name):
                 return self._aim(replace(state, tool=name), JointTarget(state.goal))
+            case cmd.SetReading(reading=reading):
+                reread = replace(state, reading=reading)
+                # Where a hand let go nothing is wished any more that could be reread.
+                let_go = isinstance(state.target, JointTarget)
+                return reread if let_go else self._aim(reread, state.target)
+            case cmd.TakeBranch(branch=branch):
+                return self._take_branch(state, branch)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
 
@@ -150,31 +155,42 @@ class Session:
                 branch=branch_of(chain, goal),
                 findings=of_joints(chain, target.q) + gripper,
             )
-        T = target.T if isinstance(target, PoseTarget) else self._pose(state, target)
-        best = project(chain, T, branch=state.branch, q_hint=state.goal)
-        # Of the solutions for the feasible pose, the one that stays on the branch.
-        solutions = inverse(chain, best.T, q_hint=best.q)
-        q = min((solution.q for solution in solutions), key=lambda q: np.abs(q - best.q).max())
-        yaw_was_wished = isinstance(target, PoseTarget)
+        if isinstance(target, PoseTarget):
+            best = nearest(chain, target.T, state.reading, branch=state.branch, q_hint=state.goal)
+            findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
+        else:
+            tracked = track(
+                chain,
+                state.goal,
+                target,
+                branch=state.branch,
+                reading=state.reading,
+                since=self._wish(state),
+            )
+            best = tracked.best
+            findings = of_tracked(chain, tracked, state.reading)
         return replace(
-            state,
-            target=target,
-            goal=frozen(chain.clamp(q)),
-            findings=of_projection(chain, best, yaw_was_wished=yaw_was_wished) + gripper,
+            state, target=target, goal=frozen(chain.clamp(best.q)), findings=findings + gripper
         )
 
-    def _pose(self, state: State, target: ToolTarget) -> FloatArray:
-        """The pose in {S} that five numbers mean: the tool lies in the plane through axis 1."""
-        x, y, _ = target.position
-        if math.hypot(x, y) < self._ON_AXIS:
-            azimuth = float(state.goal[0])
-        else:
-            azimuth = math.atan2(y, x) + (0.0 if state.branch.shoulder == "front" else math.pi)
-        R = so3.rotation_z(azimuth) @ so3.rotation_y(target.pitch) @ so3.rotation_x(target.roll)
-        return se3.from_rotation_translation(R, target.position)
-
-    _ON_AXIS = 1e-9
-    """[m] Nearer to axis 1 than this the direction to the tool point means nothing."""
+    def _take_branch(self, state: State, branch: Branch) -> State:
+        """Leap to ``branch`` with the tool where it is wished."""
+        chain = self.arm.chain_to(state.tool)
+        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
+        turned = replace(state, branch=branch)
+        if isinstance(state.target, PoseTarget):
+            return self._aim(turned, state.target)
+        wish = self._wish(state)
+        if branch.shoulder != state.branch.shoulder:
+            wish = wish.turned_round()
+        best = leap(chain, state.goal, wish, branch, state.reading)
+        goal = frozen(chain.clamp(best.q))
+        return replace(
+            turned,
+            target=JointTarget(goal) if isinstance(state.target, JointTarget) else wish,
+            goal=goal,
+            findings=of_projection(chain, best, state.reading, yaw_was_wished=False) + gripper,
+        )
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper
