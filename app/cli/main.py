@@ -24,7 +24,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return serve(Settings(host=options.host, port=options.port))
         from app.cli.lines import Kinematics, answer_lines
 
-        kinematics = Kinematics(in_base_frame=options.frame == "base")
+        kinematics = Kinematics(
+            in_base_frame=options.frame == "base", badges=getattr(options, "badges", False)
+        )
         answer_lines(kinematics.fk if options.command == "fk" else kinematics.ik)
         return 0
     except KatanaError as error:
@@ -67,6 +69,13 @@ def _parser() -> argparse.ArgumentParser:
             help="coordinates of T: the paper's frame {S} at the shoulder, or the base on the "
             "table (default: %(default)s)",
         )
+        if name == "ik":
+            lines.add_argument(
+                "--badges",
+                action="store_true",
+                help='each solution with its way from "q" in the line (default: the zero posture) '
+                "as distance_rad and time_s, and its smallest_singular_value",
+            )
     return parser
 
 

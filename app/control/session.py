@@ -9,14 +9,14 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.arm import Arm
+from app.control.choices import choice, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
-from app.kinematics.forward import forward
 from app.kinematics.reading import nearest
-from app.kinematics.tracker import leap, track
+from app.kinematics.tracker import track
 from app.motion.approach import approach
 
 LONGEST_STEP = 0.05
@@ -115,9 +115,9 @@ class Session:
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 return self._aim(held, JointTarget(state.setpoint))
             case cmd.MoveTool(position=position):
-                return self._aim(state, replace(self._wish(state), position=position))
+                return self._aim(state, replace(wish(self.arm, state), position=position))
             case cmd.TurnTool(pitch=pitch, roll=roll):
-                return self._aim(state, replace(self._wish(state), pitch=pitch, roll=roll))
+                return self._aim(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
             case cmd.SetPose(T=T):
                 return self._aim(state, PoseTarget(T))
             case cmd.Settle():
@@ -134,13 +134,6 @@ class Session:
                 return self._take_branch(state, branch)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
-
-    def _wish(self, state: State) -> ToolTarget:
-        """The tool target that a drag starts from: the last one wished, else where the goal is."""
-        if isinstance(state.target, ToolTarget):
-            return state.target
-        T = forward(self.arm.chain_to(state.tool), state.goal)
-        return ToolTarget(frozen(T[:3, 3]), *pitch_and_roll(state.goal))
 
     def _aim(self, state: State, target: Target) -> State:
         """Make ``target`` the target, and the nearest the arm can do the goal."""
@@ -165,7 +158,7 @@ class Session:
                 target,
                 branch=state.branch,
                 reading=state.reading,
-                since=self._wish(state),
+                since=wish(self.arm, state),
             )
             best = tracked.best
             findings = of_tracked(chain, tracked, state.reading)
@@ -175,22 +168,21 @@ class Session:
 
     def _take_branch(self, state: State, branch: Branch) -> State:
         """Leap to ``branch`` with the tool where it is wished."""
-        chain = self.arm.chain_to(state.tool)
-        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
-        turned = replace(state, branch=branch)
+        best = choice(self.arm, state, branch)
+        goal = frozen(self.arm.chain.clamp(best.q))
+        target: Target = JointTarget(goal)
         if isinstance(state.target, PoseTarget):
-            return self._aim(turned, state.target)
-        wish = self._wish(state)
-        if branch.shoulder != state.branch.shoulder:
-            wish = wish.turned_round()
-        best = leap(chain, state.goal, wish, branch, state.reading)
-        goal = frozen(chain.clamp(best.q))
-        return replace(
-            turned,
-            target=JointTarget(goal) if isinstance(state.target, JointTarget) else wish,
-            goal=goal,
-            findings=of_projection(chain, best, state.reading, yaw_was_wished=False) + gripper,
+            target = state.target
+        elif isinstance(state.target, ToolTarget):
+            target = wish_on(self.arm, state, branch)
+        findings = of_projection(
+            self.arm.chain,
+            best,
+            state.reading,
+            yaw_was_wished=isinstance(target, PoseTarget),
         )
+        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
+        return replace(state, branch=branch, target=target, goal=goal, findings=findings + gripper)
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper
@@ -198,8 +190,3 @@ class Session:
         others = tuple(f for f in state.findings if f.reason is not Reason.GRIPPER_LIMIT)
         held = (Finding(Reason.GRIPPER_LIMIT, goal),) if goal != angle else ()
         return replace(state, gripper_goal=goal, findings=others + held)
-
-
-def pitch_and_roll(q: FloatArray) -> tuple[float, float]:
-    """Pitch below the horizontal and roll [rad] of a pan, three parallel, roll arm at ``q``."""
-    return float(q[1] + q[2] + q[3]), float(q[4])

@@ -10,7 +10,13 @@ from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
 from app.kinematics.subproblems import wrapped
+
+
+def pitch_and_roll(q: FloatArray) -> tuple[float, float]:
+    """Pitch below the horizontal and roll [rad] of a pan, three parallel, roll arm at `q` (5,)."""
+    return float(q[1] + q[2] + q[3]), float(q[4])
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +30,11 @@ class ToolTarget:
     position: FloatArray
     pitch: float
     roll: float
+
+    @staticmethod
+    def at(chain: Chain, q: FloatArray) -> ToolTarget:
+        """Where the tool is with the joints at `q` (5,) [rad]."""
+        return ToolTarget(frozen(forward(chain, q)[:3, 3]), *pitch_and_roll(q))
 
     def facing(self, branch: Branch, theta1: float) -> float:
         """The theta1 [rad] in (-pi, pi] that has the position in the arm's plane on `branch`.

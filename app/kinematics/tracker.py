@@ -26,7 +26,7 @@ from app.kinematics.chain import Chain
 from app.kinematics.projection import Projection
 from app.kinematics.reading import Reading, nearest
 from app.kinematics.subproblems import wrapped
-from app.kinematics.tool import ToolTarget
+from app.kinematics.tool import ToolTarget, pitch_and_roll
 
 HOP: Final = 0.1
 """[rad] How far an axis may go at once: what the joints do in a twelfth of a second, so that a
@@ -167,7 +167,7 @@ def _hop(
     near = dataclasses.replace(chain, lower=lower, upper=upper)
     if reading is Reading.PITCH:
         # The pitch comes first, and no posture within a hop has one that is farther away.
-        pitch = float(q[1] + q[2] + q[3])
+        pitch, _ = pitch_and_roll(q)
         turn = min(max(wrapped(target.pitch - pitch), -HOP), HOP)
         target = dataclasses.replace(target, pitch=pitch + turn)
     found = nearest(near, target.pose(chain, theta1), reading, branch=branch, q_hint=q)
@@ -202,8 +202,8 @@ def _nearer(a: Projection, b: Projection, target: ToolTarget, reading: Reading, 
 def _misses(found: Projection, target: ToolTarget, reading: Reading) -> tuple[float, ...]:
     if reading is Reading.POSE:
         return found.position_error, found.rotation_error
-    pitch = abs(wrapped(float(found.q[1:4].sum()) - target.pitch))
-    roll = abs(wrapped(float(found.q[4]) - target.roll))
+    pitch, roll = pitch_and_roll(found.q)
+    pitch, roll = abs(wrapped(pitch - target.pitch)), abs(wrapped(roll - target.roll))
     if reading is Reading.PITCH:
         return pitch, found.position_error, roll
     return found.position_error, pitch, roll

@@ -15,10 +15,10 @@ import numpy as np
 import viser
 
 from app.control.commands import Command, MoveTool, Settle, TurnTool
-from app.control.session import pitch_and_roll
 from app.control.state import State, ToolTarget
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.tool import pitch_and_roll
 from app.robot.model import RobotModel
 from app.view.guard import WORKSPACE
 

@@ -10,13 +10,14 @@ import pytest
 
 from app.control import commands as cmd
 from app.control.arm import Arm
-from app.control.session import LONGEST_STEP, Session, pitch_and_roll
+from app.control.session import LONGEST_STEP, Session
 from app.control.state import JointTarget, PoseTarget, Reason, State, Status
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import branch_of
 from app.kinematics.forward import forward
+from app.kinematics.tool import pitch_and_roll
 
 TICK = 0.01
 
