@@ -109,8 +109,9 @@ def track(
     if _within_hop(q, ahead):
         return Tracked(ahead, None)
     for stop in () if since is None else _way(since, target):
-        q = _pursue(chain, q, stop, branch, reading, hops=2).q
-    found = _pursue(chain, q, target, branch, reading, hops=MOST_HOPS)
+        best = leap(chain, q, stop, branch, reading)
+        q = _pursue(chain, q, stop, best, reading, hops=2).q
+    found = _pursue(chain, q, target, ahead, reading, hops=MOST_HOPS)
     return Tracked(found, ahead if _nearer(ahead, found, target, reading, WORTH_A_LEAP) else None)
 
 
@@ -137,19 +138,23 @@ def _way(since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
 
 
 def _pursue(
-    chain: Chain, q: FloatArray, target: ToolTarget, branch: Branch, reading: Reading, hops: int
+    chain: Chain, q: FloatArray, target: ToolTarget, best: Projection, reading: Reading, hops: int
 ) -> Projection:
-    """The nearest pose to `target` if it is a hop away, else where at most `hops` hops lead."""
-    best = leap(chain, q, target, branch, reading)
-    found = best
-    for taken in range(hops):
+    """The nearest pose, `best`, if it is a hop away, else where at most `hops` hops lead."""
+    found: Projection | None = None
+    for _ in range(hops):
         if _within_hop(q, best):
             return best
-        hop = _hop(chain, q, target, branch, reading)
-        if taken and not _nearer(hop, found, target, reading, WORTH_A_HOP):
-            break
+        hop = _hop(chain, q, target, best.branch, reading)
+        if found is not None and not _nearer(hop, found, target, reading, WORTH_A_HOP):
+            return found
+        way = np.abs(hop.q - q)
+        way[ELBOW] = 0.0
         found, q = hop, hop.q
-    return found
+        if way.max() < HOP * (1.0 - WORTH_A_HOP):
+            # Not the bounds of the hop hold it there: another one would lead nowhere.
+            return found
+    return best if found is None else found
 
 
 def _hop(
