@@ -27,7 +27,7 @@ GRABS = (1, 5, 25)
 ROUNDING = 1e-9
 
 NEAR_AXIS_1 = 0.05
-"""[m] The joints go straight to the goal, so the tool goes there in a bow. Only this near to axis 1,
+"""[m] The joints go straight to the goal, so the tool goes there in a bow. Only this near axis 1,
 where axis 1 has to turn far, can the bow lead away from a target for a moment."""
 
 BOW = 1e-3
