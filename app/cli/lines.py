@@ -13,6 +13,7 @@ import numpy as np
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.badge import Badge
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
@@ -25,11 +26,15 @@ Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 class Kinematics:
     """Forward and inverse kinematics of the arm in the URDF, on plain JSON values."""
 
-    def __init__(self, urdf: Path, tool: str | None, *, in_base_frame: bool) -> None:
+    def __init__(
+        self, urdf: Path, tool: str | None, *, in_base_frame: bool, badges: bool = False
+    ) -> None:
         """``in_base_frame``: poses are in the base frame on the table, else in {S}.
 
         ``urdf``, ``tool``: the arm, and the link that is its default tool; see ``load``.
+        ``badges``: solutions carry what they cost to take from the request's ``q``.
         """
+        self._badges = badges
         model = load(urdf, tool)
         self._arm = model.arm
         self._T_frame_shoulder = model.T_base_shoulder if in_base_frame else np.eye(4)
@@ -44,9 +49,12 @@ class Kinematics:
         """``{"T": 4x4, "tool"}`` to every solution for the nearest pose five axes can do.
 
         The residuals say how far that pose is from ``T``, limits of the joints left aside:
-        ``within_limits`` tells of each solution whether the arm can go there.
+        ``within_limits`` tells of each solution whether the arm can go there. With badges there are
+        also its way from ``q`` ([n rad]; the zero posture if not given) and its smallest singular
+        value.
         """
-        chain = self._chain(request, {"T", "tool"})
+        chain = self._chain(request, {"T", "tool", "q"} if self._badges else {"T", "tool"})
+        start = chain.check_q(request.get("q", [0.0] * chain.n))
         T = se3.validated(_numbers(request, "T"), "T")
         T_shoulder = se3.inverse(self._T_frame_shoulder) @ T
         nearest = project(chain, T_shoulder, within_limits=False).T
@@ -60,6 +68,7 @@ class Kinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
+                | (_badge(Badge.of(chain, solution, start)) if self._badges else {})
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
@@ -71,6 +80,14 @@ class Kinematics:
         if unknown:
             raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
         return self._arm.chain_to(request.get("tool", self._arm.default_tool))
+
+
+def _badge(badge: Badge) -> dict[str, float]:
+    return {
+        "distance_rad": badge.distance,
+        "time_s": badge.time,
+        "smallest_singular_value": badge.smallest_singular_value,
+    }
 
 
 def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> None:

@@ -28,7 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from app.cli.lines import Kinematics, answer_lines
 
         in_base_frame = options.frame == "base"
-        kinematics = Kinematics(options.urdf, options.tool, in_base_frame=in_base_frame)
+        kinematics = Kinematics(
+            options.urdf,
+            options.tool,
+            in_base_frame=in_base_frame,
+            badges=options.command == "ik" and options.badges,
+        )
         answer_lines(kinematics.fk if options.command == "fk" else kinematics.ik)
         return 0
     except KatanaError as error:
@@ -71,6 +76,13 @@ def _parser() -> argparse.ArgumentParser:
             help="coordinates of T: the paper's frame {S} at the shoulder, or the base on the "
             "table (default: %(default)s)",
         )
+        if name == "ik":
+            lines.add_argument(
+                "--badges",
+                action="store_true",
+                help='each solution with its way from "q" in the line (default: the zero posture) '
+                "as distance_rad and time_s, and its smallest_singular_value",
+            )
     for command in commands.choices.values():
         command.add_argument(
             "--urdf",

@@ -14,6 +14,8 @@ import numpy as np
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.branch import BRANCHES, Branch
+from app.kinematics.reading import Reading
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,30 @@ class SetTool:
 
 
 @dataclass(frozen=True)
+class SetReading:
+    """From now on ``reading`` says which numbers of a target count; the one there is, is reread."""
+
+    reading: Reading
+
+    def __post_init__(self) -> None:
+        if self.reading not in tuple(Reading):
+            known = ", ".join(f"Reading.{reading.name}" for reading in Reading)
+            raise InputError(f"A reading is one of {known}, not {self.reading!r}.")
+
+
+@dataclass(frozen=True)
+class TakeBranch:
+    """Go for the wished pose on ``branch``, however far that is: the same tool, another arm."""
+
+    branch: Branch
+
+    def __post_init__(self) -> None:
+        if self.branch not in BRANCHES:
+            known = ", ".join(str(branch) for branch in BRANCHES)
+            raise InputError(f"A branch is one of {known}, not {self.branch!r}.")
+
+
+@dataclass(frozen=True)
 class Settle:
     """The hand lets go: what the arm can do becomes what is wished."""
 
@@ -120,6 +146,8 @@ Command = (
     | SetPose
     | SetGripper
     | SetTool
+    | SetReading
+    | TakeBranch
     | Settle
     | Home
     | Stretch

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from app.control.state import Finding, Reason
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
 from app.kinematics.projection import Projection
+from app.kinematics.reading import Reading
+from app.kinematics.tracker import Tracked
 
 POSITION_WORTH_TELLING = 5e-5
 """[m] Half of the arm's stated precision of 0.1 mm."""
@@ -26,19 +29,43 @@ def of_joints(chain: Chain, q: FloatArray) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def of_projection(chain: Chain, best: Projection, *, yaw_was_wished: bool) -> tuple[Finding, ...]:
+def of_projection(
+    chain: Chain, best: Projection, reading: Reading, *, yaw_was_wished: bool
+) -> tuple[Finding, ...]:
     """What the nearest feasible pose ``best`` gives up of the wished one."""
     findings = []
-    if best.position_error > POSITION_WORTH_TELLING:
-        findings.append(Finding(Reason.OUT_OF_REACH, best.position_error))
+    in_place = best.position_error <= POSITION_WORTH_TELLING
+    pitch_gave_way = best.pitch_error > ANGLE_WORTH_TELLING
+    if not in_place:
+        kept = reading is Reading.PITCH and not pitch_gave_way
+        reason = Reason.POSITION_CHANGED if kept else Reason.OUT_OF_REACH
+        findings.append(Finding(reason, best.position_error))
     if yaw_was_wished and best.yaw_error > ANGLE_WORTH_TELLING:
         findings.append(Finding(Reason.YAW_FIXED, best.yaw_error))
-    if best.position_error <= POSITION_WORTH_TELLING and best.pitch_error > ANGLE_WORTH_TELLING:
+    elif in_place and not pitch_gave_way and best.rotation_error > ANGLE_WORTH_TELLING:
+        findings.append(Finding(Reason.ROLL_CHANGED, best.rotation_error))
+    if in_place and pitch_gave_way:
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
-    if findings or best.rotation_error > ANGLE_WORTH_TELLING:
+    if findings:
         for axis in best.limits:
             q, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
             findings.append(
                 Finding(Reason.AXIS_LIMIT, float(min(lower, upper, key=lambda b: abs(b - q))), axis)
             )
     return tuple(findings)
+
+
+def of_tracked(chain: Chain, tracked: Tracked, reading: Reading) -> tuple[Finding, ...]:
+    """What following a drag gives up; first of all the leap that it does not make."""
+    given_up = of_projection(chain, tracked.best, reading, yaw_was_wished=False)
+    if tracked.ahead is None:
+        return given_up
+    axis, leap = tracked.leap_ahead()
+    held = Finding(Reason.ACROSS_GAP, leap, axis)
+    if tracked.ahead.position_error <= POSITION_WORTH_TELLING:
+        # Out of reach is what the arm cannot do at all.
+        given_up = tuple(
+            replace(f, reason=Reason.POSITION_CHANGED) if f.reason is Reason.OUT_OF_REACH else f
+            for f in given_up
+        )
+    return (held, *given_up)

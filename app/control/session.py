@@ -9,15 +9,14 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.arm import Arm
-from app.control.findings import of_joints, of_projection
+from app.control.choices import choice, wish, wish_on
+from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
-from app.kinematics.branch import branch_of
-from app.kinematics.forward import forward
-from app.kinematics.freedoms import pitch_and_roll, tool_pose
-from app.kinematics.inverse import inverse
-from app.kinematics.projection import project
+from app.kinematics.branch import Branch, branch_of
+from app.kinematics.reading import nearest
+from app.kinematics.tracker import track
 from app.motion.approach import approach
 
 LONGEST_STEP = 0.05
@@ -116,9 +115,9 @@ class Session:
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 return self._aim(held, JointTarget(state.setpoint))
             case cmd.MoveTool(position=position):
-                return self._aim(state, replace(self._wish(state), position=position))
+                return self._aim(state, replace(wish(self.arm, state), position=position))
             case cmd.TurnTool(pitch=pitch, roll=roll):
-                return self._aim(state, replace(self._wish(state), pitch=pitch, roll=roll))
+                return self._aim(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
             case cmd.SetPose(T=T):
                 return self._aim(state, PoseTarget(T))
             case cmd.Settle():
@@ -126,16 +125,15 @@ class Session:
                 return replace(state, target=JointTarget(state.goal))
             case cmd.SetTool(name=name):
                 return self._aim(replace(state, tool=name), JointTarget(state.goal))
+            case cmd.SetReading(reading=reading):
+                reread = replace(state, reading=reading)
+                # Where a hand let go nothing is wished any more that could be reread.
+                let_go = isinstance(state.target, JointTarget)
+                return reread if let_go else self._aim(reread, state.target)
+            case cmd.TakeBranch(branch=branch):
+                return self._take_branch(state, branch)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
-
-    def _wish(self, state: State) -> ToolTarget:
-        """The tool target that a drag starts from: the last one wished, else where the goal is."""
-        if isinstance(state.target, ToolTarget):
-            return state.target
-        chain = self.arm.chain_to(state.tool)
-        T = forward(chain, state.goal)
-        return ToolTarget(frozen(T[:3, 3]), *pitch_and_roll(chain, state.goal))
 
     def _aim(self, state: State, target: Target) -> State:
         """Make ``target`` the target, and the nearest the arm can do the goal."""
@@ -150,24 +148,41 @@ class Session:
                 branch=branch_of(chain, goal),
                 findings=of_joints(chain, target.q) + gripper,
             )
-        T = target.T if isinstance(target, PoseTarget) else self._pose(state, target)
-        best = project(chain, T, branch=state.branch, q_hint=state.goal)
-        # Of the solutions for the feasible pose, the one that stays on the branch.
-        solutions = inverse(chain, best.T, q_hint=best.q)
-        q = min((solution.q for solution in solutions), key=lambda q: np.abs(q - best.q).max())
-        yaw_was_wished = isinstance(target, PoseTarget)
+        if isinstance(target, PoseTarget):
+            best = nearest(chain, target.T, state.reading, branch=state.branch, q_hint=state.goal)
+            findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
+        else:
+            tracked = track(
+                chain,
+                state.goal,
+                target,
+                branch=state.branch,
+                reading=state.reading,
+                since=wish(self.arm, state),
+            )
+            best = tracked.best
+            findings = of_tracked(chain, tracked, state.reading)
         return replace(
-            state,
-            target=target,
-            goal=frozen(chain.clamp(q)),
-            findings=of_projection(chain, best, yaw_was_wished=yaw_was_wished) + gripper,
+            state, target=target, goal=frozen(chain.clamp(best.q)), findings=findings + gripper
         )
 
-    def _pose(self, state: State, target: ToolTarget) -> FloatArray:
-        """The pose in {S} that five numbers mean: the tool lies in the plane through axis 1."""
-        chain = self.arm.chain_to(state.tool)
-        shoulder = state.branch.shoulder
-        return tool_pose(chain, target.position, target.pitch, target.roll, shoulder, state.goal)
+    def _take_branch(self, state: State, branch: Branch) -> State:
+        """Leap to ``branch`` with the tool where it is wished."""
+        best = choice(self.arm, state, branch)
+        goal = frozen(self.arm.chain.clamp(best.q))
+        target: Target = JointTarget(goal)
+        if isinstance(state.target, PoseTarget):
+            target = state.target
+        elif isinstance(state.target, ToolTarget):
+            target = wish_on(self.arm, state, branch)
+        findings = of_projection(
+            self.arm.chain,
+            best,
+            state.reading,
+            yaw_was_wished=isinstance(target, PoseTarget),
+        )
+        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
+        return replace(state, branch=branch, target=target, goal=goal, findings=findings + gripper)
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper

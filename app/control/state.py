@@ -7,6 +7,19 @@ from enum import Enum
 
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
+from app.kinematics.reading import Reading
+from app.kinematics.tool import ToolTarget
+
+__all__ = [
+    "Finding",
+    "JointTarget",
+    "PoseTarget",
+    "Reason",
+    "State",
+    "Status",
+    "Target",
+    "ToolTarget",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,15 +27,6 @@ class JointTarget:
     """The joints themselves are wished for: ``q`` (n,) [rad]."""
 
     q: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class ToolTarget:
-    """The five freedoms of the arm's tool: ``position`` (3,) [m] in {S}, pitch and roll [rad]."""
-
-    position: FloatArray
-    pitch: float
-    roll: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +44,16 @@ class Status(Enum):
 
     OK = "ok"
     LIMITED = "limited"
+    HELD = "held"
     FAULT = "fault"
 
 
 class Reason(Enum):
     """Why the goal differs from what was wished."""
 
+    ACROSS_GAP = "across a gap"
     OUT_OF_REACH = "out of reach"
+    POSITION_CHANGED = "position changed"
     AXIS_LIMIT = "axis limit"
     GRIPPER_LIMIT = "gripper limit"
     YAW_FIXED = "yaw fixed"
@@ -61,7 +68,8 @@ class Finding:
 
     Attributes:
         reason: what holds the goal back.
-        amount: by how much [m or rad]; for a limit, the limit itself [rad].
+        amount: by how much [m or rad]; for a limit, the limit itself [rad]; for a gap, the leap
+            across it [rad].
         axis: the axis it is about, counted from 0, where it is about one.
     """
 
@@ -82,6 +90,7 @@ class State:
         tool: the tool frame that targets and read-outs are of.
         target: what was wished, kept as it was wished.
         branch: the branch that dragging keeps.
+        reading: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished; empty when it is.
     """
 
@@ -95,6 +104,7 @@ class State:
     tool: str
     target: Target
     branch: Branch
+    reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -102,6 +112,8 @@ class State:
         """What the findings come to."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
+        if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
+            return Status.HELD
         return Status.LIMITED if self.findings else Status.OK
 
     @property

@@ -94,6 +94,12 @@ class FiveAxisArm:
         """Whether {C} is {S} and {K} the tool, so that poses need no change of frames."""
         return bool((np.eye(4) == self.T_C_S).all() and (self.T_K_tool == np.eye(4)).all())
 
+    @cached_property
+    def is_straight(self) -> bool:
+        """Whether the chain is its own canonical arm, and without offsets: as the Katana is."""
+        shape = (self.a, self.d, self.tilt, *self.shifts)
+        return self.is_canonical and not any(shape) and self.signs == (1.0,) * 5
+
     def pose(self, T: FloatArray) -> FloatArray:
         """T_C_K (4, 4) of the pose `T` (4, 4) = T_S_tool."""
         return T if self.is_canonical else self.T_C_S @ T @ self.T_tool_K

@@ -125,7 +125,11 @@ class PlanarArm:
         )
 
     def at(self, u: float, v: float, phi: float) -> Posture | None:
-        """The posture with the tool point at (u, v) and pitch `phi`, if the limits allow it."""
+        """The posture with the tool point at (u, v) and pitch `phi`, if the limits allow it.
+
+        The wrist follows from the pitch; theta3 brings it to its distance from the shoulder
+        (subproblem 3, of whose two answers the branch is one), theta2 into place (subproblem 1).
+        """
         wu, wv = u - self.l3 * math.cos(phi), v - self.l3 * math.sin(phi)
         rho = math.hypot(wu, wv)
         far, near = self.l1 + self.l2, abs(self.l1 - self.l2)

@@ -129,6 +129,11 @@ def project(
     return best
 
 
+def planar_arms(chain: Chain, branch: Branch) -> tuple[PlanarArm, ...]:
+    """Axes 2 to 4 of `chain` inside the limits on `branch`, a piece each; none where it is void."""
+    return _problem(chain, True).planar.get(branch, ())
+
+
 class _Problem(NamedTuple):
     """What does not change from pose to pose: the arm, and its limits as canonical angles."""
 

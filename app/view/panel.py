@@ -14,10 +14,13 @@ from app.control.state import State
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.branch import BRANCHES
 from app.kinematics.forward import forward
+from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
-from app.view.texts import AXIS_NAMES, degrees
+from app.view.branches import BranchList
+from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, degrees
 
 ANGLE_WORTH_SENDING = 2e-6
 """[deg] Rounding on the way to radians and back is less."""
@@ -44,6 +47,7 @@ class Panel:
         server: viser.ViserServer,
         model: RobotModel,
         put: Callable[[cmd.Command], int],
+        show_ellipsoid: Callable[[bool], None],
         state: State,
     ) -> None:
         """``put`` takes a command; ``state`` is what the panel shows first."""
@@ -65,6 +69,10 @@ class Panel:
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
+        with self._gui.add_folder("Branches", expand_by_default=False):
+            self._branches = BranchList(self._gui, model, self._take, state)
+        with self._gui.add_folder("Show", expand_by_default=False):
+            self._ellipsoid(show_ellipsoid)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s].
@@ -79,11 +87,14 @@ class Panel:
                 _set(self._gripper, self._opening(state.gripper_goal))
             if self._tool.value != state.tool:
                 self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
+            if self._reading.value != READINGS[state.reading]:
+                self._reading.value = READINGS[state.reading]  # type: ignore[misc]  # likewise
         if now - self._told_at >= READOUT_INTERVAL or not state.moving:
             self._told_at = now
             page = readout.page(self._model, state)
             if page != self._told:
                 self._told = self._readout.content = page
+            self._branches.follow(state)
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
         chain = self._model.arm.chain
@@ -126,6 +137,14 @@ class Panel:
             hint="The frame that the gizmo, the numbers and the read-out are of",
         )
         self._on_person(self._tool, lambda: cmd.SetTool(self._tool.value))
+        self._reading = self._gui.add_dropdown(
+            "Reading",
+            tuple(READINGS.values()),
+            initial_value=READINGS[state.reading],
+            hint="What counts when five axes cannot do it all. "
+            + " ".join(f"{READINGS[each]}: {READING_HINTS[each]}." for each in Reading),
+        )
+        self._on_person(self._reading, lambda: cmd.SetReading(_reading(self._reading.value)))
         position = self._gui.add_vector3(
             "x, y, z",
             np.round(1e3 * T[:3, 3]) + 0.0,
@@ -147,6 +166,17 @@ class Panel:
             return cmd.SetPose(typed_pose(position.value, angles.value))
 
         self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
+
+    def _take(self, button: viser.GuiButtonHandle, number: int) -> None:
+        self._on_person(button, lambda: cmd.TakeBranch(BRANCHES[number]))
+
+    def _ellipsoid(self, show: Callable[[bool], None]) -> None:
+        box = self._gui.add_checkbox(
+            "Velocity ellipsoid",
+            initial_value=False,
+            hint="How fast the tool point can go in each direction: flat where one is lost",
+        )
+        box.on_update(lambda _: show(box.value))
 
     def _on_person(
         self,
@@ -184,6 +214,10 @@ def typed_pose(
     """The pose (4, 4) in {S} of numbers as people type them: mm, and degrees roll, pitch, yaw."""
     R = so3.from_rpy(*(math.radians(angle) for angle in angles))
     return se3.from_rotation_translation(R, 1e-3 * np.array(position))
+
+
+def _reading(name: str) -> Reading:
+    return next(reading for reading, text in READINGS.items() if text == name)
 
 
 def _set(slider: viser.GuiSliderHandle[float], value: float) -> None:

@@ -11,9 +11,11 @@ import app
 from app.control.state import State, Status
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
+from app.kinematics.velocity import limit_distances, singular_values
 from app.robot.model import RobotModel
-from app.view.texts import headline, sentence, signed
+from app.view.texts import headline, room, sentence, signed
 
 STATIC = Path(app.__file__).resolve().parent.parent / "static"
 
@@ -36,7 +38,25 @@ def page(model: RobotModel, state: State) -> str:
         f"<p class='status {mood}'><b>{escape(headline(state))}</b>"
         f"<span>{escape(why) or '&nbsp;'}</span></p>"
         f"<table><thead><tr><th>{escape(state.tool)} in {{S}}</th><th>now</th><th>goal</th>"
-        f"<th></th></tr></thead><tbody>{rows}</tbody></table></div>"
+        f"<th></th></tr></thead><tbody>{rows}</tbody></table>{_at_once(chain, state.q)}</div>"
+    )
+
+
+def _at_once(chain: Chain, q: FloatArray) -> str:
+    """How near the arm is to a singularity and to a limit."""
+    values = singular_values(chain, q)
+    distances = limit_distances(chain, q)
+    nearest = int(distances.argmin())
+    rows = (
+        ("singular", "smallest singular value", f"{values[-1]:.3f}"),
+        ("manipulability", "manipulability", f"{math.prod(values):.3f}"),
+        ("limit", "nearest limit", room(nearest, float(distances[nearest]))),
+    )
+    return "<table class='at-once'>{}</table>".format(
+        "".join(
+            f"<tr><th>{escape(name)}</th><td data-now='{key}'>{escape(value)}</td></tr>"
+            for key, name, value in rows
+        )
     )
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from app.control.findings import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from app.control.state import Finding, Reason, State, Status
+from app.kinematics.badge import Badge
+from app.kinematics.reading import Reading
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
 
@@ -32,7 +35,12 @@ def axis(number: int | None) -> str:
 
 
 REASONS: dict[Reason, Callable[[Finding], str]] = {
+    Reason.ACROSS_GAP: lambda f: (
+        f"{axis(f.axis)} would have to leap {_short(math.degrees(f.amount))}° to follow: "
+        "drag another way round, or choose the pose under Branches"
+    ),
     Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
+    Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
     Reason.YAW_FIXED: lambda f: (
@@ -48,8 +56,25 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
 STATUS: dict[Status, str] = {
     Status.OK: "On target",
     Status.LIMITED: "As near as it can",
+    Status.HELD: "Held at the edge",
     Status.FAULT: "Fault",
 }
+
+READINGS: dict[Reading, str] = {
+    Reading.POSE: "Position, then orientation",
+    Reading.PITCH: "Pitch, then position",
+    Reading.POSITION: "Position, then pitch",
+}
+
+READING_HINTS: dict[Reading, str] = {
+    Reading.POSE: "the tool point goes where it is wished, and the tool turns as near as it can",
+    Reading.PITCH: "the tool keeps the wished pitch, and stops where it cannot",
+    Reading.POSITION: "the tool point goes where it is wished, with the nearest pitch it can have",
+}
+
+BRANCH_HEADINGS = ("branch", "tool", "way there", "singular")
+
+NOTHING_LOST = "as wished"
 
 MOVING = "Moving"
 
@@ -67,6 +92,23 @@ def sentence(state: State) -> str:
         return ""
     said = "; ".join(REASONS[finding.reason](finding) for finding in state.findings)
     return said[0].upper() + said[1:] + "."
+
+
+def room(number: int, angle: float) -> str:
+    """How far an axis counted from 0 is from its nearer limit [rad]."""
+    return f"{axis(number)}: {degrees(angle)} left"
+
+
+def badge(choice: Badge) -> tuple[str, str, str]:
+    """What a branch gives up, how long the way to it is, and how far it is from a singularity."""
+    lost = []
+    if choice.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{_short(1e3 * choice.position_error)} mm")
+    if choice.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{_short(math.degrees(choice.rotation_error))}°")
+    way = f"{degrees(choice.distance, 0)} in {choice.time:.1f} s"
+    given_up = f"{', '.join(lost)} off" if lost else NOTHING_LOST
+    return given_up, way, f"{choice.smallest_singular_value:.3f}"
 
 
 def _short(value: float) -> str:

@@ -18,6 +18,7 @@ from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
+from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.scene import ArmNodes, Gap, GhostNodes, furnish
@@ -25,6 +26,7 @@ from app.view.scene import ArmNodes, Gap, GhostNodes, furnish
 GHOST_COLOURS: dict[Status, tuple[int, int, int]] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
+    Status.HELD: (234, 88, 12),
     Status.FAULT: (230, 45, 45),
 }
 
@@ -57,7 +59,8 @@ class View:
         self._ghost = GhostNodes(server, model, GHOST_COLOURS[Status.OK])
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
-        self._panel = Panel(server, model, mailbox.put, state)
+        self._ellipsoid = Ellipsoid(server, model)
+        self._panel = Panel(server, model, mailbox.put, self._show_ellipsoid, state)
         self._show(loop.snapshot)
 
     def start(self) -> None:
@@ -80,6 +83,9 @@ class View:
             # A drag sends twenty a second; the next one tells the same more truly.
             return
 
+    def _show_ellipsoid(self, visible: bool) -> None:
+        self._ellipsoid.show(visible, self._loop.snapshot.state)
+
     def _run(self) -> None:
         seen = self._loop.snapshot
         settled = True
@@ -98,6 +104,7 @@ class View:
         with self._server.atomic():
             self._arm.move(self._model.joint_angles(state.q, state.gripper))
             self._show_goal(state)
+            self._ellipsoid.follow(state)
             self._panel.follow(
                 state,
                 time.perf_counter(),

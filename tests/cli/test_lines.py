@@ -72,6 +72,27 @@ def test_ik_states_what_is_lost_of_a_pose_no_5_axis_arm_can_take() -> None:
     assert answer["residual_mm"] == pytest.approx(1000.0 - 631.8, abs=1e-6)
 
 
+def test_ik_with_badges_says_what_each_solution_costs() -> None:
+    q = [0.3, -0.9, 0.8, 0.4, 1.0]
+    (pose,) = ask("fk", [{"q": q}])
+    plain, badged = ask("ik", [pose])[0], ask("ik", [pose | {"q": q}], "--badges")[0]
+    costs = ("distance_rad", "time_s", "smallest_singular_value")
+    for solution, with_badge in zip(plain["solutions"], badged["solutions"], strict=True):
+        assert set(with_badge) == {*solution, *costs}
+        assert with_badge["distance_rad"] == pytest.approx(
+            np.abs(np.array(with_badge["q"]) - q).max()
+        )
+        assert with_badge["time_s"] >= 0.0
+        assert with_badge["smallest_singular_value"] > 0.0
+    assert min(s["distance_rad"] for s in badged["solutions"]) == pytest.approx(0.0, abs=1e-9)
+    (from_zero,) = ask("ik", [pose], "--badges")
+    assert from_zero["solutions"][0]["distance_rad"] == pytest.approx(
+        np.abs(from_zero["solutions"][0]["q"]).max()
+    )
+    (refused,) = ask("ik", [pose | {"q": q}])
+    assert "'q'" in refused["error"]
+
+
 def test_the_base_frame_is_the_shoulder_frame_moved(model: RobotModel) -> None:
     q = [0.3, -0.9, 0.8, 0.4, 1.0]
     request = {"q": q, "tool": "grasp"}

@@ -9,7 +9,24 @@ import pytest
 
 from app.control.session import Session
 from app.control.state import Finding, Reason, State, Status
-from app.view.texts import AXIS_NAMES, REASONS, STATUS, degrees, headline, millimetres, sentence
+from app.kinematics.badge import Badge
+from app.kinematics.branch import BRANCHES
+from app.kinematics.reading import Reading
+from app.view.texts import (
+    AXIS_NAMES,
+    BRANCH_HEADINGS,
+    READING_HINTS,
+    READINGS,
+    REASONS,
+    STATUS,
+    badge,
+    degrees,
+    headline,
+    millimetres,
+    room,
+    sentence,
+)
+from app.view.view import GHOST_COLOURS
 
 
 @pytest.fixture
@@ -36,6 +53,8 @@ def test_every_status_has_a_headline(status: Status) -> None:
 def test_no_text_is_left_over() -> None:
     assert set(REASONS) == set(Reason)
     assert set(STATUS) == set(Status)
+    assert set(READINGS) == set(READING_HINTS) == set(Reading)
+    assert set(GHOST_COLOURS) == set(Status)
     assert len(AXIS_NAMES) == 5
 
 
@@ -57,6 +76,48 @@ def test_no_text_is_left_over() -> None:
 )
 def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, said: str) -> None:
     assert sentence(with_findings(state, finding)) == said
+
+
+@pytest.mark.parametrize("reading", Reading)
+def test_every_reading_has_a_name_of_its_own_and_a_hint(reading: Reading) -> None:
+    assert list(READINGS.values()).count(READINGS[reading]) == 1
+    assert READING_HINTS[reading]
+
+
+def test_a_gap_is_told_with_the_axis_and_the_leap(state: State) -> None:
+    held = with_findings(
+        state,
+        Finding(Reason.ACROSS_GAP, math.radians(68.4), 3),
+        Finding(Reason.POSITION_CHANGED, 0.0123),
+    )
+    assert sentence(held) == (
+        "Axis 4 would have to leap 68° to follow: drag another way round, or choose the pose under "
+        "Branches; position gives way by 12 mm."
+    )
+    assert headline(held) == STATUS[Status.HELD]
+
+
+def test_the_nearest_limit_is_told_with_its_axis() -> None:
+    assert room(1, math.radians(7.31)) == "axis 2: 7.3° left"
+
+
+@pytest.mark.parametrize(
+    ("position_error", "rotation_error", "said"),
+    [
+        (0.0, 0.0, "as wished"),
+        (0.0123, 0.0, "12 mm off"),
+        (0.0, math.radians(4.5), "4.5° off"),
+        (0.0123, math.radians(4.5), "12 mm, 4.5° off"),
+    ],
+)
+def test_a_badge_is_told_in_three_words(
+    state: State, position_error: float, rotation_error: float, said: str
+) -> None:
+    choice = Badge(
+        BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
+    )
+    assert badge(choice) == (said, "90° in 1.3 s", "0.151")
+    assert len(BRANCH_HEADINGS) == 1 + len(badge(choice))
 
 
 def test_two_reasons_make_one_sentence(state: State) -> None:

@@ -1,0 +1,40 @@
+"""The branches a person can choose from: where each would take the arm, and what it gives up."""
+
+from __future__ import annotations
+
+from app.control.arm import Arm
+from app.control.state import PoseTarget, State
+from app.kinematics.badge import Badge
+from app.kinematics.branch import BRANCHES, Branch
+from app.kinematics.projection import Projection
+from app.kinematics.reading import nearest
+from app.kinematics.tool import ToolTarget
+from app.kinematics.tracker import leap
+
+
+def wish(arm: Arm, state: State) -> ToolTarget:
+    """The five numbers that a drag starts from: those last wished, else those of the goal."""
+    if isinstance(state.target, ToolTarget):
+        return state.target
+    return ToolTarget.at(arm.chain_to(state.tool), state.goal)
+
+
+def wish_on(arm: Arm, state: State, branch: Branch) -> ToolTarget:
+    """The same wish in the numbers of ``branch``, whose plane may face the other way."""
+    same = branch.shoulder == state.branch.shoulder
+    return wish(arm, state) if same else wish(arm, state).turned_round()
+
+
+def choice(arm: Arm, state: State, branch: Branch) -> Projection:
+    """Where ``branch`` has the tool as it is wished, as near as the limits allow there."""
+    chain = arm.chain_to(state.tool)
+    if isinstance(state.target, PoseTarget):
+        T = state.target.T
+        return nearest(chain, T, state.reading, branch=branch, q_hint=state.goal)
+    return leap(chain, state.goal, wish_on(arm, state, branch), branch, state.reading)
+
+
+def choices(arm: Arm, state: State) -> tuple[Badge, ...]:
+    """The choice on each of BRANCHES, seen from where the arm is."""
+    chain = arm.chain_to(state.tool)
+    return tuple(Badge.of(chain, choice(arm, state, branch), state.q) for branch in BRANCHES)

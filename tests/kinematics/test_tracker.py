@@ -1,0 +1,206 @@
+"""Following a drag: the nearest pose where that goes on, and no leap where it does not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import Branch, branch_of
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.freedoms import pitch_and_roll
+from app.kinematics.reading import Reading
+from app.kinematics.tool import ToolTarget
+from app.kinematics.tracker import HOP, Tracked, Tracking, leap, track
+
+READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
+FRONT_UP = Branch("front", "up")
+
+
+class Split(NamedTuple):
+    """A drag in the plane y = 0 across a point where the nearest pose leaps on one branch."""
+
+    branch: str
+    point: tuple[float, float]
+    pitch: float
+    way: tuple[float, float]
+    leap: float
+
+    def target(self, along: float) -> ToolTarget:
+        """`along` [m] past the point."""
+        (x, z), (dx, dz) = self.point, self.way
+        return ToolTarget(np.array([x + along * dx, 0.0, z + along * dz]), self.pitch, 0.0)
+
+
+# Found by searching straight drags for the nearest pose to leap by more than 1.2 rad within 1 mm
+# with the tool point in place on both sides: the limits of axes 2, 3 and 4 leave two ranges of
+# pitch there, and the nearer ends or falls behind.
+SPLITS = [
+    Split("front-up", (0.2413, 0.3683), -0.601, (-0.798, -0.603), 1.72),
+    Split("front-up", (0.1042, 0.4239), -1.536, (0.076, -0.997), 1.33),
+    Split("front-up", (0.4353, 0.0323), -0.205, (-0.810, -0.586), 1.24),
+    Split("front-down", (0.0344, 0.4422), -1.241, (-0.910, -0.414), 1.80),
+    Split("front-down", (0.4369, 0.1401), -0.133, (-1.000, 0.008), 1.30),
+    Split("back-down", (-0.2579, 0.3794), -1.628, (-0.435, -0.900), 1.20),
+]
+
+STEP = 5e-4
+"""[m] of each move of these slow drags."""
+
+
+def dragged(
+    chain: Chain, split: Split, q: FloatArray, stops: FloatArray
+) -> Iterator[tuple[ToolTarget, Tracked]]:
+    """Each target of a drag, and what became of it."""
+    branch = Branch.parse(split.branch)
+    since = ToolTarget.at(chain, q)
+    for along in stops:
+        target = split.target(float(along))
+        tracked = track(chain, q, target, branch=branch, since=since)
+        yield target, tracked
+        q, since = tracked.best.q, target
+
+
+@pytest.mark.parametrize("split", SPLITS, ids=str)
+def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, split: Split) -> None:
+    branch = Branch.parse(split.branch)
+    stops = np.arange(-0.02, 0.02, STEP)
+    plain = [
+        leap(chain, READY, split.target(float(along)), branch, Reading.POSE) for along in stops
+    ]
+    start = plain[0].q
+    leaps = np.abs(np.diff([best.q for best in plain], axis=0)).max(axis=1)
+    assert leaps.max() == pytest.approx(split.leap, abs=0.05)
+    at = int(leaps.argmax())
+    assert max(plain[at].position_error, plain[at + 1].position_error) < 1e-9
+
+    goals = list(dragged(chain, split, start, stops))
+    steps = np.abs(np.diff([tracked.best.q for _, tracked in goals], axis=0)).max(axis=1)
+    # In front of the leap nothing differs; behind it the goal goes on by what the hand does.
+    assert all(np.allclose(goals[i][1].best.q, plain[i].q, atol=1e-9) for i in range(at))
+    assert steps.max() < HOP
+    end = goals[-1][1]
+    assert end.status is Tracking.HELD
+    assert end.ahead is not None
+    assert np.allclose(end.ahead.q, plain[-1].q, atol=1e-9)
+    axis, far = end.leap_ahead()
+    assert far == pytest.approx(np.abs(plain[-1].q - end.best.q)[axis])
+    assert far > 1.0
+
+    back = list(dragged(chain, split, end.best.q, stops[::-1]))
+    assert np.abs(np.diff([b.best.q for _, b in back], axis=0)).max() < HOP
+    assert np.allclose(back[-1][1].best.q, start, atol=1e-9)
+    assert back[-1][1].status is not Tracking.HELD
+
+
+def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> None:
+    """It stays at the limit it came to, however far the hand goes on, and comes back with it."""
+    q, held = READY, 0
+    since = ToolTarget.at(chain, q)
+    radius, height = float(np.hypot(*since.position[:2])), float(since.position[2])
+    for azimuth in np.radians(np.arange(2.0, 240.0, 2.0)):
+        position = np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), height])
+        target = ToolTarget(position, since.pitch, since.roll)
+        tracked = track(chain, q, target, branch=FRONT_UP, since=since)
+        assert np.abs(tracked.best.q - q).max() < 2 * HOP
+        if azimuth <= chain.upper[0]:
+            assert tracked.status is Tracking.OK
+        else:
+            assert tracked.best.q[0] == pytest.approx(chain.upper[0], abs=1e-12)
+            held += tracked.status is Tracking.HELD
+        q, since = tracked.best.q, target
+    # Beyond the gap the place is reachable, but only the long way round.
+    assert held > 20
+    assert tracked.ahead is not None
+    assert tracked.ahead.position_error < 1e-9
+    axis, far = tracked.leap_ahead()
+    assert axis == 0
+    assert far == pytest.approx(chain.upper[0] + math.radians(122.0), abs=0.01)
+
+
+def test_over_axis_1_the_arm_does_not_turn_round_by_itself(chain: Chain) -> None:
+    q = np.radians([0.0, -110.0, 100.0, -60.0, 0.0])
+    since = ToolTarget.at(chain, q)
+    assert branch_of(chain, q) == FRONT_UP
+    for x in np.arange(float(since.position[0]), -0.1, -0.01):
+        target = ToolTarget(np.array([x, 0.0, since.position[2]]), since.pitch, 0.0)
+        tracked = track(chain, q, target, branch=FRONT_UP, since=since)
+        assert np.abs(tracked.best.q - q).max() < 2 * HOP
+        assert abs(tracked.best.q[0]) < 1e-9
+        q, since = tracked.best.q, target
+    assert tracked.status is Tracking.HELD
+    assert forward(chain, q)[0, 3] == pytest.approx(0.0, abs=1e-9)
+    axis, far = tracked.leap_ahead()
+    assert axis == 0
+    assert far == pytest.approx(math.pi, abs=0.3)
+
+
+def test_beside_axis_1_the_arm_turns_with_the_hand(chain: Chain) -> None:
+    """The same drag 6 cm to the side goes through: the goal turns half round on the way."""
+    q = np.radians([0.0, -110.0, 100.0, -60.0, 0.0])
+    since = ToolTarget.at(chain, q)
+    height = float(since.position[2])
+    for x in np.arange(float(since.position[0]), -0.2, -0.005):
+        target = ToolTarget(np.array([x, 0.06, height]), since.pitch, 0.0)
+        tracked = track(chain, q, target, branch=FRONT_UP, since=since)
+        q, since = tracked.best.q, target
+        assert tracked.best.position_error < 1e-9
+    assert q[0] > math.radians(155.0)
+
+
+@pytest.mark.parametrize("reading", Reading)
+def test_a_fast_drag_ends_where_the_slow_one_does(
+    chain: Chain, reading: Reading, rng: np.random.Generator
+) -> None:
+    """A leap of the target of up to 0.3 m inside the workspace."""
+    agreed = 0
+    for _ in range(12):
+        q = READY + rng.normal(scale=0.1, size=5)
+        since = ToolTarget.at(chain, q)
+        way = rng.normal(size=3)
+        way *= rng.uniform(0.05, 0.3) / np.linalg.norm(way)
+        target = ToolTarget(since.position + way, since.pitch, since.roll)
+        fast = track(chain, q, target, branch=FRONT_UP, reading=reading, since=since)
+        slow, last = q, since
+        for share in np.linspace(0.025, 1.0, 40):
+            stop = since.towards(target, float(share))
+            slow = track(chain, slow, stop, branch=FRONT_UP, reading=reading, since=last).best.q
+            last = stop
+        agreed += np.allclose(fast.best.q, slow, atol=1e-6)
+    assert agreed >= 11
+
+
+def test_what_is_reached_is_reached_exactly(chain: Chain, rng: np.random.Generator) -> None:
+    for _ in range(50):
+        q = rng.uniform(chain.lower + 0.1, chain.upper - 0.1)
+        wished = ToolTarget.at(chain, q + rng.normal(scale=0.02, size=5))
+        tracked = track(chain, q, wished, branch=branch_of(chain, q))
+        if tracked.status is Tracking.OK:
+            assert np.allclose(forward(chain, tracked.best.q)[:3, 3], wished.position, atol=1e-12)
+            assert pitch_and_roll(chain, tracked.best.q) == pytest.approx(
+                (wished.pitch, wished.roll), abs=1e-9
+            )
+
+
+@pytest.mark.parametrize("reading", Reading)
+def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, reading: Reading) -> None:
+    for position in ([9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [-3.0, 0.0, -3.0]):
+        target = ToolTarget(np.array(position), 40.0, -40.0)
+        tracked = track(chain, READY, target, branch=FRONT_UP, reading=reading)
+        assert np.isfinite(tracked.best.q).all()
+        assert chain.within_limits(tracked.best.q)
+
+
+def test_following_costs_no_more_than_a_tick(chain: Chain) -> None:
+    """Even the drag across the whole workspace takes a bounded number of hops, and goes on."""
+    since = ToolTarget.at(chain, READY)
+    target = ToolTarget(np.array([-0.3, 0.3, 0.2]), since.pitch, since.roll)
+    q = READY
+    for _ in range(4):
+        q = track(chain, q, target, branch=FRONT_UP, since=since).best.q
+    assert np.allclose(forward(chain, q)[:3, 3], target.position, atol=1e-12)
