@@ -9,7 +9,7 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test check lint types contracts tests browser robot bench-drag lock clean
+.PHONY: run test check lint types contracts tests browser robot bench-drag bench-kinematics lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -39,6 +39,9 @@ robot: $(dev_ok)              ## rebuild robot_description/meshes from the numbe
 
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
 	$(bin)/python benchmarks/drag_to_frame.py $(ARGS)
+
+bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and beside C; installs those
+	$(bin)/python -m benchmarks.kinematics $(ARGS)
 
 lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
