@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 
+from app.cli.version import version
+from app.cli.workspace_options import add_workspace_options
 from app.errors import KatanaError
 from app.settings import Settings
 
@@ -22,6 +23,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli.serve import serve
 
             return serve(Settings(host=options.host, port=options.port))
+        if options.command == "workspace":
+            from app.cli.workspace import workspace
+
+            return workspace(options)
         from app.cli.lines import Kinematics, answer_lines
 
         kinematics = Kinematics(in_base_frame=options.frame == "base")
@@ -42,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="katana450", description="Teleoperate and simulate the Katana450 arm in a browser."
     )
-    parser.add_argument("--version", action="version", version=f"katana450 {_version()}")
+    parser.add_argument("--version", action="version", version=f"katana450 {version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     serve = commands.add_parser("serve", help="start the app and print its address")
@@ -67,6 +72,11 @@ def _parser() -> argparse.ArgumentParser:
             help="coordinates of T: the paper's frame {S} at the shoulder, or the base on the "
             "table (default: %(default)s)",
         )
+    add_workspace_options(
+        commands.add_parser(
+            "workspace", help="map where the tool can be, and how freely it can be turned there"
+        )
+    )
     return parser
 
 
@@ -78,10 +88,3 @@ def _port(text: str) -> int:
     if not 0 <= port <= 65535:
         raise argparse.ArgumentTypeError(f"a port is a number from 0 to 65535, not {text!r}")
     return port
-
-
-def _version() -> str:
-    try:
-        return version("katana450")
-    except PackageNotFoundError:
-        return "(not installed)"
