@@ -11,7 +11,6 @@ import numpy as np
 from app.geometry import so3
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
-from app.kinematics.inverse import in_limits_turn
 from benchmarks.kinematics_task import SOLVED_POSITION, SOLVED_ROTATION, FloatArray
 
 _SAME_ANGLES = 1e-6  # rad; answers nearer than this in every joint are one branch
@@ -35,6 +34,8 @@ class Quality:
 
 def quality(chain: Chain, T: FloatArray, answers: Sequence[FloatArray]) -> Quality:
     """Of `answers`, (k, 5) [rad] for each pose of `T` (N, 4, 4)."""
+    # Within one turn of it every angle inside the limits is nearest to their middle.
+    middle = 0.5 * (chain.lower + chain.upper)
     worst, branches, inside = 0.0, [], []
     for asked, candidates in zip(T, answers, strict=True):
         right: list[FloatArray] = []
@@ -44,7 +45,7 @@ def quality(chain: Chain, T: FloatArray, answers: Sequence[FloatArray]) -> Quali
             rotation = so3.angle(reached[:3, :3], asked[:3, :3])
             worst = max(worst, position)
             if position <= SOLVED_POSITION and rotation <= SOLVED_ROTATION:
-                turned = in_limits_turn(chain, q)
+                turned = q - math.tau * np.rint((q - middle) / math.tau)
                 if not any(_same(turned, other) for other in right):
                     right.append(turned)
         branches.append(len(right))
