@@ -166,7 +166,7 @@ def _check_layout(chain: Chain, T_base_shoulder: FloatArray) -> None:
         ("axis 5 must lie in a plane through axis 1", (normal @ x, normal @ points[4])),
     ):
         size = float(np.linalg.norm(off))
-        if size > tolerances.ARM_GEOMETRY:
+        if size > tolerances.MAPPED_ARM:
             raise RobotDescriptionError(
                 f"The workspace of this arm cannot be mapped: {what}, which is off by {size:.3g} "
                 "(m or rad)."

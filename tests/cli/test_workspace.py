@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -105,19 +106,20 @@ def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
     """A map fine enough to take minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()
     out = tmp_path / "map.npz"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "app", "workspace", "--voxel", "2", "--out", str(out)],
-        cwd=ROOT,
-        stderr=slave,
-        stdout=subprocess.PIPE,
-    )
-    os.close(slave)
-    seen = b""
-    while b"Mapping" not in seen:
-        seen += os.read(master, 1024)
-    process.send_signal(signal.SIGINT)
-    stdout, _ = process.communicate(timeout=20)
-    os.close(master)
+    command = [sys.executable, "-m", "app", "workspace", "--voxel", "2", "--out", str(out)]
+    with (
+        closing(os.fdopen(master, "rb", buffering=0)) as terminal,
+        subprocess.Popen(command, cwd=ROOT, stderr=slave, stdout=subprocess.PIPE) as process,
+    ):
+        os.close(slave)
+        try:
+            seen = b""
+            while b"Mapping" not in seen:
+                seen += terminal.read(1024)
+            process.send_signal(signal.SIGINT)
+            stdout, _ = process.communicate(timeout=20)
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert stdout == b""
     assert list(tmp_path.iterdir()) == []
