@@ -25,10 +25,6 @@ ARM_GEOMETRY: Final = 1e-9
 # axis is then known to fewer digits than a joint encoder resolves.
 ON_AXIS: Final = 1e-9
 
-# [1, m] How exactly an arm must stand upright and roll in a plane through axis 1 to have its
-# workspace mapped: what is off by this is nothing beside a voxel.
-MAPPED_ARM: Final = 1e-6
-
 # [m, or the unit of the plane's d] Misfit up to which a subproblem's answer counts as exact.
 SUBPROBLEM_EXACT: Final = 1e-9
 
@@ -53,3 +49,7 @@ TOUCHING: Final = 1e-6
 # them then goes to the solution that moves the arm less.
 SAME_POSITION: Final = 1e-9
 SAME_ROTATION: Final = 1e-9
+
+# [1, m] How exactly an arm must stand upright and roll in a plane through axis 1 to have its
+# workspace mapped: what is off by this is nothing beside a voxel.
+MAPPED_ARM: Final = 1e-6
