@@ -2,41 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-import numpy.typing as npt
 
-from app import tolerances
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
 
-BoolArray = npt.NDArray[np.bool]
 
+def at(chain: Chain, T: FloatArray) -> FloatArray:
+    """(N, 4, 5) joint angles [rad] of every posture for the poses `T` (N, 4, 4) = T_S_tool [m].
 
-class Postures(NamedTuple):
-    """Every posture for N poses.
-
-    q: (N, 4, 5) joint angles [rad], each in the turn that fits the limits. exact: (N, 4) whether
-    they put the tool there, or only near it.
+    Each angle is in the turn that fits the limits. Postures for a pose out of reach only come near.
     """
-
-    q: FloatArray
-    exact: BoolArray
-
-
-def at(chain: Chain, T: FloatArray) -> Postures:
-    """Those that put the tool at the poses `T` (N, 4, 4) = T_S_tool [m]."""
-    q = np.empty((len(T), 4, chain.n))
-    errors = np.empty((len(T), 4, 2))
-    for number, pose in enumerate(T):
-        for branch, found in enumerate(inverse(chain, pose)):
-            q[number, branch] = found.q
-            errors[number, branch] = found.position_error, found.rotation_error
-    limits = (tolerances.SAME_POSITION, tolerances.SAME_ROTATION)
-    return Postures(q, np.asarray((errors <= limits).all(axis=-1)))
+    q = [[solution.q for solution in inverse(chain, pose)] for pose in T]
+    return np.array(q).reshape(-1, 4, 5)
 
 
 def poses(chain: Chain, q: FloatArray) -> FloatArray:

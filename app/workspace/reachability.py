@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from app import tolerances
 from app.errors import InputError, RobotDescriptionError
@@ -23,7 +24,8 @@ from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.workspace import postures
 from app.workspace.grid import IntArray, VoxelGrid
-from app.workspace.postures import BoolArray
+
+BoolArray = npt.NDArray[np.bool]
 
 MOST_STEPS = 720
 """Half a degree, finer than the links of the arm are straight."""
@@ -75,12 +77,16 @@ class Reachability:
         counts = np.zeros(len(points), dtype=np.int64)
         T = tool_poses(p[near], self.pitches)
         T = T.reshape(-1, 4, 4)
-        found = postures.at(self.chain, T)
-        free = found.exact & self._free(T, found.q)
+        q = postures.at(self.chain, T)
+        pose, branch = np.nonzero(self._free(T, q))
+        # The postures for a pose out of reach only come near it.
+        exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
+        pose, branch = pose[exact], branch[exact]
+        rollable = self._rollable(q[pose, branch, 4])
         possible = np.zeros((len(T), self.rolls), dtype=np.bool)
-        for branch in range(free.shape[1]):
-            here = np.flatnonzero(free[:, branch])
-            possible[here] |= self._rollable(found.q[here, branch, 4])
+        for number in range(q.shape[1]):
+            here = branch == number
+            possible[pose[here]] |= rollable[here]
         counts[near] = possible.reshape(len(near), self.orientations).sum(axis=1)
         return counts
 
@@ -144,6 +150,13 @@ def tool_poses(p: FloatArray, pitches: int) -> FloatArray:
     T[..., :3, 3] = p[:, None, :]
     T[..., 3, 3] = 1.0
     return T
+
+
+def _same(Ta: FloatArray, Tb: FloatArray) -> BoolArray:
+    """(N,) whether poses (N, 4, 4) agree, entry by entry."""
+    gap = np.abs(Ta - Tb)
+    in_place = gap[:, :3, 3].max(axis=1) <= tolerances.SAME_POSITION
+    return np.asarray(in_place & (gap[:, :3, :3].max(axis=(1, 2)) <= tolerances.SAME_ROTATION))
 
 
 def _axis_points(chain: Chain) -> FloatArray:
