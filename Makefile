@@ -9,7 +9,8 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test check lint types contracts tests browser robot bench-drag bench-start pictures lock clean
+.PHONY: run test check lint types contracts tests browser robot bench-drag bench-kinematics \
+        bench-start pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -45,6 +46,9 @@ bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm
 
 pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
 	$(bin)/python -m docs.pictures
+
+bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and beside C; installs those
+	$(bin)/python -m benchmarks.kinematics $(ARGS)
 
 lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \

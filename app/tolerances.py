@@ -67,3 +67,7 @@ TOUCHING: Final = 1e-6
 # them then goes to the solution that moves the arm less.
 SAME_POSITION: Final = 1e-9
 SAME_ROTATION: Final = 1e-9
+
+# [1, m] How exactly an arm must stand upright and roll in a plane through axis 1 to have its
+# workspace mapped: what is off by this is nothing beside a voxel.
+MAPPED_ARM: Final = 1e-6

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from app.cli.version import version
+from app.cli.workspace_options import add_workspace_options
 from app.errors import KatanaError
 from app.settings import Settings
 from robot_description import URDF_PATH
@@ -25,6 +26,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             settings = Settings(host=options.host, port=options.port)
             return serve(settings, options.urdf, options.tool)
+        if options.command == "workspace":
+            from app.cli.workspace import workspace
+
+            return workspace(options)
         from app.cli.lines import Kinematics, answer_lines
 
         in_base_frame = options.frame == "base"
@@ -51,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="katana450", description="Teleoperate and simulate the Katana450 arm in a browser."
     )
-    parser.add_argument("--version", action="version", version=f"katana450 {_version()}")
+    parser.add_argument("--version", action="version", version=f"katana450 {version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     serve = commands.add_parser("serve", help="start the app and print its address")
@@ -94,6 +99,11 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
         )
+    add_workspace_options(
+        commands.add_parser(
+            "workspace", help="map where the tool can be, and how freely it can be turned there"
+        )
+    )
     return parser
 
 
@@ -105,10 +115,3 @@ def _port(text: str) -> int:
     if not 0 <= port <= 65535:
         raise argparse.ArgumentTypeError(f"a port is a number from 0 to 65535, not {text!r}")
     return port
-
-
-def _version() -> str:
-    try:
-        return version("katana450")
-    except PackageNotFoundError:
-        return "(not installed)"

@@ -1,0 +1,50 @@
+"""A progress bar on a terminal; silence anywhere else."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from time import monotonic
+from typing import TextIO, TypeVar
+
+T = TypeVar("T")
+
+_WIDTH = 30
+_PERIOD = 0.1  # s between two drawings
+
+
+def progress(
+    items: Iterable[T], total: int, label: str, stream: TextIO | None = None
+) -> Iterator[T]:
+    """Pass on `items`, of which there are `total`, and show how many have been passed."""
+    stream = stream or sys.stderr
+    if not stream.isatty():
+        yield from items
+        return
+    start = drawn = monotonic()
+    done = 0
+    try:
+        print(_line(label, 0, total, 0.0), end="", file=stream, flush=True)
+        for item in items:
+            done += 1
+            now = monotonic()
+            if now - drawn >= _PERIOD or done == total:
+                print(_line(label, done, total, now - start), end="", file=stream, flush=True)
+                drawn = now
+            yield item
+    finally:
+        print(file=stream, flush=True)
+
+
+def _line(label: str, done: int, total: int, elapsed: float) -> str:
+    share = done / total if total else 1.0
+    filled = int(share * _WIDTH)
+    left = f"{_clock(elapsed * (1.0 - share) / share)} left" if share else ""
+    bar = "#" * filled + "." * (_WIDTH - filled)
+    # Trailing blanks wipe what a longer line before left behind.
+    return f"\r{label} [{bar}] {share:4.0%}  {left:<14}"
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"

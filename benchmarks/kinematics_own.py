@@ -1,0 +1,109 @@
+"""The app's own inverse kinematics under the benchmark, and the same closed form in C."""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app import tolerances
+from app.geometry import screws
+from app.kinematics.arm import arm_of
+from app.kinematics.chain import Chain
+from app.kinematics.inverse import inverse
+from benchmarks.kinematics_task import FloatArray, Task
+
+FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
+FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")
+
+
+def chain_of(task: Task) -> Chain:
+    """The task's arm as the app sees it."""
+    points = np.cumsum(task.offsets, axis=0)
+    M = np.eye(4)
+    M[:3, 3] = points[-1]
+    S = [screws.revolute(axis, r) for axis, r in zip(task.axes, points[:-1], strict=True)]
+    return Chain(
+        M=M,
+        S=np.column_stack(S),
+        lower=task.lower,
+        upper=task.upper,
+        speed=np.ones(5),
+        names=tuple(f"joint{number + 1}" for number in range(5)),
+    )
+
+
+class Katana450:
+    """`inverse`: all branches, whether each is inside the limits, and its residual."""
+
+    package = "katana450"
+
+    def __init__(self, task: Task) -> None:
+        self._chain = chain_of(task)
+
+    def solve(self, T: FloatArray) -> Any:
+        return inverse(self._chain, T)
+
+    def joints(self, found: Any) -> FloatArray:
+        return np.array([solution.q for solution in found]).reshape(-1, 5)
+
+    def solve_batch(self, T: FloatArray) -> Any:
+        return [self.solve(each) for each in T]
+
+    def joints_batch(self, found: Any) -> list[FloatArray]:
+        return [self.joints(each) for each in found]
+
+
+class Floor:
+    """`kinematics_floor.c`, compiled here, on one thread."""
+
+    package = "cc"
+
+    def __init__(self, task: Task) -> None:
+        arm = arm_of(chain_of(task))
+        self._arm = [np.array((arm.l1, arm.l2, arm.l3)), task.lower.copy(), task.upper.copy()]
+        self._function = _compiled().inverse_batch
+        double, byte = (np.ctypeslib.ndpointer(dtype, flags="C") for dtype in (float, np.uint8))
+        self._function.argtypes = [
+            *(double, double, double, ctypes.c_double),
+            *(double, ctypes.c_int64, double, byte),
+        ]
+        self._function.restype = None
+
+    def solve_batch(self, T: FloatArray) -> Any:
+        q, inside = np.empty((len(T), 4, 5)), np.empty((len(T), 4), dtype=np.uint8)
+        self._function(*self._arm, tolerances.LIMIT_SLACK, T, len(T), q, inside)
+        return q
+
+    def joints_batch(self, found: Any) -> list[FloatArray]:
+        return list(found)
+
+
+def compiler() -> str:
+    """The C compiler of this machine; RuntimeError when there is none."""
+    found = shutil.which("cc")
+    if found is None:
+        raise RuntimeError("there is no C compiler `cc` on this machine")
+    return found
+
+
+def compiler_version() -> str:
+    done = subprocess.run([compiler(), "--version"], capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[0]
+
+
+def _compiled() -> ctypes.CDLL:
+    with tempfile.TemporaryDirectory() as folder:
+        suffix = ".dylib" if platform.system() == "Darwin" else ".so"
+        library = Path(folder) / f"floor{suffix}"
+        command = [compiler(), *FLOOR_FLAGS, "-o", str(library), str(FLOOR_SOURCE), "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise RuntimeError(f"{FLOOR_SOURCE.name} does not compile: {done.stderr.strip()}")
+        return ctypes.CDLL(str(library))

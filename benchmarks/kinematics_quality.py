@@ -1,0 +1,64 @@
+"""How right the answers of a solver are, measured alike for all by the app's forward kinematics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry import so3
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from benchmarks.kinematics_task import SOLVED_POSITION, SOLVED_ROTATION, FloatArray
+
+_SAME_ANGLES = 1e-6  # rad; answers nearer than this in every joint are one branch
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Over all poses.
+
+    solved: share of poses with an answer that is right. worst: greatest position error of any
+    answer given as exact [m]. branches, inside: distinct right answers a pose, and how many of them
+    lie inside the limits. usable: share of poses with one that does.
+    """
+
+    solved: float
+    worst: float
+    branches: float
+    inside: float
+    usable: float
+
+
+def quality(chain: Chain, T: FloatArray, answers: Sequence[FloatArray]) -> Quality:
+    """Of `answers`, (k, 5) [rad] for each pose of `T` (N, 4, 4)."""
+    # Within one turn of it every angle inside the limits is nearest to their middle.
+    middle = 0.5 * (chain.lower + chain.upper)
+    worst, branches, inside = 0.0, [], []
+    for asked, candidates in zip(T, answers, strict=True):
+        right: list[FloatArray] = []
+        for q in candidates:
+            reached = forward(chain, q)
+            position = math.dist(reached[:3, 3], asked[:3, 3])
+            rotation = so3.angle(reached[:3, :3], asked[:3, :3])
+            worst = max(worst, position)
+            if position <= SOLVED_POSITION and rotation <= SOLVED_ROTATION:
+                turned = q - math.tau * np.rint((q - middle) / math.tau)
+                if not any(_same(turned, other) for other in right):
+                    right.append(turned)
+        branches.append(len(right))
+        inside.append(sum(chain.within_limits(q) for q in right))
+    return Quality(
+        solved=float(np.mean(np.array(branches) > 0)),
+        worst=worst,
+        branches=float(np.mean(branches)),
+        inside=float(np.mean(inside)),
+        usable=float(np.mean(np.array(inside) > 0)),
+    )
+
+
+def _same(a: FloatArray, b: FloatArray) -> bool:
+    gap = np.abs(a - b) % math.tau
+    return bool(np.minimum(gap, math.tau - gap).max() < _SAME_ANGLES)

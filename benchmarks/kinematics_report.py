@@ -1,0 +1,213 @@
+"""The benchmark's figures as tables for people and as a record for programs."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.kinematics_quality import Quality
+from benchmarks.kinematics_task import FloatArray
+
+BEGIN = "<!-- kinematics: written by `make bench-kinematics ARGS=--docs` -->"
+END = "<!-- kinematics: end -->"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where the figures were taken. load: 1-minute load average before and after."""
+
+    processor: str
+    cores: int
+    python: str
+    numpy: str
+    load: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One solver: microseconds a pose and their ratio to the reference, by block; or why none."""
+
+    title: str
+    version: str = ""
+    microseconds: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
+    ratios: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
+    quality: Quality | None = None
+    failed: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Everything that one run found."""
+
+    poses: int
+    blocks: int
+    seed: int
+    machine: Machine
+    one_by_one: list[Row]
+    batch: list[Row]
+
+
+Cells = list[str]
+_TIMES = ("µs, median", "µs, least")
+
+
+def _single_cells(row: Row) -> Cells:
+    found = _found(row)
+    return [
+        *_time_cells(row),
+        _ratio(row),
+        _share(found.solved),
+        f"{1e3 * found.worst:.1e}",
+        f"{found.branches:.2f}",
+        f"{found.inside:.2f}",
+        _share(found.usable),
+    ]
+
+
+def _batch_cells(row: Row) -> Cells:
+    found = _found(row)
+    return [*_time_cells(row), _ratio(row), _share(found.solved), f"{1e3 * found.worst:.1e}"]
+
+
+def _time_cells(row: Row) -> Cells:
+    return [f"{value:.3g}" for value in (np.median(row.microseconds), row.microseconds.min())]
+
+
+def _ratio(row: Row) -> str:
+    middle = np.median(row.ratios)
+    return "–" if np.isnan(middle) else f"{middle:.3g}"
+
+
+def _found(row: Row) -> Quality:
+    assert row.quality is not None
+    return row.quality
+
+
+def _share(value: float) -> str:
+    # Rounded down: 100 % is said only of all.
+    return "100 %" if value == 1.0 else f"{np.floor(1e4 * value) / 1e2:.2f} %"
+
+
+SINGLE_HEAD = (
+    *("solver", "version", *_TIMES, "× katana450", "solved", "worst, mm", "branches"),
+    *("inside limits", "usable"),
+)
+BATCH_HEAD = ("solver", "version", *_TIMES, "× C", "solved", "worst, mm")
+
+
+def _table(
+    head: Sequence[str], rows: Sequence[Row], cells: Callable[[Row], Cells]
+) -> Iterator[str]:
+    yield f"| {' | '.join(head)} |"
+    yield "|---|---" + "|--:" * (len(head) - 2) + "|"
+    for row in rows:
+        if row.failed:
+            yield f"| {row.title} | {row.failed.replace('|', '/')} " + "| " * (len(head) - 2) + "|"
+        else:
+            yield f"| {' | '.join([row.title, row.version, *cells(row)])} |"
+
+
+def markdown(tables: Tables) -> str:
+    """Both tables, with what they were measured on."""
+    machine = tables.machine
+    before, after = machine.load
+    conditions = (
+        f"{tables.poses} poses of seed {tables.seed} in {tables.blocks} blocks; "
+        f"{machine.processor}, {machine.cores} cores, {platform.system()}, Python "
+        f"{machine.python}, numpy {machine.numpy}; load average {before:.1f} before and "
+        f"{after:.1f} after, the benchmark's own process in it."
+    )
+    return "\n".join(
+        [
+            conditions,
+            "",
+            "One pose a call:",
+            "",
+            *_table(SINGLE_HEAD, tables.one_by_one, _single_cells),
+            "",
+            f"All {tables.poses} poses in one call, µs a pose:",
+            "",
+            *_table(BATCH_HEAD, tables.batch, _batch_cells),
+        ]
+    )
+
+
+def text(tables: Tables) -> str:
+    """The same with aligned columns, for a terminal."""
+    lines = []
+    block: list[list[str]] = []
+    for line in [*markdown(tables).splitlines(), ""]:
+        if line.startswith("|---"):
+            continue
+        if line.startswith("|"):
+            block.append([cell.strip().replace("`", "") for cell in line.strip("|").split("|")])
+            continue
+        lines += _aligned(block)
+        block = []
+        lines.append(line)
+    return "\n".join(lines)
+
+
+def _aligned(block: list[list[str]]) -> list[str]:
+    # A reason may be long; it takes the place of the figures and sets no width.
+    full = [cells for cells in block if cells[-1]]
+    widths = [max(map(len, column)) for column in zip(*full, strict=True)]
+    return [
+        "  ".join(
+            cell.ljust(width) if number < 2 else cell.rjust(width)
+            for number, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        ).rstrip()
+        for cells in block
+    ]
+
+
+def record(tables: Tables) -> dict[str, Any]:
+    """All figures and every single time as plain JSON values."""
+
+    def plain(row: Row) -> dict[str, Any]:
+        if row.failed:
+            return {"solver": row.title, "failed": row.failed}
+        return {
+            "solver": row.title,
+            "version": row.version,
+            "microseconds": row.microseconds.tolist(),
+            "median_microseconds": float(np.median(row.microseconds)),
+            "least_microseconds": float(row.microseconds.min()),
+            "median_ratio": float(np.median(row.ratios)),
+            **dataclasses.asdict(_found(row)),
+        }
+
+    return {
+        "poses": tables.poses,
+        "blocks": tables.blocks,
+        "seed": tables.seed,
+        "machine": dataclasses.asdict(tables.machine),
+        "one_by_one": [plain(row) for row in tables.one_by_one],
+        "batch": [plain(row) for row in tables.batch],
+    }
+
+
+def write_into(path: Path, tables: Tables) -> None:
+    """Put the tables between the marks in a document; ValueError when it has none."""
+    document = path.read_text(encoding="utf-8")
+    if document.count(BEGIN) != 1 or document.count(END) != 1:
+        raise ValueError(f"{path} must hold the lines {BEGIN} and {END} once each")
+    head, rest = document.split(BEGIN)
+    _, tail = rest.split(END)
+    path.write_text(f"{head}{BEGIN}\n{markdown(tables)}\n{END}{tail}", encoding="utf-8")
+
+
+def processor() -> str:
+    """The processor's name as the system gives it."""
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()

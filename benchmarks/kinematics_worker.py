@@ -1,0 +1,148 @@
+"""One solver of the benchmark in a process of its own, at the other end of a pipe.
+
+A line in: `{"solve": [first, last]}` or `{"batch": true}`; a line out: what it took. In the end
+`{"save": path}` writes the answers. Each line is JSON. What a library prints goes to stderr.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import sys
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from benchmarks.kinematics_task import FloatArray, Task
+
+# One block is solved again until this much time has gone by, and the quickest pass counts.
+LEAST_TIME = 0.02  # s
+
+
+def _own(name: str) -> Callable[[Task], Any]:
+    # The app is imported only where it is there.
+    from benchmarks import kinematics_own
+
+    solver: Callable[[Task], Any] = getattr(kinematics_own, name)
+    return solver
+
+
+def _peer(name: str, **options: Any) -> Callable[[Task], Any]:
+    from benchmarks import kinematics_peers
+
+    return partial(getattr(kinematics_peers, name), **options)
+
+
+SOLVERS: dict[str, Callable[[], Callable[[Task], Any]]] = {
+    "katana450": lambda: _own("Katana450"),
+    "floor": lambda: _own("Floor"),
+    "eaik": lambda: _peer("Eaik"),
+    "eaik-threads": lambda: _peer("Eaik", workers=os.cpu_count() or 1),
+    "roboticstoolbox": lambda: _peer("RoboticsToolbox", limits=True),
+    "roboticstoolbox-free": lambda: _peer("RoboticsToolbox", limits=False),
+    "pinocchio": lambda: _peer("Pinocchio"),
+    "mink": lambda: _peer("Mink", limits=True),
+    "mink-free": lambda: _peer("Mink", limits=False),
+    "ikpy": lambda: _peer("Ikpy"),
+}
+
+
+class Bench:
+    """A solver, its poses, and its answers so far."""
+
+    def __init__(self, solver: Any, task: Task) -> None:
+        self._solver = solver
+        # Each pose as the contiguous array a caller would have.
+        self._poses = [np.ascontiguousarray(T) for T in task.T]
+        self._batch = np.ascontiguousarray(task.T)
+        self._answers: list[FloatArray] = [np.empty((0, 5))] * len(self._poses)
+
+    def solve(self, first: int, last: int) -> float:
+        """Seconds for one pass over the poses from `first` to before `last`."""
+        solve, poses = self._solver.solve, self._poses[first:last]
+        quickest, found = _quickest(lambda: [solve(T) for T in poses])
+        self._answers[first:last] = [self._solver.joints(each) for each in found]
+        return quickest
+
+    def solve_batch(self) -> float:
+        """Seconds for all poses in one call."""
+        quickest, found = _quickest(lambda: self._solver.solve_batch(self._batch))
+        self._answers = self._solver.joints_batch(found)
+        return quickest
+
+    def save(self, path: Path) -> None:
+        """Every answer as one array q (K, 5), and how many belong to each pose."""
+        counts = np.array([len(q) for q in self._answers])
+        np.savez(path, q=np.concatenate(self._answers), counts=counts)
+
+
+def _quickest(run: Callable[[], Any]) -> tuple[float, Any]:
+    """The least seconds of one run, of as many as fit in a little while, and its first result."""
+    gc.collect()
+    gc.disable()
+    try:
+        start = perf_counter()
+        result = run()
+        quickest = spent = perf_counter() - start
+        while spent < LEAST_TIME:
+            start = perf_counter()
+            run()
+            once = perf_counter() - start
+            quickest, spent = min(quickest, once), spent + once
+    finally:
+        gc.enable()
+    return quickest, result
+
+
+def _version(package: str) -> str:
+    if package == "cc":
+        from benchmarks.kinematics_own import compiler_version
+
+        return compiler_version()
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "this tree"
+
+
+def main(name: str, task_file: str) -> int:
+    """Answer requests until stdin ends."""
+    # The pipe is for answers alone: libraries that print must not break a line of it.
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+
+    def say(answer: dict[str, Any]) -> None:
+        print(json.dumps(answer), file=answers, flush=True)
+
+    task = Task.load(Path(task_file))
+    try:
+        solver = SOLVERS[name]()(task)
+        bench = Bench(solver, task)
+    except Exception as error:
+        say({"failed": f"{type(error).__name__}: {error}"})
+        return 1
+    say({"version": _version(solver.package), "numpy": np.__version__})
+    for line in sys.stdin:
+        request = json.loads(line)
+        try:
+            if "save" in request:
+                bench.save(Path(request["save"]))
+                say({})
+            elif "batch" in request:
+                say({"seconds": bench.solve_batch()})
+            else:
+                say({"seconds": bench.solve(*request["solve"])})
+        except Exception as error:
+            say({"failed": f"{type(error).__name__}: {error}"})
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

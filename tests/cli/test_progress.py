@@ -1,0 +1,47 @@
+"""The bar is drawn on a terminal and nowhere else."""
+
+from __future__ import annotations
+
+import io
+import time
+
+import pytest
+
+from app.cli.progress import progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_items_pass_and_a_terminal_sees_how_many() -> None:
+    terminal = Terminal()
+    assert list(progress(range(4), 4, "Work", terminal)) == [0, 1, 2, 3]
+    text = terminal.getvalue()
+    assert "\rWork [" in text
+    assert "   0%" in text
+    assert "#" * 30 + "] 100%" in text
+    assert text.endswith("\n")
+
+
+def test_what_is_left_is_told() -> None:
+    terminal = Terminal()
+    for _ in progress(range(4), 4, "Work", terminal):
+        time.sleep(0.11)
+    assert " s left" in terminal.getvalue()
+
+
+def test_anything_else_sees_nothing() -> None:
+    stream = io.StringIO()
+    assert list(progress(range(4), 4, "Work", stream)) == [0, 1, 2, 3]
+    assert stream.getvalue() == ""
+
+
+def test_the_line_ends_when_the_work_breaks_off() -> None:
+    terminal = Terminal()
+    working = progress(range(4), 4, "Work", terminal)
+    next(working)
+    with pytest.raises(KeyboardInterrupt):
+        working.throw(KeyboardInterrupt())  # type: ignore[attr-defined]
+    assert terminal.getvalue().endswith("\n")

@@ -1,0 +1,125 @@
+"""``katana450 workspace`` as a person runs it: a process, files, an interrupt."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli.main import main
+from app.exchange.reachability_file import load_map
+
+ROOT = Path(__file__).resolve().parents[2]
+COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4", "--samples", "30")
+
+
+def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, ply = tmp_path / "map.npz", tmp_path / "map.ply"
+    assert (
+        main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out), "--ply", str(ply)]) == 0
+    )
+    said = capsys.readouterr()
+    points, share = load_map(out)
+    assert f"The tool grasp reaches {len(points)} voxels of 170 mm" in said.out
+    assert f"{share.max():.1%}" in said.out
+    assert f"Written: {ply}" in said.out
+    assert said.err == ""
+    assert sorted(tmp_path.iterdir()) == [out, ply]
+    with np.load(out) as arrays:
+        assert arrays["tool"].item() == "grasp"
+        assert arrays["voxel"].item() == pytest.approx(0.17)
+
+
+def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
+    one, two = tmp_path / "one.npz", tmp_path / "two.npz"
+    for path in (one, two):
+        assert main(["workspace", *COARSE, "--seed", "5", "--out", str(path)]) == 0
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
+    out = tmp_path / "map.npz"
+    assert main(["workspace", *COARSE, "--table", "300", "--out", str(out)]) == 0
+    points, _ = load_map(out)
+    assert points[:, 2].min() >= 0.3
+    with np.load(out) as arrays:
+        assert arrays["cloud"][:, 2].min() >= 0.3
+        assert arrays["table"].item() == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--tool", "hammer"], "tcp, grasp, flange"),
+        (["--table", "2000"], "comes up to"),
+        (["--table", "nan"], "leaves nothing"),
+        (["--voxel", "0"], "makes no map"),
+        (["--voxel", "-5"], "makes no map"),
+        (["--voxel", "inf"], "makes no map"),
+        (["--pitches", "0"], "number of pitches is 0"),
+        (["--rolls", "100000"], "give 1 to 720"),
+        (["--samples", "-1"], "number of samples is -1"),
+        (["--seed", "-1"], "seed is -1"),
+        (["--out", "map.txt"], "must end in .npz"),
+        (["--ply", "map.npz"], "must end in .ply"),
+        (["--out", "/nowhere/at/all/map.npz"], "no directory"),
+        (["--scheduler", "127.0.0.1:1"], "No Dask scheduler answers at '127.0.0.1:1'"),
+        (["--scheduler", "nonsense://x"], "unknown address scheme"),
+        (["--scheduler", ""], "missing port"),
+    ],
+)
+def test_what_cannot_be_done_is_told_before_the_work(
+    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    start = time.monotonic()
+    assert main(["workspace", *options]) == 1
+    heard = capsys.readouterr()
+    assert heard.err.startswith("katana450: ")
+    assert said in heard.err
+    assert heard.out == ""
+    assert time.monotonic() - start < 5.0
+
+
+def test_a_value_that_is_no_number_is_not_understood(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        main(["workspace", "--voxel", "big"])
+    assert exit_.value.code == 2
+    assert "--voxel" in capsys.readouterr().err
+
+
+def test_without_distributed_the_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main(["workspace", "--scheduler", "tcp://127.0.0.1:1"]) == 1
+    assert "pip install 'katana450[dask]'" in capsys.readouterr().err
+
+
+def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
+    """A map fine enough to take minutes, on a terminal of its own, so that the bar is drawn."""
+    master, slave = os.openpty()
+    out = tmp_path / "map.npz"
+    command = [sys.executable, "-m", "app", "workspace", "--voxel", "2", "--out", str(out)]
+    with (
+        closing(os.fdopen(master, "rb", buffering=0)) as terminal,
+        subprocess.Popen(command, cwd=ROOT, stderr=slave, stdout=subprocess.PIPE) as process,
+    ):
+        os.close(slave)
+        try:
+            seen = b""
+            while b"Mapping" not in seen:
+                seen += terminal.read(1024)
+            process.send_signal(signal.SIGINT)
+            stdout, _ = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    assert stdout == b""
+    assert list(tmp_path.iterdir()) == []

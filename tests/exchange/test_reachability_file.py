@@ -1,0 +1,143 @@
+"""What is written is read again, by this program and by others; anything else is refused."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from app.errors import InputError
+from app.exchange.reachability_file import FORMAT, load_map, write_npz, write_ply
+from app.robot.model import RobotModel
+from app.workspace.colors import share_colors
+from app.workspace.map import ReachabilityMap, Survey
+from app.workspace.reachability import Reachability
+
+POINTS = np.array([[0.11, -0.2, 0.3], [0.13, -0.2, 0.3], [0.15, 0.2, 0.5]])
+SHARE = np.array([0.25, 1.0, 1 / 3])
+FOUND = ReachabilityMap(POINTS, SHARE, cloud=np.array([[0.3, 0.0, 0.2]]))
+
+
+@pytest.fixture(scope="module")
+def survey(model: RobotModel) -> Survey:
+    reachability = Reachability(model.arm.chain, model.T_base_shoulder, 0.05, 36, 24)
+    return Survey(reachability, voxel=0.02, samples=1, seed=3)
+
+
+@pytest.fixture
+def npz(survey: Survey, tmp_path: Path) -> Path:
+    path = tmp_path / "map.npz"
+    with path.open("wb") as file:
+        write_npz(file, survey, FOUND, "tcp")
+    return path
+
+
+def test_a_map_comes_back_to_the_bit(npz: Path) -> None:
+    points, share = load_map(npz)
+    assert np.array_equal(points, POINTS)
+    assert np.array_equal(share, SHARE)
+    assert not points.flags.writeable
+    assert not share.flags.writeable
+
+
+def test_the_file_holds_what_its_keys_promise(npz: Path) -> None:
+    with np.load(npz, allow_pickle=False) as arrays:
+        assert np.array_equal(arrays["cloud"], FOUND.cloud)
+        rest = {key: arrays[key].item() for key in arrays if arrays[key].ndim == 0}
+    assert rest == {
+        "format": FORMAT,
+        "voxel": 0.02,
+        "table": 0.05,
+        "pitches": 36,
+        "rolls": 24,
+        "tool": "tcp",
+        "seed": 3,
+    }
+
+
+def test_the_same_map_is_the_same_bytes(npz: Path, survey: Survey) -> None:
+    again = io.BytesIO()
+    write_npz(again, survey, FOUND, "tcp")
+    assert again.getvalue() == npz.read_bytes()
+
+
+def test_an_empty_map_is_a_map(survey: Survey, tmp_path: Path) -> None:
+    path = tmp_path / "empty.npz"
+    empty = ReachabilityMap(np.empty((0, 3)), np.empty(0), np.empty((0, 3)))
+    with path.open("wb") as file:
+        write_npz(file, survey, empty, "tcp")
+    points, share = load_map(path)
+    assert points.shape == (0, 3)
+    assert share.shape == (0,)
+    ply = io.BytesIO()
+    write_ply(ply, empty)
+    assert b"element vertex 0\n" in ply.getvalue()
+
+
+def test_another_program_reads_the_point_cloud() -> None:
+    ply = io.BytesIO()
+    write_ply(ply, FOUND)
+    ply.seek(0)
+    cloud: Any = trimesh.load(ply, file_type="ply")
+    assert np.allclose(cloud.vertices, POINTS, atol=1e-7)
+    assert np.array_equal(cloud.colors[:, :3], share_colors(SHARE))
+
+
+GOOD = {"format": np.array(FORMAT), "points": POINTS, "share": SHARE}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"format": np.array("something else")}, "something else"),
+        ({"points": POINTS[:, :2]}, "'points'"),
+        ({"points": POINTS[:2]}, "'share'"),
+        ({"points": POINTS * np.nan}, "'points'"),
+        ({"points": np.array(0.0)}, "'points'"),
+        ({"points": np.array([["a", "b", "c"]])}, "'points'"),
+        ({"points": np.array([None, {}], dtype=object)}, "broken"),
+        ({"share": SHARE[:, None]}, "'share'"),
+        ({"share": SHARE - 0.25}, "above 0"),
+        ({"share": SHARE + 0.1}, "up to 1"),
+    ],
+)
+def test_a_file_that_breaks_the_promise_is_refused(
+    tmp_path: Path, change: dict[str, np.ndarray[tuple[int, ...], np.dtype[np.generic]]], said: str
+) -> None:
+    path = tmp_path / "map.npz"
+    np.savez(path, allow_pickle=True, **(GOOD | change))
+    with pytest.raises(InputError, match=said) as refused:
+        load_map(path)
+    assert "map.npz" in str(refused.value)
+
+
+@pytest.mark.parametrize("key", ["format", "points", "share"])
+def test_a_file_without_a_key_is_refused(tmp_path: Path, key: str) -> None:
+    path = tmp_path / "map.npz"
+    np.savez(path, allow_pickle=True, **{name: GOOD[name] for name in GOOD if name != key})
+    with pytest.raises(InputError, match=key):
+        load_map(path)
+
+
+def test_what_is_no_npz_is_refused(npz: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        load_map(tmp_path / "nothing.npz")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_map(tmp_path)
+    other = tmp_path / "other.npz"
+    whole = npz.read_bytes()
+    array = io.BytesIO()
+    np.save(array, POINTS)
+    for content in (b"", b"nonsense", whole[: len(whole) // 2], array.getvalue()):
+        other.write_bytes(content)
+        with pytest.raises(InputError, match=r"other\.npz is no reachability map"):
+            load_map(other)
+    damaged = bytearray(whole)
+    damaged[whole.index(b"points.npy") + 50] ^= 0xFF
+    other.write_bytes(bytes(damaged))
+    with pytest.raises(InputError, match=r"other\.npz"):
+        load_map(other)

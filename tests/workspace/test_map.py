@@ -1,0 +1,70 @@
+"""A whole map: the same from the same seed, whatever the chunks and their order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.workspace import map as map_module
+from app.workspace.colors import share_colors
+from app.workspace.map import Survey
+from app.workspace.reachability import Reachability
+
+
+@pytest.fixture(scope="module")
+def survey(model: RobotModel) -> Survey:
+    reachability = Reachability(model.arm.chain, model.T_base_shoulder, 0.0, 3, 4)
+    return Survey(reachability, voxel=0.16, samples=60, seed=9)
+
+
+def test_a_map_holds_what_its_voxels_count(survey: Survey) -> None:
+    found = survey.map(survey.count(chunk) for chunk in survey.chunks())
+    assert len(found.points) > 50
+    assert np.array_equal(found.share * 12, survey.reachability.count(found.points))
+    assert (found.share > 0.0).all()
+    assert (found.share <= 1.0).all()
+    assert (found.points[:, 2] >= 0.0).all()
+
+
+def test_chunks_do_not_change_the_map(survey: Survey, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = survey.map(survey.count(chunk) for chunk in survey.chunks())
+    monkeypatch.setattr(map_module, "POSES", 300)
+    chunks = survey.chunks()
+    assert len(chunks) > 3
+    counts = {number: survey.count(chunks[number]) for number in reversed(range(len(chunks)))}
+    pieces = survey.map(counts[number] for number in range(len(chunks)))
+    assert np.array_equal(whole.points, pieces.points)
+    assert np.array_equal(whole.share, pieces.share)
+
+
+def test_the_cloud_is_the_tool_at_random_joint_angles(survey: Survey, model: RobotModel) -> None:
+    nothing = [np.zeros(len(survey.grid), dtype=np.int64)]
+    found = survey.map(nothing)
+    assert found.points.shape == (0, 3)
+    chain = model.arm.chain
+    q = np.random.default_rng(9).uniform(chain.lower, chain.upper, (60, 5))
+    points = np.array([(model.T_base_shoulder @ forward(chain, each))[:3, 3] for each in q])
+    assert 10 < len(found.cloud) < 60
+    for point in found.cloud:
+        assert np.abs(points - point).max(axis=1).min() < 1e-15
+    assert (found.cloud[:, 2] >= 0.0).all()
+    other = Survey(survey.reachability, voxel=0.16, samples=60, seed=10).map(nothing)
+    assert not np.array_equal(other.cloud[:5], found.cloud[:5])
+
+
+@pytest.mark.parametrize(("samples", "seed"), [(-1, 0), (0, -1)])
+def test_negative_numbers_are_refused_before_the_work(
+    survey: Survey, samples: int, seed: int
+) -> None:
+    with pytest.raises(InputError, match="is -1; give 0 or more"):
+        Survey(survey.reachability, 0.1, samples, seed)
+
+
+def test_colours_grow_lighter_with_the_share() -> None:
+    colors = share_colors(np.array([0.0, 0.1, 0.2, 0.3])).astype(int)
+    assert (np.diff(colors.sum(axis=1)) > 0).all()
+    assert np.array_equal(colors, share_colors(2.0 * np.array([0.0, 0.1, 0.2, 0.3])))
+    assert share_colors(np.empty(0)).shape == (0, 3)

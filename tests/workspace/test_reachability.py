@@ -1,0 +1,164 @@
+"""The count of orientations, against forward kinematics and against the projection."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from app.errors import InputError, RobotDescriptionError
+from app.geometry import screws, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward, joint_frames
+from app.kinematics.projection import project
+from app.robot.model import RobotModel
+from app.workspace.reachability import MOST_STEPS, Reachability, tool_poses
+
+
+def reachability(
+    model: RobotModel, *, tool: str = "tcp", table: float = 0.0, pitches: int = 8, rolls: int = 6
+) -> Reachability:
+    return Reachability(model.arm.chain_to(tool), model.T_base_shoulder, table, pitches, rolls)
+
+
+def postures_inside(chain: Chain, count: int, seed: int) -> FloatArray:
+    return np.random.default_rng(seed).uniform(chain.lower, chain.upper, (count, chain.n))
+
+
+def rotation_x(angle: float) -> FloatArray:
+    return so3.exp(np.array([angle, 0.0, 0.0]))
+
+
+def test_what_forward_kinematics_reaches_is_counted(model: RobotModel) -> None:
+    """Postures inside the limits with the tool level and unrolled: that one orientation counts."""
+    level = reachability(model, pitches=1, rolls=1, table=-1.0)
+    chain = level.chain
+    q = postures_inside(chain, 600, 4)
+    q[:, 3] = -q[:, 1] - q[:, 2]
+    q[:, 4] = 0.0
+    q = q[(q[:, 3] >= chain.lower[3]) & (q[:, 3] <= chain.upper[3])]
+    T = np.array([forward(chain, each) for each in q])
+    # Facing away from the point the tool points inward, which is pitch pi, not 0.
+    outward = (T[:, :2, 0] * T[:, :2, 3]).sum(axis=1) > 0.0
+    assert outward.sum() > 20
+    assert (level.count(level.in_base(T[outward, :3, 3])) == 1).all()
+
+
+@pytest.mark.parametrize("tool", ["tcp", "flange"])
+def test_the_count_is_that_of_poses_the_projection_leaves_alone(
+    model: RobotModel, tool: str
+) -> None:
+    """Both ways: nothing is counted that the arm cannot do, and nothing it can is left out."""
+    every = reachability(model, tool=tool, table=-1.0)
+    chain = every.chain
+    q = postures_inside(chain, 5, 7)
+    inside = np.array([forward(chain, each)[:3, 3] for each in q])
+    points = np.concatenate([inside, [[0.5, 0.3, 0.3], [-0.2, 0.01, 0.1], [0.9, 0.0, 0.0]]])
+    rolls = [rotation_x(k * math.tau / every.rolls) for k in range(every.rolls)]
+    for p, count in zip(points, every.count(every.in_base(points)), strict=True):
+        possible = 0
+        for T in tool_poses(p[None], every.pitches)[0]:
+            for roll in rolls:
+                asked = T.copy()
+                asked[:3, :3] = T[:3, :3] @ roll
+                nearest = project(chain, asked)
+                possible += nearest.position_error < 1e-8 and nearest.rotation_error < 1e-8
+        assert count == possible
+    assert every.count(every.in_base(inside)).max() > 0
+
+
+def test_a_point_on_axis_1_can_be_asked_for(model: RobotModel) -> None:
+    every = reachability(model)
+    above = np.array([[0.0, 0.0, 0.8], [1e-12, 0.0, 0.8]])
+    counts = every.count(above)
+    assert counts[0] > 0
+    assert counts[0] == counts[1]
+
+
+def test_what_lies_below_the_table_or_too_far_is_not_counted(model: RobotModel) -> None:
+    point = np.array([[0.3, 0.1, 0.3]])
+    assert reachability(model, table=0.29).count(point)[0] > 0
+    assert reachability(model, table=0.31).count(point)[0] == 0
+    assert reachability(model).count(np.array([[2.0, 0.0, 0.3], [0.0, 0.0, -1.0]])).tolist() == [
+        0,
+        0,
+    ]
+    assert reachability(model).count(np.empty((0, 3))).shape == (0,)
+
+
+def test_elbow_and_wrist_keep_off_the_table(model: RobotModel) -> None:
+    """Against each link moved from home: clear is what has both points on the table or above."""
+    chain = model.arm.chain
+    q = postures_inside(chain, 300, 11)
+    points = [screws.point_on(S) for S in chain.S.T]
+    T = np.array([forward(chain, each) for each in q])
+    frames = np.array([joint_frames(chain, each) for each in q])
+    heights = np.stack(
+        [
+            (frames[:, 1] @ [*points[2], 1.0])[:, 2],
+            (frames[:, 2] @ [*points[3], 1.0])[:, 2],
+        ]
+    )
+    shoulder = model.T_base_shoulder[2, 3]
+    for table in (0.1, 0.3, 0.4):
+        found = reachability(model, table=table).clear(T, q[:, None])[:, 0]
+        assert np.array_equal(found, (heights + shoulder >= table).all(axis=0))
+        assert 0 < found.sum() < len(q) or table == 0.1
+
+
+def test_a_higher_table_never_helps(model: RobotModel) -> None:
+    points = np.random.default_rng(3).uniform([-0.4, -0.4, 0.45], [0.4, 0.4, 0.7], (30, 3))
+    low = reachability(model, table=0.0).count(points)
+    high = reachability(model, table=0.4).count(points)
+    assert (high <= low).all()
+    assert (high < low).any()
+
+
+def test_rolls_are_those_that_axis_5_can_turn(model: RobotModel) -> None:
+    """From -164.5 to 171.5 degrees, with only the front shoulder inside the limits."""
+    whole_degrees = reachability(model, pitches=1, rolls=360)
+    p = forward(whole_degrees.chain, np.array([0.0, -0.8, 1.2, -0.4, 0.0]))[None, :3, 3]
+    assert whole_degrees.count(whole_degrees.in_base(p)).tolist() == [336]
+
+
+def test_every_limit_counts(model: RobotModel) -> None:
+    """Each joint's limits alone take orientations away, and wider ones give them back."""
+    chain = model.arm.chain
+    points = np.random.default_rng(5).uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 0.6], (25, 3))
+
+    def total(lower: FloatArray, upper: FloatArray) -> int:
+        limited = dataclasses.replace(chain, lower=lower, upper=upper)
+        every = Reachability(limited, model.T_base_shoulder, 0.0, 6, 6)
+        return int(every.count(points).sum())
+
+    whole = total(chain.lower, chain.upper)
+    for joint in range(5):
+        narrow_lower, narrow_upper = chain.lower.copy(), chain.upper.copy()
+        narrow_lower[joint] *= 0.5
+        narrow_upper[joint] *= 0.5
+        assert total(narrow_lower, narrow_upper) < whole
+
+
+@pytest.mark.parametrize("steps", [0, -1, MOST_STEPS + 1])
+def test_steps_that_are_none_are_refused(model: RobotModel, steps: int) -> None:
+    with pytest.raises(InputError, match="number of pitches"):
+        reachability(model, pitches=steps)
+    with pytest.raises(InputError, match="number of rolls"):
+        reachability(model, rolls=steps)
+
+
+def test_an_arm_that_does_not_stand_upright_is_refused(model: RobotModel) -> None:
+    leaning = np.array(model.T_base_shoulder)
+    leaning[:3, :3] = rotation_x(0.1)
+    with pytest.raises(RobotDescriptionError, match="base must stand upright"):
+        Reachability(model.arm.chain, leaning, 0.0, 4, 4)
+
+
+def test_a_tool_that_does_not_roll_about_its_x_axis_is_refused(model: RobotModel) -> None:
+    M = np.array(model.arm.chain.M)
+    M[:3, :3] = so3.exp(np.array([0.0, 0.2, 0.0]))
+    with pytest.raises(RobotDescriptionError, match="tool"):
+        Reachability(model.arm.chain.with_tool(M), model.T_base_shoulder, 0.0, 4, 4)
