@@ -16,6 +16,7 @@ from app import tolerances
 from app.geometry import screws
 from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
+from app.kinematics.batch import inverse_batch
 from app.kinematics.inverse import inverse
 from benchmarks.kinematics_task import FloatArray, Task
 
@@ -54,10 +55,10 @@ class Katana450:
         return np.array([solution.q for solution in found]).reshape(-1, 5)
 
     def solve_batch(self, T: FloatArray) -> Any:
-        return [self.solve(each) for each in T]
+        return inverse_batch(self._chain, T)
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
-        return [self.joints(each) for each in found]
+        return list(found.q)
 
 
 class Floor:

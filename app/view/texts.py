@@ -106,7 +106,7 @@ def badge(choice: Badge) -> tuple[str, str, str]:
         lost.append(f"{_short(1e3 * choice.position_error)} mm")
     if choice.rotation_error > ANGLE_WORTH_TELLING:
         lost.append(f"{_short(math.degrees(choice.rotation_error))}°")
-    way = f"{degrees(choice.distance, 0)} in {choice.time:.1f} s"
+    way = f"{degrees(choice.distance, 0)}, {choice.time:.1f} s"
     given_up = f"{', '.join(lost)} off" if lost else NOTHING_LOST
     return given_up, way, f"{choice.smallest_singular_value:.3f}"
 

@@ -289,6 +289,15 @@ class ViserPage:
         # viser holds changes back and forgets all but the newest of any control.
         self.page.wait_for_timeout(2 * THROTTLE_MILLISECONDS)
 
+    def chosen(self, label: str) -> str:
+        """What a list to choose from shows."""
+        return self._labelled(label).input_value()
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose from a list."""
+        self._labelled(label).click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
     def click_button(self, label: str) -> None:
         """Click the button with this text."""
         self.page.get_by_role("button", name=label, exact=True).click()

@@ -116,7 +116,7 @@ def test_a_badge_is_told_in_three_words(
     choice = Badge(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
-    assert badge(choice) == (said, "90° in 1.3 s", "0.151")
+    assert badge(choice) == (said, "90°, 1.3 s", "0.151")
     assert len(BRANCH_HEADINGS) == 1 + len(badge(choice))
 
 
