@@ -72,9 +72,9 @@ READING_HINTS: dict[Reading, str] = {
     Reading.POSITION: "the tool point goes where it is wished, with the nearest pitch it can have",
 }
 
-BRANCH_HEADINGS = ("branch", "tool", "way there", "singular")
+BRANCH_HEADINGS = ("branch", "off by", "way there", "singular")
 
-NOTHING_LOST = "as wished"
+NOTHING_LOST = "nothing"
 
 MOVING = "Moving"
 
@@ -107,8 +107,7 @@ def badge(choice: Badge) -> tuple[str, str, str]:
     if choice.rotation_error > ANGLE_WORTH_TELLING:
         lost.append(f"{_short(math.degrees(choice.rotation_error))}°")
     way = f"{degrees(choice.distance, 0)}, {choice.time:.1f} s"
-    given_up = f"{', '.join(lost)} off" if lost else NOTHING_LOST
-    return given_up, way, f"{choice.smallest_singular_value:.3f}"
+    return ", ".join(lost) or NOTHING_LOST, way, f"{choice.smallest_singular_value:.3f}"
 
 
 def _short(value: float) -> str:

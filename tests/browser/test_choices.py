@@ -54,7 +54,7 @@ def test_a_person_looks_at_the_branches_and_takes_one(
         assert [page.slider_value(f"Axis {i}") for i in range(1, 6)] == [
             round(math.degrees(angle), 6) for angle in READY
         ]
-        assert "as wished" in page.text_of("[data-branch=front-up]")
+        assert "nothing" in page.text_of("[data-branch=front-up]")
 
         page.page.get_by_role(
             "button", name="Take front-down", exact=True

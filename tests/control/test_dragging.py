@@ -10,6 +10,7 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.arm import Arm
+from app.control.choices import wish
 from app.control.session import Session
 from app.control.state import State, Status
 from app.geometry.arrays import FloatArray
@@ -22,13 +23,15 @@ A_TRIP = 25
 """Moves of the hand one after the other that go the same way, so that they get somewhere."""
 
 GRABS = (1, 5, 25)
-"""Moves of the hand between taking hold and letting go."""
+"""Moves of the hand between taking hold and letting go; in every fourth trip it turns the rings
+too."""
 
 ROUNDING = 1e-9
 
 NEAR_AXIS_1 = 0.05
 """[m] The joints go straight to the goal, so the tool goes there in a bow. Only this near axis 1,
-where axis 1 has to turn far, can the bow lead away from a target for a moment."""
+where axis 1 has to turn far, and where the rings turn the tool on the spot, can the bow lead away
+from a target for a moment."""
 
 BOW = 1e-3
 """[m] By how much in a tick, at most."""
@@ -67,24 +70,31 @@ def trips(arm: Arm, rng: np.random.Generator) -> Iterator[tuple[FloatArray, Floa
             x, y, _ = tool(arm, q)
             way = np.array([-x, -y, 0.05 * rng.normal()]) + rng.normal(scale=0.02, size=3)
         # Mostly slow, some as fast as a hand can.
-        length = rng.uniform(0.002, 0.02) if number % 10 else 0.06
+        length = rng.uniform(0.002, 0.02) if number % 20 else 0.06
         yield q, length * way / np.linalg.norm(way), GRABS[number % len(GRABS)]
 
 
 def test_ten_thousand_drags(arm: Arm, session: Session) -> None:
     rng = np.random.default_rng(450)
     seen: Counter[Status] = Counter()
-    for q, way, grab in trips(arm, rng):
+    for number, (q, way, grab) in enumerate(trips(arm, rng)):
+        turns = number % 4 == 3
         state = session.begin(q, 0.0, 0.0)
         branch = state.branch
         target = tool(arm, q)
         for drag in range(A_TRIP):
-            target = np.clip(target + way, -1.4, 1.4)
-            moved = session.step(state, [cmd.MoveTool(target)], state.t + TICK)
+            if turns and drag % 3 == 2:
+                wished = wish(arm, state)
+                turn = rng.normal(scale=0.05, size=2)
+                command: cmd.Command = cmd.TurnTool(wished.pitch + turn[0], wished.roll + turn[1])
+            else:
+                target = np.clip(target + way, -1.4, 1.4)
+                command = cmd.MoveTool(target)
+            moved = session.step(state, [command], state.t + TICK)
             waited = session.step(moved, [], moved.t + TICK)
             check_goal(arm, state, moved, target)
-            check_motion(arm, state, moved, target)
-            check_motion(arm, moved, waited, target)
+            check_motion(arm, state, moved, target, turns)
+            check_motion(arm, moved, waited, target, turns)
             left = max(seconds_left(arm, moved) - TICK, 0.0)
             assert seconds_left(arm, waited) <= left + ROUNDING
             assert waited.branch == branch
@@ -105,7 +115,7 @@ def check_goal(arm: Arm, before: State, state: State, target: FloatArray) -> Non
     assert on_branch(state.goal, now, state.branch, ROUNDING)
 
 
-def check_motion(arm: Arm, before: State, state: State, target: FloatArray) -> None:
+def check_motion(arm: Arm, before: State, state: State, target: FloatArray, turns: bool) -> None:
     """The arm keeps to its speeds, limits and branch, and goes to a target it can reach."""
     chain = arm.chain
     assert (np.abs(state.setpoint - before.setpoint) <= chain.speed * TICK * (1 + ROUNDING)).all()
@@ -114,5 +124,5 @@ def check_motion(arm: Arm, before: State, state: State, target: FloatArray) -> N
     assert on_branch(state.setpoint, now, state.branch, OVER_AXIS_1)
     if state.status is Status.OK:
         near = min(math.hypot(now[0], now[1]), math.hypot(target[0], target[1])) < NEAR_AXIS_1
-        bow = BOW if near else ROUNDING
+        bow = BOW if near or turns else ROUNDING
         assert math.dist(now, target) <= math.dist(was, target) + bow

@@ -196,8 +196,8 @@ def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, reading: R
         assert chain.within_limits(tracked.best.q)
 
 
-def test_following_costs_no_more_than_a_tick(chain: Chain) -> None:
-    """Even the drag across the whole workspace takes a bounded number of hops, and goes on."""
+def test_a_drag_too_long_for_one_move_goes_on_with_the_next(chain: Chain) -> None:
+    """Half round the base at once: a tick has time for so many hops, the next has more."""
     since = ToolTarget.at(chain, READY)
     target = ToolTarget(np.array([-0.3, 0.3, 0.2]), since.pitch, since.roll)
     q = READY

@@ -104,10 +104,10 @@ def test_the_nearest_limit_is_told_with_its_axis() -> None:
 @pytest.mark.parametrize(
     ("position_error", "rotation_error", "said"),
     [
-        (0.0, 0.0, "as wished"),
-        (0.0123, 0.0, "12 mm off"),
-        (0.0, math.radians(4.5), "4.5° off"),
-        (0.0123, math.radians(4.5), "12 mm, 4.5° off"),
+        (0.0, 0.0, "nothing"),
+        (0.0123, 0.0, "12 mm"),
+        (0.0, math.radians(4.5), "4.5°"),
+        (0.0123, math.radians(4.5), "12 mm, 4.5°"),
     ],
 )
 def test_a_badge_is_told_in_three_words(
