@@ -15,8 +15,8 @@ import numpy as np
 from app import tolerances
 from app.geometry import screws
 from app.kinematics.arm import arm_of
-from app.kinematics.chain import Chain
 from app.kinematics.batch import inverse_batch
+from app.kinematics.chain import Chain
 from app.kinematics.inverse import inverse
 from benchmarks.kinematics_task import FloatArray, Task
 
