@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from app import tolerances
 from app.control.state import Finding, Reason
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
@@ -23,7 +24,8 @@ def of_joints(chain: Chain, q: FloatArray) -> tuple[Finding, ...]:
     """What clamping ``q`` (n,) [rad] to the limits takes away."""
     findings = []
     for axis, (angle, lower, upper) in enumerate(zip(q, chain.lower, chain.upper, strict=True)):
-        if angle < lower or angle > upper:
+        # A slider at its end is there through degrees and back, and asks for nothing beyond.
+        if angle < lower - tolerances.LIMIT_SLACK or angle > upper + tolerances.LIMIT_SLACK:
             limit = float(lower if angle < lower else upper)
             findings.append(Finding(Reason.AXIS_LIMIT, limit, axis))
     return tuple(findings)

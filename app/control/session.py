@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app import tolerances
 from app.control import commands as cmd
 from app.control.arm import Arm
 from app.control.choices import choice, wish, wish_on
@@ -188,5 +189,6 @@ class Session:
         limits = self.arm.gripper
         goal = min(max(angle, limits.lower), limits.upper)
         others = tuple(f for f in state.findings if f.reason is not Reason.GRIPPER_LIMIT)
-        held = (Finding(Reason.GRIPPER_LIMIT, goal),) if goal != angle else ()
+        beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
+        held = (Finding(Reason.GRIPPER_LIMIT, goal),) if beyond else ()
         return replace(state, gripper_goal=goal, findings=others + held)

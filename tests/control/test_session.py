@@ -155,6 +155,16 @@ def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
 
 
 @pytest.mark.parametrize("axis", range(5))
+def test_a_slider_at_its_end_is_no_complaint(
+    arm: Arm, session: Session, state: State, axis: int
+) -> None:
+    end = math.radians(math.degrees(arm.chain.upper[axis]))
+    state = run(session, state, [cmd.SetJoint(axis, math.nextafter(end, math.inf))])
+    assert state.findings == ()
+    assert state.goal[axis] <= arm.chain.upper[axis]
+
+
+@pytest.mark.parametrize("axis", range(5))
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_joint_stops_at_its_limit_and_says_which(
     arm: Arm, session: Session, state: State, axis: int, side: float
