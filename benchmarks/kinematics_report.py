@@ -76,12 +76,16 @@ def _batch_cells(row: Row) -> Cells:
 
 
 def _time_cells(row: Row) -> Cells:
-    return [f"{value:.3g}" for value in (np.median(row.microseconds), row.microseconds.min())]
+    return [_digits(value) for value in (np.median(row.microseconds), row.microseconds.min())]
 
 
 def _ratio(row: Row) -> str:
     middle = np.median(row.ratios)
-    return "–" if np.isnan(middle) else f"{middle:.3g}"
+    return "–" if np.isnan(middle) else _digits(middle)
+
+
+def _digits(value: float) -> str:
+    return f"{value:.3g}" if value < 1e3 else f"{value:.0f}"
 
 
 def _found(row: Row) -> Quality:
