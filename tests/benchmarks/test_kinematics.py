@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import pytest
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
 from benchmarks import kinematics_report as report
-from benchmarks.kinematics import BATCH, ONE_BY_ONE, ROOT, measure, seeded_task
+from benchmarks.kinematics import BATCH, ONE_BY_ONE, ROOT, main, measure, seeded_task
 from benchmarks.kinematics_own import Floor, chain_of
 from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
@@ -145,20 +144,16 @@ def test_the_tables_go_between_the_marks(tables: Tables, tmp_path: Path) -> None
         report.write_into(document, tables)
 
 
-def test_the_command_prints_both_tables_and_writes_json(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [
-            *(sys.executable, "-m", "benchmarks.kinematics", "--poses", "4", "--blocks", "2"),
-            *("--solvers", "katana450", "floor", "--json", str(tmp_path / "figures.json")),
-        ],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=60,
-        check=True,
-    )
-    assert "One pose a call" in done.stdout
-    assert "in one call" in done.stdout
+def test_the_command_prints_both_tables_and_writes_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--poses", "4", "--blocks", "2", "--solvers", "katana450", "floor")
+    written = ("--json", str(tmp_path / "figures.json"))
+    monkeypatch.setattr(sys, "argv", ["kinematics", *options, *written])
+    main()
+    said = capsys.readouterr().out
+    assert "One pose a call" in said
+    assert "in one call" in said
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
     (row,) = figures["one_by_one"]
     assert row["solver"] == "katana450 `inverse`"
