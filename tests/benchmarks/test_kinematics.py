@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +13,7 @@ import pytest
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
 from benchmarks import kinematics_report as report
-from benchmarks.kinematics import BATCH, ONE_BY_ONE, ROOT, Bench, measure, seeded_task
+from benchmarks.kinematics import BATCH, ONE_BY_ONE, ROOT, main, measure, seeded_task
 from benchmarks.kinematics_own import Floor, chain_of
 from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
@@ -94,21 +92,29 @@ def test_wrong_answers_and_doubles_do_not_count() -> None:
     assert quality(chain, task.T, [np.empty((0, 5))]).solved == 0.0
 
 
-def test_a_peer_that_is_not_there_is_listed_with_the_reason(tmp_path: Path) -> None:
-    """Each peer is asked of an environment that has none; every one must say what it lacks."""
-    chain, task = seeded_task(2, 1)
-    task.save(tmp_path / "task.npz")
-    with pytest.raises(SolverError, match=r"ModuleNotFoundError.*eaik"):
-        SolverProcess(HERE, "eaik", tmp_path / "task.npz", ROOT)
-    eaik = next(entry for entry in ONE_BY_ONE if entry.name == "eaik")
-    with ExitStack() as stack:
-        bench = Bench(stack, [], tmp_path / "task.npz", tmp_path)
-        bench.failed["eaik"] = "could not be installed: no wheel | no compiler"
-        times = bench.rounds([eaik], [(0, 2)], 2)
-        (row,) = bench.rows([eaik], times, "katana450", chain, task)
-    machine = report.Machine("a processor", 2, "3", "2", (0.0, 0.0))
-    text = report.text(Tables(2, 1, 1, machine, [row], []))
-    assert "could not be installed: no wheel / no compiler" in text
+def test_a_peer_that_cannot_be_installed_is_listed_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without network and cache there is nothing to install from."""
+    monkeypatch.setenv("UV_OFFLINE", "1")
+    monkeypatch.setenv("UV_NO_CACHE", "1")
+    tables = measure(2, 1, 1, tmp_path / "peers", ["katana450", "eaik"])
+    _, single = tables.one_by_one
+    _, batch = tables.batch
+    assert "could not be installed" in single.failed
+    assert "offline" in single.failed.lower() or "network" in single.failed.lower()
+    assert batch.failed == single.failed
+    for written in (report.text(tables), report.markdown(tables)):
+        assert written.count("could not be installed") == 2
+    assert report.record(tables)["batch"][1] == {"solver": "EAIK, 1 thread", "failed": batch.failed}
+
+
+def test_a_peer_that_cannot_be_imported_is_an_error(tmp_path: Path) -> None:
+    """The app's own environment holds no peer."""
+    seeded_task(2, 1)[1].save(tmp_path / "task.npz")
+    for name, module in (("eaik", "eaik"), ("pinocchio", "pinocchio"), ("mink-free", "mink")):
+        with pytest.raises(SolverError, match=rf"ModuleNotFoundError.*{module}"):
+            SolverProcess(HERE, name, tmp_path / "task.npz", ROOT)
 
 
 @needs_compiler
@@ -138,20 +144,16 @@ def test_the_tables_go_between_the_marks(tables: Tables, tmp_path: Path) -> None
         report.write_into(document, tables)
 
 
-def test_the_command_prints_both_tables_and_writes_json(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [
-            *(sys.executable, "-m", "benchmarks.kinematics", "--poses", "4", "--blocks", "2"),
-            *("--solvers", "katana450", "floor", "--json", str(tmp_path / "figures.json")),
-        ],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=60,
-        check=True,
-    )
-    assert "One pose a call" in done.stdout
-    assert "in one call" in done.stdout
+def test_the_command_prints_both_tables_and_writes_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--poses", "4", "--blocks", "2", "--solvers", "katana450", "floor")
+    written = ("--json", str(tmp_path / "figures.json"))
+    monkeypatch.setattr(sys, "argv", ["kinematics", *options, *written])
+    main()
+    said = capsys.readouterr().out
+    assert "One pose a call" in said
+    assert "in one call" in said
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
     (row,) = figures["one_by_one"]
     assert row["solver"] == "katana450 `inverse`"
