@@ -18,6 +18,7 @@ from app.kinematics.arm import arm_of
 from app.kinematics.batch import inverse_batch
 from app.kinematics.chain import Chain
 from app.kinematics.inverse import inverse
+from app.kinematics.solver import Solver
 from benchmarks.kinematics_task import FloatArray, Task
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
@@ -59,6 +60,21 @@ class Katana450:
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
         return list(found.q)
+
+
+class Bare:
+    """`Solver`: the same without checks, as a loop over many poses uses it."""
+
+    package = "katana450"
+
+    def __init__(self, task: Task) -> None:
+        self._solve = Solver.of(chain_of(task)).solve
+
+    def solve(self, T: FloatArray) -> Any:
+        return self._solve(T.tolist())
+
+    def joints(self, found: Any) -> FloatArray:
+        return np.array(found)
 
 
 class Floor:

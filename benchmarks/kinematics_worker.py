@@ -41,6 +41,7 @@ def _peer(name: str, **options: Any) -> Callable[[Task], Any]:
 
 SOLVERS: dict[str, Callable[[], Callable[[Task], Any]]] = {
     "katana450": lambda: _own("Katana450"),
+    "katana450-bare": lambda: _own("Bare"),
     "floor": lambda: _own("Floor"),
     "eaik": lambda: _peer("Eaik"),
     "eaik-threads": lambda: _peer("Eaik", workers=os.cpu_count() or 1),

@@ -11,7 +11,7 @@ from tests.browser.page import Camera, ViserPage
 from tests.browser.server import AppServer
 
 IMAGES = Path(__file__).with_name("images")
-WINDOW = (1440, 860)
+WINDOW = (1440, 900)
 MOVE = "/target/move"
 
 
