@@ -68,6 +68,6 @@ TOUCHING: Final = 1e-6
 SAME_POSITION: Final = 1e-9
 SAME_ROTATION: Final = 1e-9
 
-# [1, m] How exactly an arm must stand upright and roll in a plane through axis 1 to have its
-# workspace mapped: what is off by this is nothing beside a voxel.
+# [1, m] How exactly axis 1 must be upright and the tool point lie on axis 5 for a workspace to be
+# mapped: what is off by this is nothing beside a voxel.
 MAPPED_ARM: Final = 1e-6

@@ -9,6 +9,7 @@ import viser
 
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
+from app.exchange.reachability_file import load_map
 from app.robot.model import load
 from app.runtime.clock import MonotonicClock
 from app.runtime.loop import ControlLoop
@@ -21,9 +22,18 @@ class Assembly:
     """A simulated arm, its control loop, and the view of it on a server that is open already."""
 
     def __init__(
-        self, server: viser.ViserServer, settings: Settings, urdf: Path, tool: str | None
+        self,
+        server: viser.ViserServer,
+        settings: Settings,
+        urdf: Path,
+        tool: str | None,
+        workspace: Path | None,
     ) -> None:
-        """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``."""
+        """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``.
+
+        ``workspace``: file of a reachability map that can be shown.
+        """
+        stored = None if workspace is None else load_map(workspace)
         model = load(urdf, tool)
         for note in model.notes:
             print(f"katana450: {note}", file=sys.stderr)
@@ -31,7 +41,7 @@ class Assembly:
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
-        self._view = View(server, model, self._loop, mailbox, settings.frame_rate)
+        self._view = View(server, model, self._loop, mailbox, settings.frame_rate, stored)
 
     def start(self) -> None:
         """Run the control loop and the view in threads of their own."""

@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli.serve import serve
 
             settings = Settings(host=options.host, port=options.port)
-            return serve(settings, options.urdf, options.tool)
+            return serve(settings, options.urdf, options.tool, options.workspace)
         if options.command == "workspace":
             from app.cli.workspace import workspace
 
@@ -69,6 +69,12 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument(
         "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
     )
+    serve.add_argument(
+        "--workspace",
+        type=Path,
+        metavar="FILE.npz",
+        help="a map written by `katana450 workspace --out`, to be shown in the scene",
+    )
     for name, what in (
         ("fk", 'joints to poses: {"q": [5 angles, rad], "tool": "tcp"} a line'),
         ("ik", 'poses to joints: {"T": [[4x4, m]], "tool": "tcp"} a line'),
@@ -88,6 +94,11 @@ def _parser() -> argparse.ArgumentParser:
                 help='each solution with its way from "q" in the line (default: the zero posture) '
                 "as distance_rad and time_s, and its smallest_singular_value",
             )
+    add_workspace_options(
+        commands.add_parser(
+            "workspace", help="map where the tool can be, and how freely it can be turned there"
+        )
+    )
     for command in commands.choices.values():
         command.add_argument(
             "--urdf",
@@ -99,11 +110,6 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
         )
-    add_workspace_options(
-        commands.add_parser(
-            "workspace", help="map where the tool can be, and how freely it can be turned there"
-        )
-    )
     return parser
 
 

@@ -14,10 +14,16 @@ from app.view.server import open_server
 from robot_description import URDF_PATH
 
 
-def serve(settings: Settings, urdf: Path = URDF_PATH, tool: str | None = None) -> int:
+def serve(
+    settings: Settings,
+    urdf: Path = URDF_PATH,
+    tool: str | None = None,
+    workspace: Path | None = None,
+) -> int:
     """Run the app until SIGINT or SIGTERM; returns the exit status.
 
     ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
+    ``workspace``: file of a reachability map that can be shown.
     """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
     stopping = threading.Event()
@@ -33,7 +39,7 @@ def serve(settings: Settings, urdf: Path = URDF_PATH, tool: str | None = None) -
     # The libraries that read the robot take most of a second: the page loads in the meantime.
     from app.cli.assembly import Assembly
 
-    assembly = Assembly(server, settings, urdf, tool)
+    assembly = Assembly(server, settings, urdf, tool, workspace)
     assembly.start()
     print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
     stopping.wait()

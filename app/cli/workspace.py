@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,8 +24,10 @@ from app.workspace.reachability import Reachability
 def workspace(options: argparse.Namespace) -> int:
     """Map the workspace, write the files asked for, print what was found."""
     _check_files(options.out, options.ply)
-    model = load()
-    tool = model.arm.default_tool if options.tool is None else options.tool
+    model = load(options.urdf, options.tool)
+    for note in model.notes:
+        print(f"katana450: {note}", file=sys.stderr)
+    tool = model.arm.default_tool
     reachability = Reachability(
         chain=model.arm.chain_to(tool),
         T_base_shoulder=model.T_base_shoulder,
@@ -36,7 +39,7 @@ def workspace(options: argparse.Namespace) -> int:
     found = survey.map(_counts(survey, options.scheduler))
     files: dict[Path, Writer] = {}
     if options.out:
-        files[options.out] = lambda file: write_npz(file, survey, found, tool)
+        files[options.out] = lambda file: write_npz(file, survey, found, model.name, tool)
     if options.ply:
         files[options.ply] = lambda file: write_ply(file, found)
     write_files(files)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 def add_workspace_options(parser: argparse.ArgumentParser) -> None:
     """Put them into `parser`; lengths are in mm, as a person measures them."""
-    parser.add_argument("--tool", help="tool frame (default: the arm's own, tcp)")
     parser.add_argument(
         "--table",
         type=float,

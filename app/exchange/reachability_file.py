@@ -8,12 +8,15 @@ Keys of the .npz, lengths in m, angles in rad, points in the base frame:
     cloud (K, 3)     tool points at random joint angles
     voxel, table     edge of a voxel; height of the table
     pitches, rolls   in how many steps a turn was cut
-    tool, seed       the tool frame; seed of the cloud
+    robot, tool      name of the arm and of its tool frame
+    seed             of the cloud
 """
 
 from __future__ import annotations
 
+import math
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -28,7 +31,24 @@ from app.workspace.map import ReachabilityMap, Survey
 FORMAT = "katana450 reachability 1"
 
 
-def write_npz(file: BinaryIO, survey: Survey, found: ReachabilityMap, tool: str) -> None:
+@dataclass(frozen=True, eq=False)
+class StoredMap:
+    """A map as it was read.
+
+    points: (N, 3) centres of voxels of edge `voxel` in the base frame [m]. share: (N,) of the
+    orientations, above 0 and up to 1. robot, tool: which arm and which of its tools it is of.
+    """
+
+    points: FloatArray
+    share: FloatArray
+    voxel: float
+    robot: str
+    tool: str
+
+
+def write_npz(
+    file: BinaryIO, survey: Survey, found: ReachabilityMap, robot: str, tool: str
+) -> None:
     """Write everything; the same map gives the same bytes."""
     reachability = survey.reachability
     np.savez_compressed(
@@ -42,13 +62,14 @@ def write_npz(file: BinaryIO, survey: Survey, found: ReachabilityMap, tool: str)
         table=np.array(reachability.table),
         pitches=np.array(reachability.pitches),
         rolls=np.array(reachability.rolls),
+        robot=np.array(robot),
         tool=np.array(tool),
         seed=np.array(survey.seed),
     )
 
 
-def load_map(path: str | os.PathLike[str]) -> tuple[FloatArray, FloatArray]:
-    """Points (N, 3) in the base frame [m] and shares (N,), both read-only, of an .npz file.
+def load_map(path: str | os.PathLike[str]) -> StoredMap:
+    """The map in an .npz file, its arrays read-only.
 
     Raises InputError for a file that is missing, no such map or broken.
     """
@@ -59,11 +80,16 @@ def load_map(path: str | os.PathLike[str]) -> tuple[FloatArray, FloatArray]:
             if str(arrays["format"]) != FORMAT:
                 raise ValueError(f"its format is {arrays['format']}, not {FORMAT}")
             points, share = arrays["points"], arrays["share"]
+            voxel, robot, tool = (arrays[key].item() for key in ("voxel", "robot", "tool"))
     except OSError as error:
         raise InputError(f"{name} cannot be read: {error.strerror or error}.") from error
     except Exception as error:
         raise InputError(f"{name} is no reachability map, or is broken: {error}.") from error
-    return _checked(name, points, share)
+    if not (isinstance(voxel, float) and isinstance(robot, str) and isinstance(tool, str)):
+        raise InputError(f"'voxel' of {name} must be a number, 'robot' and 'tool' must be names.")
+    if not 0.0 < voxel < math.inf:
+        raise InputError(f"The voxels of {name} have an edge of {voxel} m, which is none.")
+    return StoredMap(*_checked(name, points, share), voxel, robot, tool)
 
 
 def _checked(

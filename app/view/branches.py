@@ -1,56 +1,106 @@
-"""The branches in the panel: what each would give and cost, and a button to take it."""
+"""The branches to choose from: what each would give and cost, and two ways to take one.
+
+A table and a button a branch in the panel; and, when a person asks to see them, the arm as it would
+stand, to be clicked.
+"""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from html import escape
+from typing import Any
 
 import viser
 
 from app.control.choices import choices
+from app.control.commands import TakeBranch
 from app.control.state import State
+from app.kinematics.badge import Badge
 from app.kinematics.branch import BRANCHES
 from app.robot.model import RobotModel
+from app.view.scene import Colour, GhostNodes
 from app.view.texts import BRANCH_HEADINGS, badge
+
+COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (216, 67, 121))
+"""One for each of BRANCHES, told apart by people of every kind of sight; the table has them too."""
+
+OPACITY = 0.25
+
+Listen = Callable[[Any, Callable[[], TakeBranch]], None]
+"""Makes a person's click on a button or a shape send what the function makes."""
 
 
 class BranchList:
-    """A table and a button a branch; looking at them changes nothing."""
+    """Looking at the branches changes nothing."""
 
     def __init__(
-        self,
-        gui: viser.GuiApi,
-        model: RobotModel,
-        take: Callable[[viser.GuiButtonHandle, int], None],
-        state: State,
+        self, server: viser.ViserServer, model: RobotModel, listen: Listen, state: State
     ) -> None:
-        """``take`` makes a button ask for the branch of that number in BRANCHES."""
+        self._server = server
         self._model = model
+        self._listen = listen
         self._seen = state
-        self._table = gui.add_html(self._rows(state))
-        for number, branch in enumerate(BRANCHES):
-            button = gui.add_button(
+        self._ghosts: list[GhostNodes] = []
+        # The box is ticked in a thread of viser's.
+        self._lock = threading.Lock()
+        found = choices(model.arm, state)
+        self._table = server.gui.add_html(_rows(found))
+        self._box = server.gui.add_checkbox(
+            "Ghosts of the others",
+            initial_value=False,
+            hint="Shows the arm on each other branch; click one and the arm goes there",
+        )
+        self._box.on_update(lambda _: self._show())
+        for branch in BRANCHES:
+            button = server.gui.add_button(
                 f"Take {branch}", hint="The tool where it is wished, the arm on this branch"
             )
-            take(button, number)
+            listen(button, lambda branch=branch: TakeBranch(branch))  # type: ignore[misc]
 
     def follow(self, state: State) -> None:
         """Show what the branches come to from ``state``."""
         if state is not self._seen:
             self._seen = state
-            rows = self._rows(state)
-            if rows != self._table.content:
-                self._table.content = rows
+            self._show()
 
-    def _rows(self, state: State) -> str:
-        head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
-        rows = "".join(
-            f"<tr data-branch='{choice.branch}'><th>{choice.branch}</th>"
-            + "".join(f"<td>{escape(said)}</td>" for said in badge(choice))
-            + "</tr>"
-            for choice in choices(self._model.arm, state)
-        )
-        return (
-            f"<div class='k450'><table class='branches'><thead><tr>{head}</tr></thead>"
-            f"<tbody>{rows}</tbody></table></div>"
-        )
+    def _show(self) -> None:
+        with self._lock:
+            self._draw(self._seen)
+
+    def _draw(self, state: State) -> None:
+        found = choices(self._model.arm, state)
+        rows = _rows(found)
+        if rows != self._table.content:
+            self._table.content = rows
+        if self._box.value and not self._ghosts:
+            # Made when first wanted: three more arms are half of what a page loads.
+            self._ghosts = [self._ghost(number) for number in range(len(BRANCHES))]
+        for ghost, choice in zip(self._ghosts, found, strict=False):
+            visible = self._box.value and choice.branch != state.branch
+            ghost.root.visible = visible
+            if visible:
+                ghost.move(self._model.joint_angles(choice.q, state.gripper))
+
+    def _ghost(self, number: int) -> GhostNodes:
+        branch = BRANCHES[number]
+        name = f"/branch/{branch}"
+        ghost = GhostNodes(self._server, self._model, name, COLOURS[number], OPACITY)
+        for shape in ghost.shapes:
+            self._listen(shape, lambda: TakeBranch(branch))
+        return ghost
+
+
+def _rows(found: tuple[Badge, ...]) -> str:
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
+    rows = "".join(
+        f"<tr data-branch='{choice.branch}'><th><i style='background:rgb{colour}'></i>"
+        f"{choice.branch}</th>"
+        + "".join(f"<td>{escape(said)}</td>" for said in badge(choice))
+        + "</tr>"
+        for choice, colour in zip(found, COLOURS, strict=True)
+    )
+    return (
+        f"<div class='k450'><table class='branches'><thead><tr>{head}</tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>"
+    )

@@ -92,6 +92,8 @@ class Guard:
                 case wire.TransformControlsDragEndMessage():
                     self._drags.discard((client_id, message.name))
                     return None
+                case wire.SceneNodeClickMessage():
+                    return self._click(message)
         except (TypeError, ValueError, AttributeError, OverflowError) as error:
             return f"it is malformed ({error})"
         return "the page has no use for it"
@@ -115,6 +117,13 @@ class Guard:
         if max(abs(x) for x in message.position) > WORKSPACE:
             return f"its position is more than {WORKSPACE} m away"
         return None
+
+    def _click(self, message: wire.SceneNodeClickMessage) -> str | None:
+        node = self._server.scene.get_handle_by_name(message.name)
+        if not getattr(node, "visible", False):
+            return "there is nothing of that name to click"
+        numbers = (*message.ray_origin, *message.ray_direction, *message.screen_pos)
+        return None if _finite(numbers) else "a number of its ray is not finite"
 
     def _update(self, message: wire.GuiUpdateMessage) -> str | None:
         handle = self._server.gui._gui_input_handle_from_uuid.get(message.uuid)

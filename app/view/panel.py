@@ -14,12 +14,12 @@ from app.control.state import State
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
-from app.kinematics.branch import BRANCHES
 from app.kinematics.forward import forward
 from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList
+from app.view.reachability import Cut, ReachabilityCloud
 from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, degrees
 
 ANGLE_WORTH_SENDING = 2e-6
@@ -31,6 +31,14 @@ READOUT_INTERVAL = 0.1
 FARTHEST = 1000.0
 """[mm] Beyond any tool point of the arm: what a typed position may hold."""
 
+
+Clickable = (
+    viser.GuiInputHandle[Any]
+    | viser.GuiButtonHandle
+    | viser.GuiButtonGroupHandle
+    | viser.MeshHandle
+)
+"""What a person changes or clicks."""
 
 GESTURES: dict[str, cmd.Command] = {
     "Home": cmd.Home(),
@@ -48,6 +56,7 @@ class Panel:
         model: RobotModel,
         put: Callable[[cmd.Command], int],
         show_ellipsoid: Callable[[bool], None],
+        reachability: ReachabilityCloud | None,
         state: State,
     ) -> None:
         """``put`` takes a command; ``state`` is what the panel shows first."""
@@ -70,9 +79,11 @@ class Panel:
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
         with self._gui.add_folder("Branches", expand_by_default=False):
-            self._branches = BranchList(self._gui, model, self._take, state)
+            self._branches = BranchList(server, model, self._on_person, state)
         with self._gui.add_folder("Show", expand_by_default=False):
             self._ellipsoid(show_ellipsoid)
+            if reachability is not None:
+                self._reachability(reachability)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s].
@@ -167,9 +178,6 @@ class Panel:
 
         self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
 
-    def _take(self, button: viser.GuiButtonHandle, number: int) -> None:
-        self._on_person(button, lambda: cmd.TakeBranch(BRANCHES[number]))
-
     def _ellipsoid(self, show: Callable[[bool], None]) -> None:
         box = self._gui.add_checkbox(
             "Velocity ellipsoid",
@@ -178,14 +186,21 @@ class Panel:
         )
         box.on_update(lambda _: show(box.value))
 
+    def _reachability(self, cloud: ReachabilityCloud) -> None:
+        names = tuple(cut.value for cut in Cut)
+        cuts = self._gui.add_dropdown(
+            "Reachability", names, initial_value=Cut.HIDDEN.value, hint=cloud.legend
+        )
+        cuts.on_update(lambda _: cloud.show(Cut(cuts.value)))
+
     def _on_person(
         self,
-        handle: viser.GuiInputHandle[Any] | viser.GuiButtonHandle | viser.GuiButtonGroupHandle,
+        handle: Clickable,
         say: Callable[[], cmd.Command],
     ) -> None:
         """Send what ``say`` makes when a person, not this program, changes ``handle``."""
 
-        async def changed(event: viser.GuiEvent[Any]) -> None:
+        async def changed(event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:

@@ -14,6 +14,9 @@ from app.geometry.arrays import FloatArray
 from app.robot.model import Body, RobotModel
 from app.robot.visual import Visual
 
+Colour = tuple[int, int, int]
+"""Red, green, blue of 255."""
+
 ANGLE_WORTH_SENDING = 1e-7
 """[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
 
@@ -81,22 +84,26 @@ instead of flickering in it."""
 
 
 class GhostNodes(FrameTree):
-    """Where the arm is going: the same links, translucent, in one colour that tells how it went."""
-
-    OPACITY = 0.35
+    """Where the arm is going, or could go: the same links, translucent, in one colour."""
 
     def __init__(
-        self, server: viser.ViserServer, model: RobotModel, colour: tuple[int, int, int]
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        root: str,
+        colour: Colour,
+        opacity: float,
     ) -> None:
-        super().__init__(server, "/ghost", model)
+        """``root``: name of its node; it is made hidden."""
+        super().__init__(server, root, model)
         self.root.visible = False
         self._colour = colour
-        self._shapes = [
+        self.shapes = [
             server.scene.add_mesh_simple(
                 f"{self.path[body.name]}/shape{number}",
                 *_surface(visual),
                 color=colour,
-                opacity=self.OPACITY,
+                opacity=opacity,
                 cast_shadow=False,
                 receive_shadow=False,
             )
@@ -105,13 +112,13 @@ class GhostNodes(FrameTree):
             if body.moves
         ]
 
-    def show(self, visible: bool, colour: tuple[int, int, int]) -> None:
+    def show(self, visible: bool, colour: Colour) -> None:
         """Show or hide the ghost, in ``colour`` (red, green, blue of 255)."""
         if visible != self.root.visible:
             self.root.visible = visible
         if visible and colour != self._colour:
             self._colour = colour
-            for shape in self._shapes:
+            for shape in self.shapes:
                 shape.color = colour
 
 

@@ -13,6 +13,7 @@ import viser
 from app.control.commands import Command
 from app.control.state import PoseTarget, State, Status, ToolTarget
 from app.errors import InputError
+from app.exchange.reachability_file import StoredMap
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
@@ -21,14 +22,17 @@ from app.runtime.mailbox import Mailbox
 from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.panel import READOUT_INTERVAL, Panel
-from app.view.scene import ArmNodes, Gap, GhostNodes, furnish
+from app.view.reachability import ReachabilityCloud
+from app.view.scene import ArmNodes, Colour, Gap, GhostNodes, furnish
 
-GHOST_COLOURS: dict[Status, tuple[int, int, int]] = {
+GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
     Status.HELD: (234, 88, 12),
     Status.FAULT: (230, 45, 45),
 }
+
+GHOST_OPACITY = 0.35
 
 GHOST_FROM = np.deg2rad(0.2)
 """[rad] The ghost shows while a joint is farther than this from its goal."""
@@ -44,8 +48,12 @@ class View:
         loop: ControlLoop,
         mailbox: Mailbox,
         frame_rate: float,
+        stored: StoredMap | None = None,
     ) -> None:
-        """``frame_rate``: most updates a second [Hz]."""
+        """``frame_rate``: most updates a second [Hz]. ``stored``: a workspace that can be shown.
+
+        Raises ConfigurationError for the map of another arm.
+        """
         self._server = server
         self._model = model
         self._loop = loop
@@ -56,11 +64,12 @@ class View:
         furnish(server)
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
-        self._ghost = GhostNodes(server, model, GHOST_COLOURS[Status.OK])
+        self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
-        self._panel = Panel(server, model, mailbox.put, self._show_ellipsoid, state)
+        cloud = None if stored is None else ReachabilityCloud(server, model, stored)
+        self._panel = Panel(server, model, mailbox.put, self._show_ellipsoid, cloud, state)
         self._show(loop.snapshot)
 
     def start(self) -> None:

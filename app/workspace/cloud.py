@@ -19,6 +19,6 @@ def tool_cloud(reachability: Reachability, count: int, seed: int) -> FloatArray:
     q = np.random.default_rng(seed).uniform(chain.lower, chain.upper, (count, chain.n))
     T = postures.poses(chain, q)
     points = reachability.in_base(T[:, :3, 3])
-    clear = reachability.clear(T, q[:, None, :])[:, 0] & (points[:, 2] >= reachability.table)
+    clear = reachability.clear(q) & (points[:, 2] >= reachability.table)
     cloud: FloatArray = points[clear]
     return cloud

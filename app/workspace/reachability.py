@@ -1,16 +1,20 @@
 """How freely the tool can be turned at a point: the share of orientations inside the limits.
 
 At a point off axis 1 a 5-axis arm is free to choose two angles of the tool: its pitch, by which the
-tool's x axis leans in the vertical plane through axis 1 and the point, and its roll about that
-axis. The share is that of pitch and roll, each taken all round in equal steps, at which some
-posture holds the tool there with every joint inside its limits and elbow, wrist and tool point not
-below the table. Bodies are not looked at: links may cross each other or the table's edge.
+roll axis leans in the arm's plane through the point, and its roll about that axis. The share is
+that of pitch and roll, each taken all round in equal steps, at which some posture holds the tool
+there with every joint inside its limits and elbow, wrist and tool point not below the table. Bodies
+are not looked at: links may cross each other or the table's edge.
+
+All is worked out on the canonical arm (app/kinematics/arm.py), for every member of the family whose
+tool point lies on the roll axis. Where the arm's plane passes beside axis 1 there are two planes
+through a point, one a shoulder; the same pitch and roll in both counts once.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +22,9 @@ import numpy.typing as npt
 
 from app import tolerances
 from app.errors import InputError, RobotDescriptionError
-from app.geometry import screws
+from app.geometry import se3
 from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
+from app.kinematics.arm import FiveAxisArm, arm_of
 from app.kinematics.chain import Chain
 from app.workspace import postures
 from app.workspace.grid import IntArray, VoxelGrid
@@ -38,7 +42,7 @@ class Reachability:
     chain: the arm with its tool, in {S}. T_base_shoulder: (4, 4) where {S} stands. table: height z
     of the table in the base frame [m]. pitches, rolls: in how many steps a turn is cut. Raises
     InputError for another number of steps than 1 to MOST_STEPS, RobotDescriptionError for an arm
-    whose tool does not roll in a plane through an upright axis 1.
+    whose axis 1 is not upright or whose tool point is not on the roll axis.
     """
 
     chain: Chain
@@ -51,7 +55,25 @@ class Reachability:
         for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
             if not 1 <= steps <= MOST_STEPS:
                 raise InputError(f"The number of {name} is {steps}; give 1 to {MOST_STEPS}.")
-        _check_layout(self.chain, self.T_base_shoulder)
+        for what, off in (
+            ("axis 1 must be upright", self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)),
+            ("the tool point must lie on axis 5", self._arm.off_axis),
+        ):
+            size = float(np.linalg.norm(off))
+            if size > tolerances.MAPPED_ARM:
+                raise RobotDescriptionError(
+                    f"The workspace of this arm cannot be mapped: {what}, which is off by "
+                    f"{size:.3g} (m or rad)."
+                )
+
+    @property
+    def _arm(self) -> FiveAxisArm:
+        return arm_of(self.chain)
+
+    @property
+    def T_base_canonical(self) -> FloatArray:
+        """(4, 4) where the frame {C} of the canonical arm stands in the base frame [m]."""
+        return self.T_base_shoulder @ se3.inverse(self._arm.T_C_S)
 
     @property
     def orientations(self) -> int:
@@ -60,90 +82,93 @@ class Reachability:
 
     @property
     def reach(self) -> float:
-        """No point farther than this from the origin of {S} can be reached [m]."""
-        stations = [*_axis_points(self.chain)[:4], self.chain.M[:3, 3]]
-        return sum(math.dist(a, b) for a, b in itertools.pairwise(stations))
+        """No point farther than this from the origin of {C} can be reached [m]."""
+        arm = self._arm
+        return math.hypot(abs(arm.a) + arm.l1 + arm.l2 + arm.l3, arm.d)
 
     def grid(self, voxel: float) -> VoxelGrid:
         """The voxels of edge `voxel` [m] that may hold a reachable point."""
-        return VoxelGrid.around(self.T_base_shoulder[:3, 3], self.reach, voxel, self.table)
+        return VoxelGrid.around(self.T_base_canonical[:3, 3], self.reach, voxel, self.table)
 
     def count(self, points: FloatArray) -> IntArray:
         """(N,) how many orientations can be had at each of `points` (N, 3), base frame [m]."""
-        R, origin = self.T_base_shoulder[:3, :3], self.T_base_shoulder[:3, 3]
-        p = (points - origin) @ R
+        T_base_C = self.T_base_canonical
+        p = (points - T_base_C[:3, 3]) @ T_base_C[:3, :3]
         within = (points[:, 2] >= self.table) & ((p * p).sum(axis=1) <= self.reach**2)
         near = np.flatnonzero(within)
         counts = np.zeros(len(points), dtype=np.int64)
-        T = tool_poses(p[near], self.pitches)
-        T = T.reshape(-1, 4, 4)
-        q = postures.at(self.chain, T)
-        pose, branch = np.nonzero(self._free(T, q))
-        # The postures for a pose out of reach only come near it.
-        exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
-        pose, branch = pose[exact], branch[exact]
-        rollable = self._rollable(q[pose, branch, 4])
-        possible = np.zeros((len(T), self.rolls), dtype=np.bool)
-        for number in range(q.shape[1]):
-            here = branch == number
-            possible[pose[here]] |= rollable[here]
+        possible = np.zeros((len(near) * self.pitches, self.rolls), dtype=np.bool)
+        for poses in self.tool_poses(p[near]):
+            T = poses.reshape(-1, 4, 4)
+            q = postures.at(self.chain, T)
+            pose, branch = np.nonzero(self._free(q))
+            # The postures for a pose out of reach only come near it.
+            exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
+            pose, branch = pose[exact], branch[exact]
+            rollable = self._rollable(q[pose, branch, 4])
+            for number in range(q.shape[1]):
+                here = branch == number
+                possible[pose[here]] |= rollable[here]
         counts[near] = possible.reshape(len(near), self.orientations).sum(axis=1)
         return counts
 
-    def _rollable(self, theta5: FloatArray) -> BoolArray:
-        """(N, rolls) whether axis 5 can add each roll to its angle `theta5` (N,) [rad].
+    def tool_poses(self, p: FloatArray) -> Iterator[FloatArray]:
+        """T_S_tool (N, pitches, 4, 4) at the points `p` (N, 3) of {C} [m], unrolled.
 
-        Axis 5 turns the tool about its own x axis, so every roll follows from one.
+        Pitch 0 is outward and positive pitch downwards. Once for the arm facing the points and,
+        where that makes another plane, once for the arm with its back to them.
         """
+        arm = self._arm
+        phi = np.linspace(0.0, math.tau, self.pitches, endpoint=False)
+        rho = np.hypot(p[:, 0], p[:, 1])
+        outward = np.sqrt(np.maximum(rho**2 - arm.d**2, 0.0))
+        # On axis 1 every bearing will do.
+        bearing = np.where(rho == 0.0, 0.0, np.arctan2(p[:, 1], p[:, 0]))
+        facing = _tool_frames(p, bearing - np.arctan2(arm.d, outward), phi, behind=False)
+        T_S_C = se3.inverse(arm.T_C_S)
+        yield T_S_C @ facing @ arm.T_K_tool
+        if arm.d:
+            behind = _tool_frames(p, bearing - np.arctan2(arm.d, -outward), phi, behind=True)
+            yield T_S_C @ behind @ arm.T_K_tool
+
+    def _rollable(self, theta5: FloatArray) -> BoolArray:
+        """(N, rolls) whether axis 5 can add each roll to its angle `theta5` (N,) [rad]."""
         lower, upper = self.chain.lower[4], self.chain.upper[4]
         slack = tolerances.LIMIT_SLACK
-        rolls = np.arange(self.rolls) * (math.tau / self.rolls)
+        rolls = np.arange(self.rolls) * (math.tau / self.rolls) * self._arm.signs[4]
         beyond_lower = np.mod(theta5[:, None] + rolls - lower + slack, math.tau)
         fits: BoolArray = beyond_lower <= upper - lower + 2.0 * slack
         return fits
 
-    def _free(self, T: FloatArray, q: FloatArray) -> BoolArray:
-        """(N, 4) whether axes 1 to 4 are inside their limits and the arm is clear of the table."""
+    def _free(self, q: FloatArray) -> BoolArray:
+        """(N, B) whether axes 1 to 4 are inside their limits and the arm is clear of the table."""
         slack = tolerances.LIMIT_SLACK
         lower, upper = self.chain.lower[:4] - slack, self.chain.upper[:4] + slack
         inside = ((q[..., :4] >= lower) & (q[..., :4] <= upper)).all(axis=-1)
-        return np.asarray(inside & self.clear(T, q))
+        return np.asarray(inside & self.clear(q))
 
-    def clear(self, T: FloatArray, q: FloatArray) -> BoolArray:
-        """(N, B) whether elbow and wrist are not below the table.
-
-        T: (N, 4, 4) poses T_S_tool [m]; q: (N, B, 5) postures for each of them [rad].
-        """
-        chain = self.chain
-        shoulder, elbow, wrist = _axis_points(chain)[1:4]
-        table = self.table - float(self.T_base_shoulder[2, 3])
-        in_tool = chain.M[:3, :3].T @ (wrist - chain.M[:3, 3])
-        wrist_height = T[:, 2, :3] @ in_tool + T[:, 2, 3]
-        outward = elbow - shoulder
-        upward = np.cross(chain.S[:3, 1], outward)
-        theta2 = q[..., 1]
-        elbow_height = shoulder[2] + np.cos(theta2) * outward[2] + np.sin(theta2) * upward[2]
-        return np.asarray((elbow_height >= table) & (wrist_height >= table)[:, None])
+    def clear(self, q: FloatArray) -> BoolArray:
+        """(...) whether elbow and wrist are not below the table at angles `q` (..., 5) [rad]."""
+        arm = self._arm
+        alpha = arm.canonical(q)
+        elbow = self.T_base_canonical[2, 3] - arm.l1 * np.sin(alpha[..., 1])
+        wrist = elbow - arm.l2 * np.sin(alpha[..., 1] + alpha[..., 2])
+        return np.asarray(np.minimum(elbow, wrist) >= self.table)
 
     def in_base(self, p: FloatArray) -> FloatArray:
         """(N, 3) points `p` (N, 3) of {S} in the base frame [m]."""
         return p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
 
 
-def tool_poses(p: FloatArray, pitches: int) -> FloatArray:
-    """(N, pitches, 4, 4) poses T_S_tool at the points `p` (N, 3) of {S} [m], unrolled.
+def _tool_frames(p: FloatArray, alpha1: FloatArray, phi: FloatArray, *, behind: bool) -> FloatArray:
+    """T_C_K (N, pitches, 4, 4) at `p` (N, 3), in the planes at `alpha1` (N,), pitched by `phi`.
 
-    The tool's x axis lies in the upright plane through axis 1 and the point; pitch 0 is outward,
-    and positive pitch downwards.
+    behind: the plane is seen from its back, where outward is against its own u.
     """
-    radius = np.hypot(p[:, 0], p[:, 1])
-    on_axis = radius == 0.0
-    c = np.where(on_axis, 1.0, p[:, 0]) / np.where(on_axis, 1.0, radius)
-    s = np.where(on_axis, 0.0, p[:, 1]) / np.where(on_axis, 1.0, radius)
-    c, s = c[:, None], s[:, None]
-    phi = np.arange(pitches) * (math.tau / pitches)
+    turn = -1.0 if behind else 1.0
+    c, s = turn * np.cos(alpha1)[:, None], turn * np.sin(alpha1)[:, None]
     cp, sp = np.cos(phi), np.sin(phi)
-    T = np.zeros((len(p), pitches, 4, 4))
+    T = np.zeros((len(p), len(phi), 4, 4))
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = c * cp, -s, c * sp
     T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = s * cp, c, s * sp
     T[..., 2, 0], T[..., 2, 2] = -sp, cp
@@ -157,30 +182,3 @@ def _same(Ta: FloatArray, Tb: FloatArray) -> BoolArray:
     gap = np.abs(Ta - Tb)
     in_place = gap[:, :3, 3].max(axis=1) <= tolerances.SAME_POSITION
     return np.asarray(in_place & (gap[:, :3, :3].max(axis=(1, 2)) <= tolerances.SAME_ROTATION))
-
-
-def _axis_points(chain: Chain) -> FloatArray:
-    """(5, 3) a point on each axis at q = 0 in {S} [m]: where the arm's plane cuts axes 2 to 4."""
-    return np.array([screws.point_on(S) for S in chain.S.T])
-
-
-def _check_layout(chain: Chain, T_base_shoulder: FloatArray) -> None:
-    arm_of(chain)
-    points, directions = _axis_points(chain), chain.S[:3].T
-    normal, x = directions[1], chain.M[:3, 0]
-    upright = np.array([0.0, 0.0, 1.0])
-    for what, off in (
-        ("the base must stand upright", T_base_shoulder[2, :3] - upright),
-        ("axis 1 must be upright in the origin of {S}", [*(directions[0] - upright), *points[0]]),
-        ("axis 2 must be level", normal @ upright),
-        ("the tool must roll about its x axis", directions[4] - x),
-        ("the tool point must lie on axis 5", np.cross(x, chain.M[:3, 3] - points[4])),
-        ("axis 4 must cross axis 5", np.cross(x, points[3] - points[4])),
-        ("axis 5 must lie in a plane through axis 1", (normal @ x, normal @ points[4])),
-    ):
-        size = float(np.linalg.norm(off))
-        if size > tolerances.MAPPED_ARM:
-            raise RobotDescriptionError(
-                f"The workspace of this arm cannot be mapped: {what}, which is off by {size:.3g} "
-                "(m or rad)."
-            )

@@ -6,17 +6,22 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from app.cli.main import main
+from app.exchange.reachability_file import load_map
 from app.kinematics.forward import forward
 from app.kinematics.velocity import limit_distances, singular_values
 from app.robot.model import RobotModel
 from app.settings import Settings
+from app.view.reachability import Cut
 from app.view.texts import READINGS, room
 from tests.browser.conftest import OpenPage
-from tests.browser.server import AppServer
+from tests.browser.server import APP, AppServer, ServerError
 
 READY = np.array(Settings().ready)
 MOVE = "/target/move"
+ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
 
 def test_a_person_looks_at_the_branches_and_takes_one(
@@ -63,6 +68,59 @@ def test_a_person_looks_at_the_branches_and_takes_one(
         page.click_button("Take front-down")
         page.wait_until(lambda: page.slider_value("Axis 3") < 0.0, "the other elbow")
         assert page.errors == []
+
+
+def test_a_person_clicks_the_ghost_of_a_branch(open_page: OpenPage, artefacts: Path) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        page.page.get_by_text("Branches", exact=True).click()
+        page.page.get_by_text("Ghosts of the others", exact=True).click()
+        elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
+        page.wait_ready((elbow,))
+        page.screenshot(artefacts / "app-ghosts.png")
+        before = page.slider_value("Axis 3")
+        page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
+        page.wait_until(lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow")
+        page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+        assert page.errors == []
+
+
+def test_a_map_of_the_workspace_is_looked_into(
+    open_page: OpenPage, tmp_path: Path, artefacts: Path
+) -> None:
+    path = tmp_path / "map.npz"
+    assert main(["workspace", "--voxel", "40", "--pitches", "12", "--out", str(path)]) == 0
+    stored = load_map(path)
+    with AppServer((*APP, "--workspace", str(path))) as server:
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        page.page.get_by_text("Show", exact=True).click()
+
+        def drawn(cut: Cut) -> int:
+            page.choose("Reachability", cut.value)
+            page.wait_ready(("/reachability",))
+            page.screenshot(artefacts / f"app-reachability-{cut.name.lower()}.png")
+            (message,) = page.messages("PointCloudMessage", node="/reachability", last=1)
+            count: int = message.body["props"]["points"]["length"]
+            return count // 3
+
+        layers = np.floor(stored.points[:, 1] / stored.voxel)
+        assert drawn(Cut.SLICE) == (layers == 0.0).sum()
+        assert drawn(Cut.HALF) == (layers >= 0.0).sum()
+        assert drawn(Cut.WHOLE) == len(stored.points)
+        page.choose("Reachability", Cut.HIDDEN.value)
+        page.wait_until(
+            lambda: page.messages("RemoveSceneNodeMessage", node="/reachability", last=1),
+            "the map to go",
+        )
+        assert page.errors == []
+
+
+def test_the_map_of_another_arm_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.npz"
+    options = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--out", str(path))
+    assert main(["workspace", "--urdf", str(ARMS / "pincherx_150.urdf"), *options]) == 0
+    with pytest.raises(ServerError, match=r"pincherx_150'; this one is 'katana450'"):
+        AppServer((*APP, "--workspace", str(path))).start()
 
 
 def test_a_reading_is_chosen_for_everyone(open_page: OpenPage) -> None:

@@ -26,15 +26,14 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
         main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out), "--ply", str(ply)]) == 0
     )
     said = capsys.readouterr()
-    points, share = load_map(out)
-    assert f"The tool grasp reaches {len(points)} voxels of 170 mm" in said.out
-    assert f"{share.max():.1%}" in said.out
+    stored = load_map(out)
+    assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in said.out
+    assert f"{stored.share.max():.1%}" in said.out
     assert f"Written: {ply}" in said.out
     assert said.err == ""
     assert sorted(tmp_path.iterdir()) == [out, ply]
-    with np.load(out) as arrays:
-        assert arrays["tool"].item() == "grasp"
-        assert arrays["voxel"].item() == pytest.approx(0.17)
+    assert (stored.robot, stored.tool) == ("katana450", "grasp")
+    assert stored.voxel == pytest.approx(0.17)
 
 
 def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
@@ -47,8 +46,7 @@ def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
 def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
     assert main(["workspace", *COARSE, "--table", "300", "--out", str(out)]) == 0
-    points, _ = load_map(out)
-    assert points[:, 2].min() >= 0.3
+    assert load_map(out).points[:, 2].min() >= 0.3
     with np.load(out) as arrays:
         assert arrays["cloud"][:, 2].min() >= 0.3
         assert arrays["table"].item() == pytest.approx(0.3)
@@ -57,7 +55,7 @@ def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--tool", "hammer"], "tcp, grasp, flange"),
+        (["--tool", "hammer"], "no link 'hammer'"),
         (["--table", "2000"], "comes up to"),
         (["--table", "nan"], "leaves nothing"),
         (["--voxel", "0"], "makes no map"),

@@ -32,16 +32,17 @@ def survey(model: RobotModel) -> Survey:
 def npz(survey: Survey, tmp_path: Path) -> Path:
     path = tmp_path / "map.npz"
     with path.open("wb") as file:
-        write_npz(file, survey, FOUND, "tcp")
+        write_npz(file, survey, FOUND, "katana450", "tcp")
     return path
 
 
 def test_a_map_comes_back_to_the_bit(npz: Path) -> None:
-    points, share = load_map(npz)
-    assert np.array_equal(points, POINTS)
-    assert np.array_equal(share, SHARE)
-    assert not points.flags.writeable
-    assert not share.flags.writeable
+    stored = load_map(npz)
+    assert np.array_equal(stored.points, POINTS)
+    assert np.array_equal(stored.share, SHARE)
+    assert not stored.points.flags.writeable
+    assert not stored.share.flags.writeable
+    assert (stored.voxel, stored.robot, stored.tool) == (0.02, "katana450", "tcp")
 
 
 def test_the_file_holds_what_its_keys_promise(npz: Path) -> None:
@@ -54,6 +55,7 @@ def test_the_file_holds_what_its_keys_promise(npz: Path) -> None:
         "table": 0.05,
         "pitches": 36,
         "rolls": 24,
+        "robot": "katana450",
         "tool": "tcp",
         "seed": 3,
     }
@@ -61,7 +63,7 @@ def test_the_file_holds_what_its_keys_promise(npz: Path) -> None:
 
 def test_the_same_map_is_the_same_bytes(npz: Path, survey: Survey) -> None:
     again = io.BytesIO()
-    write_npz(again, survey, FOUND, "tcp")
+    write_npz(again, survey, FOUND, "katana450", "tcp")
     assert again.getvalue() == npz.read_bytes()
 
 
@@ -69,10 +71,10 @@ def test_an_empty_map_is_a_map(survey: Survey, tmp_path: Path) -> None:
     path = tmp_path / "empty.npz"
     empty = ReachabilityMap(np.empty((0, 3)), np.empty(0), np.empty((0, 3)))
     with path.open("wb") as file:
-        write_npz(file, survey, empty, "tcp")
-    points, share = load_map(path)
-    assert points.shape == (0, 3)
-    assert share.shape == (0,)
+        write_npz(file, survey, empty, "katana450", "tcp")
+    stored = load_map(path)
+    assert stored.points.shape == (0, 3)
+    assert stored.share.shape == (0,)
     ply = io.BytesIO()
     write_ply(ply, empty)
     assert b"element vertex 0\n" in ply.getvalue()
@@ -87,7 +89,14 @@ def test_another_program_reads_the_point_cloud() -> None:
     assert np.array_equal(cloud.colors[:, :3], share_colors(SHARE))
 
 
-GOOD = {"format": np.array(FORMAT), "points": POINTS, "share": SHARE}
+GOOD = {
+    "format": np.array(FORMAT),
+    "points": POINTS,
+    "share": SHARE,
+    "voxel": np.array(0.02),
+    "robot": np.array("katana450"),
+    "tool": np.array("tcp"),
+}
 
 
 @pytest.mark.parametrize(
@@ -103,6 +112,12 @@ GOOD = {"format": np.array(FORMAT), "points": POINTS, "share": SHARE}
         ({"share": SHARE[:, None]}, "'share'"),
         ({"share": SHARE - 0.25}, "above 0"),
         ({"share": SHARE + 0.1}, "up to 1"),
+        ({"voxel": np.array(0.0)}, "an edge of 0"),
+        ({"voxel": np.array(np.nan)}, "an edge of nan"),
+        ({"voxel": np.array("wide")}, "'voxel'"),
+        ({"voxel": SHARE}, "broken"),
+        ({"robot": np.array(3)}, "'robot'"),
+        ({"tool": np.array(1.5)}, "'tool'"),
     ],
 )
 def test_a_file_that_breaks_the_promise_is_refused(
@@ -115,7 +130,7 @@ def test_a_file_that_breaks_the_promise_is_refused(
     assert "map.npz" in str(refused.value)
 
 
-@pytest.mark.parametrize("key", ["format", "points", "share"])
+@pytest.mark.parametrize("key", list(GOOD))
 def test_a_file_without_a_key_is_refused(tmp_path: Path, key: str) -> None:
     path = tmp_path / "map.npz"
     np.savez(path, allow_pickle=True, **{name: GOOD[name] for name in GOOD if name != key})

@@ -4,24 +4,31 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.errors import InputError, RobotDescriptionError
-from app.geometry import screws, so3
+from app.geometry import screws, se3, so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward, joint_frames
 from app.kinematics.projection import project
-from app.robot.model import RobotModel
-from app.workspace.reachability import MOST_STEPS, Reachability, tool_poses
+from app.robot.model import RobotModel, load
+from app.workspace.reachability import MOST_STEPS, Reachability
+from tests.kinematics.family import member, random_offsets
+
+ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
 
 def reachability(
     model: RobotModel, *, tool: str = "tcp", table: float = 0.0, pitches: int = 8, rolls: int = 6
 ) -> Reachability:
-    return Reachability(model.arm.chain_to(tool), model.T_base_shoulder, table, pitches, rolls)
+    chain = model.arm.chain_to(tool or model.arm.default_tool)
+    return Reachability(chain, model.T_base_shoulder, table, pitches, rolls)
 
 
 def postures_inside(chain: Chain, count: int, seed: int) -> FloatArray:
@@ -47,26 +54,64 @@ def test_what_forward_kinematics_reaches_is_counted(model: RobotModel) -> None:
     assert (level.count(level.in_base(T[outward, :3, 3])) == 1).all()
 
 
-@pytest.mark.parametrize("tool", ["tcp", "flange"])
+def of_the_katana(model: RobotModel, tool: str) -> Reachability:
+    return reachability(model, tool=tool, table=-1.0)
+
+
+def of_another_arm(name: str) -> Reachability:
+    return reachability(load(ARMS / name), tool="", table=-1.0)
+
+
+def of_a_member(seed: int) -> Reachability:
+    """One with every offset that a tool on the roll axis leaves, and limits of its own."""
+    rng = np.random.default_rng(seed)
+    stand = se3.from_rotation_translation(so3.rotation_z(0.7), np.array([0.1, -0.2, 0.3]))
+    turned = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), np.zeros(3))
+    offsets = dataclasses.replace(
+        random_offsets(rng, lateral=True), radial=0.04, lateral=0.05, roll_offset=-0.03
+    )
+    chain = member(offsets, stand, turned)
+    lower, upper = rng.uniform(-2.9, -1.2, 5), rng.uniform(1.2, 2.9, 5)
+    limited = dataclasses.replace(chain, lower=lower, upper=upper)
+    return Reachability(limited, se3.inverse(stand), -2.0, 8, 6)
+
+
+@pytest.mark.parametrize(
+    "arm",
+    [
+        lambda model: of_the_katana(model, "tcp"),
+        lambda model: of_the_katana(model, "flange"),
+        lambda _: of_another_arm("pincherx_150.urdf"),
+        lambda _: of_another_arm("youbot_arm.urdf"),
+        lambda _: of_a_member(1),
+        lambda _: of_a_member(2),
+        lambda _: of_a_member(3),
+    ],
+    ids=["katana tcp", "katana flange", "pincher", "youbot", "member 1", "member 2", "member 3"],
+)
 def test_the_count_is_that_of_poses_the_projection_leaves_alone(
-    model: RobotModel, tool: str
+    model: RobotModel, arm: Callable[[RobotModel], Reachability]
 ) -> None:
     """Both ways: nothing is counted that the arm cannot do, and nothing it can is left out."""
-    every = reachability(model, tool=tool, table=-1.0)
-    chain = every.chain
+    every = arm(model)
+    chain, canonical = every.chain, arm_of(every.chain)
     q = postures_inside(chain, 5, 7)
     inside = np.array([forward(chain, each)[:3, 3] for each in q])
-    points = np.concatenate([inside, [[0.5, 0.3, 0.3], [-0.2, 0.01, 0.1], [0.9, 0.0, 0.0]]])
+    points = np.concatenate([inside, [[0.3, 0.2, 0.2], [-0.2, 0.01, 0.1], [0.9, 0.0, 0.0]]])
     rolls = [rotation_x(k * math.tau / every.rolls) for k in range(every.rolls)]
-    for p, count in zip(points, every.count(every.in_base(points)), strict=True):
-        possible = 0
-        for T in tool_poses(p[None], every.pitches)[0]:
-            for roll in rolls:
-                asked = T.copy()
-                asked[:3, :3] = T[:3, :3] @ roll
-                nearest = project(chain, asked)
-                possible += nearest.position_error < 1e-8 and nearest.rotation_error < 1e-8
-        assert count == possible
+    in_canonical = points @ canonical.T_C_S[:3, :3].T + canonical.T_C_S[:3, 3]
+    for p, count in zip(in_canonical, every.count(every.in_base(points)), strict=True):
+        possible = np.zeros((every.pitches, every.rolls), dtype=bool)
+        for poses in every.tool_poses(p[None]):
+            for pitch, T in enumerate(poses[0]):
+                for number, roll in enumerate(rolls):
+                    asked = T.copy()
+                    R_K_tool = canonical.T_K_tool[:3, :3]
+                    asked[:3, :3] = T[:3, :3] @ R_K_tool.T @ roll @ R_K_tool
+                    nearest = project(chain, asked)
+                    exact = nearest.position_error < 1e-8 and nearest.rotation_error < 1e-8
+                    possible[pitch, number] |= exact
+        assert count == possible.sum()
     assert every.count(every.in_base(inside)).max() > 0
 
 
@@ -94,7 +139,6 @@ def test_elbow_and_wrist_keep_off_the_table(model: RobotModel) -> None:
     chain = model.arm.chain
     q = postures_inside(chain, 300, 11)
     points = [screws.point_on(S) for S in chain.S.T]
-    T = np.array([forward(chain, each) for each in q])
     frames = np.array([joint_frames(chain, each) for each in q])
     heights = np.stack(
         [
@@ -104,7 +148,7 @@ def test_elbow_and_wrist_keep_off_the_table(model: RobotModel) -> None:
     )
     shoulder = model.T_base_shoulder[2, 3]
     for table in (0.1, 0.3, 0.4):
-        found = reachability(model, table=table).clear(T, q[:, None])[:, 0]
+        found = reachability(model, table=table).clear(q)
         assert np.array_equal(found, (heights + shoulder >= table).all(axis=0))
         assert 0 < found.sum() < len(q) or table == 0.1
 
@@ -153,12 +197,12 @@ def test_steps_that_are_none_are_refused(model: RobotModel, steps: int) -> None:
 def test_an_arm_that_does_not_stand_upright_is_refused(model: RobotModel) -> None:
     leaning = np.array(model.T_base_shoulder)
     leaning[:3, :3] = rotation_x(0.1)
-    with pytest.raises(RobotDescriptionError, match="base must stand upright"):
+    with pytest.raises(RobotDescriptionError, match="axis 1 must be upright"):
         Reachability(model.arm.chain, leaning, 0.0, 4, 4)
 
 
-def test_a_tool_that_does_not_roll_about_its_x_axis_is_refused(model: RobotModel) -> None:
+def test_a_tool_point_beside_the_roll_axis_is_refused(model: RobotModel) -> None:
     M = np.array(model.arm.chain.M)
-    M[:3, :3] = so3.exp(np.array([0.0, 0.2, 0.0]))
+    M[2, 3] += 0.02
     with pytest.raises(RobotDescriptionError, match="tool"):
         Reachability(model.arm.chain.with_tool(M), model.T_base_shoulder, 0.0, 4, 4)
