@@ -19,7 +19,7 @@ from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList
-from app.view.reachability import Cut, ReachabilityCloud
+from app.view.looks import Shows, add_shows, add_views
 from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, degrees
 
 ANGLE_WORTH_SENDING = 2e-6
@@ -55,8 +55,7 @@ class Panel:
         server: viser.ViserServer,
         model: RobotModel,
         put: Callable[[cmd.Command], int],
-        show_ellipsoid: Callable[[bool], None],
-        reachability: ReachabilityCloud | None,
+        shows: Shows,
         state: State,
     ) -> None:
         """``put`` takes a command; ``state`` is what the panel shows first."""
@@ -66,6 +65,7 @@ class Panel:
         self._told_at = -math.inf
         self._told = ""
         self._readout = self._gui.add_html(readout.page(model, state))
+        add_views(self._gui, shows)
         with self._gui.add_folder("Joints"):
             self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
             self._gripper = self._finger(state) if model.arm.gripper.moves else None
@@ -81,9 +81,7 @@ class Panel:
         with self._gui.add_folder("Branches", expand_by_default=False):
             self._branches = BranchList(server, model, self._on_person, state)
         with self._gui.add_folder("Show", expand_by_default=False):
-            self._ellipsoid(show_ellipsoid)
-            if reachability is not None:
-                self._reachability(reachability)
+            add_shows(self._gui, shows)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s].
@@ -177,21 +175,6 @@ class Panel:
             return cmd.SetPose(typed_pose(position.value, angles.value))
 
         self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
-
-    def _ellipsoid(self, show: Callable[[bool], None]) -> None:
-        box = self._gui.add_checkbox(
-            "Velocity ellipsoid",
-            initial_value=False,
-            hint="How fast the tool point can go in each direction: flat where one is lost",
-        )
-        box.on_update(lambda _: show(box.value))
-
-    def _reachability(self, cloud: ReachabilityCloud) -> None:
-        names = tuple(cut.value for cut in Cut)
-        cuts = self._gui.add_dropdown(
-            "Reachability", names, initial_value=Cut.HIDDEN.value, hint=cloud.legend
-        )
-        cuts.on_update(lambda _: cloud.show(Cut(cuts.value)))
 
     def _on_person(
         self,

@@ -149,35 +149,3 @@ def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     # One vertex a corner: half of what goes over the wire.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     return mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces)
-
-
-FLOOR = (226, 231, 236)
-SKY = (247, 249, 251)
-
-
-def furnish(server: viser.ViserServer) -> None:
-    """The room: floor and light."""
-    scene = server.scene
-    scene.add_grid(
-        "/floor",
-        infinite_grid=True,
-        cell_size=0.05,
-        cell_thickness=0.6,
-        cell_color=(205, 211, 218),
-        section_size=0.25,
-        section_thickness=1.0,
-        section_color=(172, 181, 192),
-        plane_color=FLOOR,
-        plane_opacity=1.0,
-        fade_distance=5.0,
-        shadow_opacity=0.35,
-        # A hair below the table top, so that the foot of the arm does not flicker in it.
-        position=(0.0, 0.0, -5e-4),
-    )
-    scene.set_background_image(_gradient(SKY, FLOOR), format="png")
-    scene.configure_environment_map("studio", environment_intensity=0.35)
-
-
-def _gradient(top: tuple[int, int, int], bottom: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
-    rows = np.linspace(top, bottom, 128).round().astype(np.uint8)
-    return np.repeat(rows[:, None, :], 2, axis=1)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
-import math
 import socket
 
 import viser
 
 from app.errors import ConfigurationError
+from app.view.brand import dress
+from app.view.cameras import FOV, LOOKS, Preset
 from app.view.guard import Guard
-
-BRAND = (36, 119, 212)
 
 
 def open_server(host: str, port: int) -> viser.ViserServer:
@@ -37,15 +36,14 @@ def open_server(host: str, port: int) -> viser.ViserServer:
 
 def _dress(server: viser.ViserServer) -> None:
     """What a page takes over when it connects, and so must stand before the first one does."""
-    server.gui.configure_theme(
-        control_width="medium", show_logo=False, show_share_button=False, brand_color=BRAND
-    )
+    dress(server.gui, dark=False)
     server.gui.set_panel_label("Katana450")
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")
-    server.initial_camera.position = (0.98, -0.82, 0.62)
-    server.initial_camera.look_at = (0.17, 0.0, 0.25)
-    server.initial_camera.fov = math.radians(40.0)
+    look = LOOKS[Preset.FREE]
+    server.initial_camera.position = look.position
+    server.initial_camera.look_at = look.target
+    server.initial_camera.fov = FOV
 
 
 def _check_free(host: str, port: int) -> None:

@@ -19,11 +19,14 @@ from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
+from app.view.cameras import Cameras, Preset
 from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
+from app.view.looks import Shows
 from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.reachability import ReachabilityCloud
-from app.view.scene import ArmNodes, Colour, Gap, GhostNodes, furnish
+from app.view.room import furnish
+from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
@@ -69,7 +72,9 @@ class View:
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
-        self._panel = Panel(server, model, mailbox.put, self._show_ellipsoid, cloud, state)
+        self._cameras = Cameras(server, model)
+        shows = Shows(self._show_ellipsoid, self._look_from, cloud)
+        self._panel = Panel(server, model, mailbox.put, shows, state)
         self._show(loop.snapshot)
 
     def start(self) -> None:
@@ -95,6 +100,9 @@ class View:
     def _show_ellipsoid(self, visible: bool) -> None:
         self._ellipsoid.show(visible, self._loop.snapshot.state)
 
+    def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
+        self._cameras.give(client, preset, self._loop.snapshot.state)
+
     def _run(self) -> None:
         seen = self._loop.snapshot
         settled = True
@@ -114,6 +122,7 @@ class View:
             self._arm.move(self._model.joint_angles(state.q, state.gripper))
             self._show_goal(state)
             self._ellipsoid.follow(state)
+            self._cameras.follow(state)
             self._panel.follow(
                 state,
                 time.perf_counter(),

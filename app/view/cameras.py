@@ -1,0 +1,103 @@
+"""Where to look from: named views for one browser at a time."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import viser
+
+from app.control.state import State
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+
+FOV = np.deg2rad(40.0)
+"""[rad] Vertical; that of a lens which does not bend the arm."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """A camera at ``position``, turned to ``target``; both [m] in the base frame."""
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+class Preset(Enum):
+    """The views a person can ask for; only the last one follows the arm."""
+
+    FREE = "3D"
+    FRONT = "Front"
+    SIDE = "Side"
+    TOP = "Top"
+    TOOL = "Tool"
+
+
+LOOKS = {
+    Preset.FREE: Look((0.98, -0.82, 0.62), (0.17, 0.0, 0.25)),
+    Preset.FRONT: Look((1.55, 0.0, 0.42), (0.0, 0.0, 0.33)),
+    Preset.SIDE: Look((0.2, -1.4, 0.38), (0.2, 0.0, 0.33)),
+    # Not from straight above: a camera that looks along up has no up.
+    Preset.TOP: Look((0.2, -0.01, 1.75), (0.2, 0.0, 0.2)),
+}
+
+BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
+"""[m] Where the camera rides on the tool, and how far ahead of the tool point it looks."""
+
+
+class Cameras:
+    """Turns cameras; a browser that rides on the tool does so until it is given another view."""
+
+    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
+        self._model = model
+        self._riding: dict[int, viser.ClientHandle] = {}
+        self._lock = threading.Lock()
+        server.on_client_disconnect(self._forget)
+
+    def give(self, client: viser.ClientHandle, preset: Preset, state: State) -> None:
+        """Show ``client`` the arm from ``preset``."""
+        with self._lock:
+            self._riding.pop(client.client_id, None)
+            if preset is Preset.TOOL:
+                self._riding[client.client_id] = client
+        _turn(client, LOOKS.get(preset) or self._on_tool(state))
+
+    def follow(self, state: State) -> None:
+        """Take the cameras that ride on the tool along."""
+        with self._lock:
+            riding = list(self._riding.values())
+        for client in riding:
+            _turn(client, self._on_tool(state))
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._riding.pop(client.client_id, None)
+
+    def _on_tool(self, state: State) -> Look:
+        chain = self._model.arm.chain_to(state.tool)
+        T = self._model.T_base_shoulder @ forward(chain, state.q)
+        p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
+        # Above in the arm's plane, however the tool is rolled.
+        up = z - (z @ x) * x
+        size = float(np.linalg.norm(up))
+        up = up / size if size > LEAST_UP else -T[:3, 2]
+        return Look(_triple(p - BEHIND * x + ABOVE * up), _triple(p + AHEAD * x))
+
+
+LEAST_UP = 0.05
+"""The tool upright: up in its plane is no longer told by gravity."""
+
+
+def _turn(client: viser.ClientHandle, look: Look) -> None:
+    with client.atomic():
+        client.camera.up_direction = (0.0, 0.0, 1.0)
+        client.camera.position = look.position
+        client.camera.look_at = look.target
+
+
+def _triple(p: FloatArray) -> tuple[float, float, float]:
+    x, y, z = p.tolist()
+    return x, y, z

@@ -1,0 +1,65 @@
+"""Controls that change what is seen and nothing else: camera, theme, what is drawn besides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from app.view.cameras import Preset
+from app.view.reachability import Cut, ReachabilityCloud
+from app.view.room import THEMES, give
+
+
+@dataclass(frozen=True)
+class Shows:
+    """What the controls call.
+
+    ellipsoid: shows or hides it. look_from: turns one browser's camera. reachability: the map, if
+    one was given.
+    """
+
+    ellipsoid: Callable[[bool], None]
+    look_from: Callable[[viser.ClientHandle, Preset], None]
+    reachability: ReachabilityCloud | None
+
+
+def add_views(gui: viser.GuiApi, shows: Shows) -> None:
+    """A row of buttons, each for the browser it is clicked in."""
+    views = gui.add_button_group(
+        "View",
+        tuple(preset.value for preset in Preset),
+        hint="Where you look from; Tool rides on the tool until you choose another. "
+        "Drag, right-drag and wheel turn, shift and zoom",
+    )
+
+    @views.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            shows.look_from(event.client, Preset(views.value))
+
+
+def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
+    """The rest of them."""
+    themes = gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")
+
+    @themes.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            give(event.client, THEMES[themes.value])
+
+    box = gui.add_checkbox(
+        "Velocity ellipsoid",
+        initial_value=False,
+        hint="How fast the tool point can go in each direction: flat where one is lost",
+    )
+    box.on_update(lambda _: shows.ellipsoid(box.value))
+    cloud = shows.reachability
+    if cloud is not None:
+        names = tuple(cut.value for cut in Cut)
+        cuts = gui.add_dropdown(
+            "Reachability", names, initial_value=Cut.HIDDEN.value, hint=cloud.legend
+        )
+        cuts.on_update(lambda _: cloud.show(Cut(cuts.value)))

@@ -1,0 +1,86 @@
+"""Cameras and themes: what is seen changes in one window, and nothing else changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.settings import Settings
+from app.view.cameras import AHEAD, LOOKS, Preset
+from app.view.room import DARK, LIGHT
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+
+READY = np.array(Settings().ready)
+MOVE = "/target/move"
+
+
+def seen_from(page: ViserPage) -> tuple[FloatArray, FloatArray]:
+    """Where the camera stands and where it looks, in the base frame."""
+    told = page.sent("ViewerCameraMessage")[-1].body
+    return np.array(told["position"]), np.array(told["look_at"])
+
+
+def wait_for_look(page: ViserPage, position: FloatArray, target: FloatArray) -> None:
+    page.wait_until(
+        lambda: np.allclose(np.stack(seen_from(page)), [position, target], atol=1e-3),
+        f"a camera at {position}",
+    )
+
+
+def test_each_window_looks_from_where_its_person_asks(
+    open_page: OpenPage, model: RobotModel, artefacts: Path
+) -> None:
+    chain = model.arm.chain
+    with AppServer() as server:
+        page, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
+        others = seen_from(other)
+        for preset, look in LOOKS.items():
+            page.click_button(preset.value)
+            wait_for_look(page, np.array(look.position), np.array(look.target))
+            page.screenshot(artefacts / f"look-{preset.value.lower()}.png")
+
+        page.click_button(Preset.TOOL.value)
+
+        def on_tool(q: FloatArray) -> FloatArray:
+            T = model.T_base_shoulder @ forward(chain, q)
+            ahead: FloatArray = T[:3, 3] + AHEAD * T[:3, 0]
+            return ahead
+
+        page.wait_until(lambda: np.allclose(seen_from(page)[1], on_tool(READY), atol=1e-3), "it")
+        page.screenshot(artefacts / "look-tool.png")
+        page.click_button("Stretch")
+        page.wait_until(
+            lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
+            "the camera to ride along",
+        )
+        page.click_button(Preset.SIDE.value)
+        page.click_button("Home")
+        page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+        side = LOOKS[Preset.SIDE]
+        wait_for_look(page, np.array(side.position), np.array(side.target))
+        assert np.allclose(np.stack(seen_from(other)), np.stack(others), atol=1e-3)
+        assert page.errors == other.errors == []
+
+
+def test_a_theme_is_of_one_window(open_page: OpenPage, artefacts: Path) -> None:
+    with AppServer() as server:
+        page, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
+
+        def corner(window: ViserPage) -> FloatArray:
+            patch = window.picture()[760:790, 20:60].reshape(-1, 3)
+            return np.asarray(np.median(patch, axis=0), dtype=float)
+
+        page.page.get_by_text("Show", exact=True).click()
+        page.click_button("Dark")
+        page.wait_until(lambda: corner(page).max() < max(DARK.floor) + 30, "the night")
+        page.screenshot(artefacts / "look-dark.png")
+        assert corner(other).min() > min(LIGHT.floor) - 40
+        page.click_button("Light")
+        page.wait_until(lambda: corner(page).min() > min(LIGHT.floor) - 40, "the day")
+        assert page.errors == other.errors == []
