@@ -1,0 +1,146 @@
+"""Setpoints inside position, speed, acceleration and jerk, whatever is asked and whenever."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.geometry.arrays import FloatArray
+from app.motion.limiter import Limiter, Limits, Motion
+
+DT = 0.01
+LIMITS = Limits(
+    lower=np.array([-3.0, -2.0, -2.0, -1.9, -2.8]),
+    upper=np.array([2.8, 0.13, 2.2, 1.8, 2.9]),
+    speed=np.array([2.2, 1.2, 2.4, 2.2, 2.9]),
+    acceleration=np.array([2.4, 1.3, 2.6, 2.4, 3.1]),
+    jerk=np.array([24.0, 13.0, 26.0, 24.0, 31.0]),
+)
+
+
+@pytest.fixture
+def limiter() -> Limiter:
+    return Limiter(LIMITS)
+
+
+def inside(rng: np.random.Generator) -> FloatArray:
+    return rng.uniform(LIMITS.lower, LIMITS.upper)
+
+
+def check(before: Motion, after: Motion, dt: float = DT) -> None:
+    """One step keeps to every limit, and is a step of a motion and not a leap."""
+    assert (after.q >= LIMITS.lower - 1e-9).all()
+    assert (after.q <= LIMITS.upper + 1e-9).all()
+    assert (np.abs(after.qd) <= LIMITS.speed * (1 + 1e-9)).all()
+    assert (np.abs(after.qdd) <= LIMITS.acceleration * (1 + 1e-9)).all()
+    assert (np.abs(after.qdd - before.qdd) <= LIMITS.jerk * dt * (1 + 1e-6) + 1e-8).all()
+    assert (np.abs(after.qd - before.qd) <= LIMITS.acceleration * dt * (1 + 1e-6) + 1e-8).all()
+    assert (np.abs(after.q - before.q) <= LIMITS.speed * dt * (1 + 1e-6) + 1e-9).all()
+
+
+def test_a_move_ends_at_rest_exactly_at_its_goal(limiter: Limiter) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        start, goal = inside(rng), inside(rng)
+        motion = Motion.rest(start)
+        for _ in range(2000):
+            after = limiter.towards(motion, goal, DT)
+            check(motion, after)
+            # On the straight line between the two, from rest.
+            way = goal - start
+            share = (after.q - start) @ way / (way @ way)
+            assert np.abs(after.q - start - share * way).max() < 1e-6
+            motion = after
+            if motion.at_rest:
+                break
+        assert np.array_equal(motion.q, goal)
+
+
+def test_goals_that_change_at_any_tick_break_no_limit(limiter: Limiter) -> None:
+    rng = np.random.default_rng(2)
+    motion, goal, share = Motion.rest(inside(rng)), inside(rng), 1.0
+    for tick in range(8000):
+        if rng.random() < 0.15:
+            # Limits are goals more often than chance would have it.
+            goal = inside(rng)
+            ends = rng.random(5) < 0.3
+            goal[ends] = np.where(rng.random(5) < 0.5, LIMITS.lower, LIMITS.upper)[ends]
+        if rng.random() < 0.02:
+            share = float(rng.uniform(0.05, 1.0))
+        stopping = tick % 400 > 380
+        after = limiter.stop(motion, DT) if stopping else limiter.towards(motion, goal, DT, share)
+        check(motion, after)
+        motion = after
+
+
+def test_a_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        motion, goal = Motion.rest(inside(rng)), inside(rng)
+        for _ in range(int(rng.integers(5, 120))):
+            motion = limiter.towards(motion, goal, DT)
+        halt, time = limiter.halt(motion), limiter.time_to_halt(motion)
+        # No jerk-limited stop is faster than at full braking, nor slower than that after the
+        # jerk it takes to get there and away from there.
+        bang = (np.abs(motion.qd) / LIMITS.acceleration).max()
+        assert bang <= time + 1e-9
+        assert time <= bang + 3.0 * (LIMITS.acceleration / LIMITS.jerk).max()
+        ticks = 0
+        while not motion.at_rest:
+            after = limiter.stop(motion, DT)
+            check(motion, after)
+            motion, ticks = after, ticks + 1
+        assert ticks <= np.ceil(time / DT) + 1
+        assert np.abs(motion.q - halt).max() < 1e-6
+
+
+def test_a_share_of_the_speed_is_kept(limiter: Limiter) -> None:
+    motion, goal = Motion.rest(np.zeros(5)), LIMITS.lower
+    fastest = np.zeros(5)
+    for _ in range(3000):
+        motion = limiter.towards(motion, goal, DT, 0.25)
+        fastest = np.maximum(fastest, np.abs(motion.qd))
+    assert (fastest <= 0.25 * LIMITS.speed * (1 + 1e-9)).all()
+    assert (fastest / LIMITS.speed).max() > 0.249
+    assert np.array_equal(motion.q, goal)
+
+
+def test_rates_are_reached_and_brake_before_a_limit(limiter: Limiter) -> None:
+    rng = np.random.default_rng(4)
+    motion = Motion.rest(inside(rng))
+    for _ in range(60):
+        qd = rng.uniform(-1.5, 1.5, 5) * LIMITS.speed
+        for _ in range(int(rng.integers(1, 150))):
+            after = limiter.at_rate(motion, qd, DT)
+            check(motion, after)
+            motion = after
+    motion = Motion.rest(np.zeros(5))
+    slow = 0.1 * LIMITS.speed * (1, -1, 1, 1, -1)
+    for _ in range(100):
+        motion = limiter.at_rate(motion, slow, DT)
+    assert np.allclose(motion.qd, slow)
+
+
+def test_nothing_moves_without_time_or_reason(limiter: Limiter) -> None:
+    motion = Motion.rest(np.zeros(5))
+    assert limiter.towards(motion, LIMITS.upper, 0.0) is motion
+    assert limiter.towards(motion, np.zeros(5), DT) is motion
+    assert limiter.stop(motion, DT) is motion
+    assert limiter.time_to_halt(motion) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("speed", [0.0] * 5),
+        ("acceleration", [-1.0] * 5),
+        ("jerk", [np.nan] * 5),
+        ("upper", [-9.0] * 5),
+        ("lower", [0.0] * 4),
+    ],
+)
+def test_limits_that_are_none_are_refused(name: str, value: list[float]) -> None:
+    values = {key: getattr(LIMITS, key) for key in ("lower", "upper", "speed", "acceleration")}
+    with pytest.raises(InputError):
+        Limits(**{**values, "jerk": LIMITS.jerk, name: np.array(value)})
