@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.turns import in_limits_turn
+from app.robot.conduit import Hinge, Stretch, read_stretches
 from app.robot.visual import Visual, rods, visuals_of
 from robot_description import URDF_PATH
 
@@ -26,6 +28,9 @@ SHOULDER_FRAME = "shoulder_frame"
 
 TOOL_FRAMES = ("tcp", "grasp", "flange")
 """Links that targets can be set for where the file has them; the first is the default."""
+
+CONDUITS = "conduits.json"
+"""File beside the URDF that says where its conduit is held."""
 
 TURNING = ("revolute", "continuous")
 """Types of joint an arm is made of; a continuous one is given half a turn either way."""
@@ -66,6 +71,7 @@ class RobotModel:
         arm: chain in {S}, tools, gripper.
         T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table.
         bodies: every link, parents first.
+        stretches: the free runs of the conduit, if it has one.
         fingers: driven and following finger joints: angle = factor * driven + offset.
         notes: sentences for a person on what was taken for granted in the file.
     """
@@ -75,6 +81,7 @@ class RobotModel:
     T_base_shoulder: FloatArray
     bodies: tuple[Body, ...]
     fingers: Mapping[str, tuple[float, float]]
+    stretches: tuple[Stretch, ...] = ()
     notes: tuple[str, ...] = ()
 
     def ready(self, posture: Sequence[float]) -> FloatArray:
@@ -141,6 +148,9 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
         T_base_shoulder=frozen(T_base_shoulder),
         bodies=bodies,
         fingers=_follow(fingers),
+        stretches=read_stretches(
+            path.parent / CONDUITS, lambda start, end: _hinge(bodies, chain, start, end)
+        ),
         notes=(*notes, *(f"There is no mesh at {mesh}." for mesh in missing)),
     )
 
@@ -246,6 +256,30 @@ def _follow(fingers: list[Any]) -> dict[str, tuple[float, float]]:
         else (float(joint.mimic.multiplier), float(joint.mimic.offset))
         for joint in fingers
     }
+
+
+def _hinge(bodies: Sequence[Body], chain: Chain, start: str, end: str) -> Hinge:
+    """The one joint between two links; KeyError when there is not one."""
+    by_name = {body.name: body for body in bodies}
+    way: list[Body] = []
+    name: str | None = end
+    while name != start:
+        if name is None:
+            raise KeyError(f"{end} does not hang on {start}")
+        way.insert(0, by_name[name])
+        name = way[0].parent
+    driven = [i for i, body in enumerate(way) if body.joint in chain.names]
+    if len(driven) != 1:
+        raise KeyError(f"there are {len(driven)} driven joints between {start} and {end}, not one")
+    at = driven[0]
+    before, after = (
+        functools.reduce(np.matmul, (body.T_parent_body for body in some), np.eye(4))
+        for some in (way[: at + 1], way[at + 1 :])
+    )
+    joint, axis = way[at].joint or "", way[at].axis
+    number = chain.names.index(joint)
+    lower, upper = float(chain.lower[number]), float(chain.upper[number])
+    return Hinge(joint, axis, lower, upper, before, after)
 
 
 def _bodies(

@@ -20,6 +20,7 @@ from app.robot.model import RobotModel
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
 from app.view.cameras import Cameras, Preset
+from app.view.conduit import Conduits
 from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
@@ -67,6 +68,7 @@ class View:
         furnish(server)
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
+        self._conduits = Conduits(server, model, self._arm)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
@@ -119,7 +121,9 @@ class View:
     def _show(self, snapshot: Snapshot) -> None:
         state = snapshot.state
         with self._server.atomic():
-            self._arm.move(self._model.joint_angles(state.q, state.gripper))
+            angles = self._model.joint_angles(state.q, state.gripper)
+            self._arm.move(angles)
+            self._conduits.move(angles)
             self._show_goal(state)
             self._ellipsoid.follow(state)
             self._cameras.follow(state)
