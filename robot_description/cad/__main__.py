@@ -6,11 +6,11 @@ import argparse
 import time
 from pathlib import Path
 
-from robot_description.cad.build import MESHES, build
+from robot_description.cad.build import MESHES, build, write_conduits
 
 
 def main() -> None:
-    """Write the meshes and print a line for each, then the total."""
+    """Write the meshes and the conduit's ends; print a line for each mesh, then the total."""
     parser = argparse.ArgumentParser(
         prog="python -m robot_description.cad", description="Build the meshes of the URDF."
     )
@@ -33,6 +33,8 @@ def main() -> None:
         triangles += built.triangles
         size += built.size
         materials += built.materials
+    if folder == MESHES:
+        write_conduits()
     print(f"{'total':<20}{materials:>10}{triangles:>11}{size:>10}{before - start:>9.2f}")
 
 
