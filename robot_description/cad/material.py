@@ -33,6 +33,29 @@ PLASTIC = Material("black plastic", _hex("343437"), 0.0, 0.55)
 PANEL = Material("light panel", _hex("e2e2de"), 0.0, 0.55)
 GREEN = Material("terminal green", _hex("1f8a4d"), 0.0, 0.50)
 BLUE = Material("blue lettering", _hex("24479e"), 0.0, 0.50)
+BRASS = Material("brass", _hex("c9a15a"), 0.45, 0.38)
+LENS = Material("sensor window", _hex("64202c"), 0.0, 0.30)
+PAD = Material("black pad", _hex("3b3b3f"), 0.0, 0.62)
+MELAMINE = Material("white melamine", _hex("ece9e2"), 0.0, 0.38)
+RIM = Material("blue rim", _hex("2c4f86"), 0.0, 0.38)
+LAMINATE = Material("grey laminate", _hex("8e9497"), 0.0, 0.85)
+BIRCH = Material("birch edge", _hex("c8a97a"), 0.0, 0.75)
 
-MATERIALS: tuple[Material, ...] = (ALUMINIUM, BRIGHT, STEEL, RUBBER, PLASTIC, PANEL, GREEN, BLUE)
+MATERIALS: tuple[Material, ...] = (
+    ALUMINIUM,
+    BRIGHT,
+    STEEL,
+    RUBBER,
+    PLASTIC,
+    PANEL,
+    GREEN,
+    BLUE,
+    BRASS,
+    LENS,
+    PAD,
+    MELAMINE,
+    RIM,
+    LAMINATE,
+    BIRCH,
+)
 """In the order their primitives are written."""

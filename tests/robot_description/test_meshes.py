@@ -14,8 +14,8 @@ from trimesh.visual.texture import TextureVisuals
 from robot_description import URDF_PATH
 
 MESHES = URDF_PATH.parent / "meshes"
-TRIANGLE_BUDGET = 45_000
-BYTE_BUDGET = 1_200_000
+TRIANGLE_BUDGET = 60_000
+BYTE_BUDGET = 1_500_000
 TOLERANCE = 5.0  # mm
 
 # Outer sizes in mm in the link's frame: (x, y, z) ranges. The black covers in the fork slots stand
