@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from robot_description import URDF_PATH
-from robot_description.cad.build import MESHES, Built, build
+from robot_description.cad.build import CONDUITS, MESHES, Built, build, write_conduits
 from robot_description.cad.mass import write_inertials
 from robot_description.cad.props import PROPS, build_props
 from robot_description.cad.stl import STL, build_stl
@@ -34,7 +34,7 @@ def _report(title: str, files: Iterable[Built]) -> None:
 
 
 def main() -> None:
-    """Write meshes, props, STL files and the inertials in the URDF."""
+    """Write meshes, props, STL files, the conduit's ends and the inertials in the URDF."""
     parser = argparse.ArgumentParser(
         prog="python -m robot_description.cad",
         description="Build meshes, props and STL files, and write the inertials into the URDF.",
@@ -50,6 +50,7 @@ def main() -> None:
     _report("meshes", build(folder / MESHES.name))
     _report("props", build_props(folder / PROPS.name))
     _report("stl", build_stl(folder / STL.name))
+    write_conduits(folder / CONDUITS.name)
     urdf = folder / URDF_PATH.name
     if urdf != URDF_PATH:
         urdf.write_text(URDF_PATH.read_text("utf-8"), "utf-8")

@@ -9,18 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_description.cad.arm import forearm_link, upper_arm_link, wrist_link
-from robot_description.cad.column import arm_base_link, pan_link
+from robot_description.cad.column import arm_base_link
+from robot_description.cad.conduit import conduits_json
 from robot_description.cad.control_box import base_link
 from robot_description.cad.fingers import finger_left_link, finger_right_link
+from robot_description.cad.forearm import forearm_link
 from robot_description.cad.glb import Primitive, glb_bytes
 from robot_description.cad.gripper import gripper_link
 from robot_description.cad.part import Part
 from robot_description.cad.roll import roll_link
 from robot_description.cad.shading import shade, weld
+from robot_description.cad.shoulder import pan_link
+from robot_description.cad.upper_arm import upper_arm_link
+from robot_description.cad.wrist import wrist_link
 
 MILLIMETRE = 0.001
 MESHES = Path(__file__).resolve().parent.parent / "meshes"
+CONDUITS = MESHES.parent / "conduits.json"
 
 PARTS: tuple[Callable[[], Part], ...] = (
     base_link,
@@ -79,3 +84,8 @@ def build(folder: Path = MESHES) -> Iterator[Built]:
     folder.mkdir(parents=True, exist_ok=True)
     for part in parts():
         yield write_glb(part, folder)
+
+
+def write_conduits(path: Path = CONDUITS) -> None:
+    """Write where the conduit is held, for whoever draws it."""
+    path.write_text(conduits_json(), encoding="utf-8")

@@ -1,27 +1,45 @@
-"""What several links carry alike: hubs, terminal boxes, cable glands, screws; mm."""
+"""What several links carry alike: hubs, boxes, conduit fittings, screws, names; mm."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Literal
 
-from robot_description.cad.lettering import lettering
-from robot_description.cad.material import ALUMINIUM, BLUE, BRIGHT, PLASTIC, RUBBER, STEEL
-from robot_description.cad.outline import octagon
+from manifold3d import Manifold
+
+from robot_description.cad import conduit
+from robot_description.cad.conduit import Eye, Gland
+from robot_description.cad.lettering import lettering, wrapped
+from robot_description.cad.material import ALUMINIUM, BLUE, BRIGHT, PLASTIC, STEEL
+from robot_description.cad.outline import circle, octagon
 from robot_description.cad.part import Part
-from robot_description.cad.solid import Direction, Point, Range, block, lathe, placed, prism, rod
+from robot_description.cad.solid import (
+    Direction,
+    Point,
+    Range,
+    aimed,
+    around,
+    ball,
+    block,
+    lathe,
+    placed,
+    prism,
+    rod,
+)
 
 Sideways = Literal["+y", "-y"]
 
 SCREW_HEAD_HEIGHT = 1.6
 SOCKET_SHARE = 0.5  # of the head's diameter
-GLAND_NUT = 15.0  # diameter
-GLAND_NUT_HEIGHT = 4.0
-HOSE_RIB, HOSE_GROOVE = 12.0, 9.6  # diameters
-HOSE_PITCH = 3.2
-DISC_EDGE = 2.6
+GLAND_NUT = 18.0  # across flats
+SLEEVE_DIAMETER, SLEEVE_MOUTH = 19.6, 14.4
+EYE_DIAMETER = 22.0
+DISC_EDGE, DISC_GAP = 4.0, 1.4
+STAR_SCREWS, STAR_CIRCLE, STAR_SCREW = 6, 0.26, 0.19  # shares of the cap's diameter
 LETTER_STANDS = 0.2
 BORE_CLEARANCE = 0.6  # on the diameter
+SEAM_WIDTH, SEAM_DEPTH = 1.0, 0.9
 
 
 def screws(part: Part, points: Iterable[Point], toward: Direction, head: float) -> None:
@@ -30,51 +48,88 @@ def screws(part: Part, points: Iterable[Point], toward: Direction, head: float) 
         part.add(
             STEEL,
             lathe(
-                [(-0.8, head / 2, 0.0), (SCREW_HEAD_HEIGHT, head / 2, 0.0)], toward, at, segments=12
+                [(-0.8, head / 2, 0.0), (SCREW_HEAD_HEIGHT, head / 2, 0.0)], toward, at, segments=10
             ),
         )
         socket = SOCKET_SHARE * head
         part.cut(rod(socket, SCREW_HEAD_HEIGHT - 0.9, 4.0, toward, at, segments=6), of=STEEL)
 
 
-def gland(part: Part, at: Point, toward: Direction, ribs: int) -> None:
-    """Set a cable gland with the first ``ribs`` ribs of its corrugated hose on a surface."""
+def gland(part: Part, fitting: Gland) -> None:
+    """Set a swivel gland: nut, ball and the sleeve that the conduit goes into."""
+    x, y, z = fitting.at
+    nut = prism(octagon(GLAND_NUT), -1.0, conduit.NUT_HEIGHT, (0.0, 1.0))
+    radius, mouth = SLEEVE_DIAMETER / 2, conduit.SLEEVE_LENGTH
+    sleeve = lathe(
+        [
+            (1.5, radius - 2.2, 0.0),
+            (4.5, radius, 0.0),
+            (mouth, radius, 1.2),
+            (mouth, SLEEVE_MOUTH / 2, 0.0),
+            (mouth - conduit.INSERTED - 1.0, SLEEVE_MOUTH / 2, 0.0),
+        ],
+        segments=18,
+    )
     part.add(
         PLASTIC,
-        placed(prism(octagon(GLAND_NUT), -1.0, GLAND_NUT_HEIGHT, (0.0, 0.8)), toward, at),
+        placed(nut, "+y", (x, y, z)),
+        ball(GLAND_NUT - 2.0, fitting.swivel, 12),
+        aimed(sleeve, fitting.outward, fitting.swivel),
     )
-    profile = []
-    for k in range(ribs):
-        start = GLAND_NUT_HEIGHT - 0.5 + k * HOSE_PITCH
-        for share, diameter in ((0.0, HOSE_GROOVE), (0.5, HOSE_RIB)):
-            profile.append((start + share * HOSE_PITCH, diameter / 2, 0.0))
-    profile.append((GLAND_NUT_HEIGHT - 0.5 + ribs * HOSE_PITCH, HOSE_GROOVE / 2, 0.0))
-    part.add(RUBBER, lathe(profile, toward, at, segments=14))
 
 
-def hub(part: Part, disc: Range, diameter: float, cap: float, end: float) -> None:
+def eye(part: Part, fitting: Eye, foot: Manifold) -> None:
+    """Set a ring that the conduit passes through upwards, on the bracket ``foot``."""
+    half = conduit.EYE_HALF
+    outer = rod(EYE_DIAMETER, -half, half, at=fitting.at, edge=1.4)
+    bore = rod(2 * conduit.RADIUS, -half - 1.0, half + 1.0, at=fitting.at)
+    part.add(PLASTIC, (outer + foot) - bore)
+
+
+def _disc(low: float, high: float, diameter: float, cap: float, toward: Direction) -> Manifold:
+    radius, dish = diameter / 2, cap / 2
+    return lathe(
+        [
+            (low, radius - 3.0, 0.0),
+            (low + DISC_GAP, radius - 3.0, 0.0),
+            (low + DISC_GAP, radius, 1.2),
+            (high, radius, DISC_EDGE),
+            (high, dish + 2.6, 0.0),
+            (high - 1.4, dish + 1.2, 0.0),
+        ],
+        toward,
+    )
+
+
+def hub(
+    part: Part, disc: Range, diameter: float, cap: float, end: float, star: bool = False
+) -> None:
     """Close a joint on both sides: a black disc over the range ``disc``, a silver cap to ``end``.
 
-    ``diameter`` is the disc's and ``cap`` the silver centre's.
+    ``diameter`` is the disc's and ``cap`` the silver centre's, which carries a ``star`` of screws
+    or a hole.
     """
     low, high = disc
     toward: Direction
     for toward in ("+y", "-y"):
+        part.add(PLASTIC, _disc(low, high, diameter, cap, toward))
+        hole = 0.1 * cap
         part.add(
-            PLASTIC,
+            BRIGHT,
             lathe(
                 [
-                    (low, diameter / 2, 0.0),
-                    (high, diameter / 2, DISC_EDGE),
-                    (high, cap / 2 + 5.0, 0.0),
-                    (high - 1.2, cap / 2 + 3.4, 0.0),
+                    (high - 3.0, cap / 2, 0.0),
+                    (end, cap / 2, 1.2),
+                    (end, hole, 0.0),
+                    (end - 1.6, hole, 0.0),
                 ],
                 toward,
             ),
         )
-        part.add(BRIGHT, rod(cap, high - 3.0, end, toward, edge=1.0))
-        part.cut(rod(0.2 * cap, end - 2.0, end + 1.0, toward, segments=12), of=BRIGHT)
-        part.add(STEEL, rod(0.3 * cap, end - 3.0, end - 1.4, toward, segments=12))
+        part.add(PLASTIC, rod(2.2 * hole, high - 3.0, end - 1.2, toward, segments=12))
+        for u, w in around(STAR_SCREWS, STAR_CIRCLE * cap) if star else ():
+            head = rod(STAR_SCREW * cap, end - 2.0, end + 0.9, toward, segments=10)
+            part.add(PLASTIC, head.translate((u, 0.0, w)))
 
 
 def name(part: Part, text: str, height: float, at: Point, toward: Sideways) -> None:
@@ -84,23 +139,57 @@ def name(part: Part, text: str, height: float, at: Point, toward: Sideways) -> N
     part.add(BLUE, (upright if toward == "-y" else upright.rotate((0.0, 0.0, 180.0))).translate(at))
 
 
+def name_round(text: str, height: float, radius: float, azimuth: float) -> Manifold:
+    """Return ``text`` to read round a cylinder about z, centred at ``azimuth`` degrees and z 0."""
+    ring = wrapped(text, height, 2 * LETTER_STANDS, radius - LETTER_STANDS)
+    return ring.rotate((0.0, 0.0, azimuth))
+
+
 def bored(part: Part, diameter: float, half_length: float, x: float = 0.0) -> None:
     """Bore everything there about the axis y at ``x`` for a shaft, out to both ``half_length``."""
     reach = half_length
     part.cut(rod(diameter + BORE_CLEARANCE, -reach, reach, "+y", (x, 0.0, 0.0)))
 
 
-def terminal_box(
-    part: Part, x: Range, y: Range, z: Range, glands: Iterable[float], ribs: int
-) -> None:
-    """Add a box with a lid and screws towards +y and a cable gland at each x of ``glands``."""
-    seam = 2.4
-    part.add(ALUMINIUM, block(x, (y[0], y[1] - seam - 0.7), z, 1.2))
+def seam(radius: float, at: float) -> list[tuple[float, float, float]]:
+    """Return the part of a lathe's profile that runs a groove round a cylinder at height ``at``."""
+    low, high, floor = at - SEAM_WIDTH / 2, at + SEAM_WIDTH / 2, radius - SEAM_DEPTH
+    return [(low, radius, 0.0), (low, floor, 0.0), (high, floor, 0.0), (high, radius, 0.0)]
+
+
+def terminal_box(part: Part, x: Range, y: Range, z: Range, glands: Iterable[Gland]) -> None:
+    """Add a box with a lid and screws towards +y and its ``glands``; a deep box has a second seam.
+
+    The seams show the dark core that the shells sit on.
+    """
+    gap = 0.8
+    lid, edge = y[1] - 3.2, 1.2
+    parting = [y[0] + 0.62 * (lid - y[0])] if lid - y[0] > 40.0 else []
+    for low, high in pairwise([y[0] - gap, *parting, lid - gap]):
+        part.add(ALUMINIUM, block(x, (low + gap, high), z, edge))
+    core = 0.9
     part.add(
-        STEEL, block((x[0] + 0.8, x[1] - 0.8), (y[0] + 3.0, y[1] - 1.0), (z[0] + 0.8, z[1] - 0.8))
+        STEEL,
+        block((x[0] + core, x[1] - core), (y[0] + 3.0, y[1] - 1.0), (z[0] + core, z[1] - core)),
     )
-    part.add(ALUMINIUM, block(x, (y[1] - seam, y[1]), z, 0.8))
-    inner = [(u, w) for u in (x[0] + 3.6, x[1] - 3.6) for w in (z[0] + 3.6, z[1] - 3.6)]
+    part.add(ALUMINIUM, block(x, (lid, y[1]), z, 0.8))
+    inner = [(u, w) for u in (x[0] + 3.4, x[1] - 3.4) for w in (z[0] + 3.4, z[1] - 3.4)]
     screws(part, [(u, y[1], w) for u, w in inner], "+y", 3.6)
-    for u in glands:
-        gland(part, (u, y[1], 0.0), "+y", ribs)
+    for each in glands:
+        gland(part, each)
+
+
+def plug(part: Part, at: Point, toward: Direction, diameter: float) -> None:
+    """Set a round panel connector with a knurled ring and a dark face."""
+    radius = diameter / 2
+    part.add(
+        BRIGHT,
+        lathe(
+            [(-1.0, radius, 0.0), (3.6, radius, 0.6), (3.6, radius - 1.6, 0.0)],
+            toward,
+            at,
+            segments=20,
+        ),
+    )
+    part.cut(placed(prism(circle(radius - 1.6, segments=16), 2.2, 6.0), toward, at), of=BRIGHT)
+    part.add(PLASTIC, rod(diameter - 2.4, -0.5, 2.4, toward, at, segments=16))

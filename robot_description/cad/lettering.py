@@ -1,41 +1,92 @@
-"""Raised capitals and digits made of straight strokes, for the name on the arm; mm."""
+"""Raised letters and digits made of mitred strokes, for the name on the arm; mm."""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from collections.abc import Sequence
 
-from manifold3d import CrossSection, Manifold
+import numpy as np
+from manifold3d import CrossSection, FillRule, Manifold
+from numpy.typing import NDArray
 
-from robot_description.cad.outline import rectangle
+from robot_description.cad.outline import on_grid
 
 Stroke = tuple[tuple[float, float], ...]
 
-# Centre lines on a cell 4 wide and 6 high.
-_STROKES: dict[str, tuple[Stroke, ...]] = {
-    "A": (((0, 0), (2, 6), (4, 0)), ((0.7, 2), (3.3, 2))),
-    "K": (((0, 0), (0, 6)), ((4, 6), (0, 2.4)), ((1.4, 3.6), (4, 0))),
-    "N": (((0, 0), (0, 6), (4, 0), (4, 6)),),
-    "T": (((2, 0), (2, 6)), ((0, 6), (4, 6))),
-    "0": (((1, 0), (3, 0), (4, 1), (4, 5), (3, 6), (1, 6), (0, 5), (0, 1), (1, 0)),),
-    "4": (((3, 0), (3, 6), (0, 2), (4, 2)),),
-    "5": (((4, 6), (0.3, 6), (0, 3.5), (3, 3.5), (4, 2.6), (4, 1), (3, 0), (0, 0)),),
+
+def _arc(
+    centre: tuple[float, float], radii: tuple[float, float], start: float, end: float, count: int
+) -> Stroke:
+    """Return ``count`` + 1 points of an ellipse from ``start`` to ``end`` degrees."""
+    angles = [math.radians(start + (end - start) * k / count) for k in range(count + 1)]
+    return tuple(
+        (centre[0] + radii[0] * math.cos(a), centre[1] + radii[1] * math.sin(a)) for a in angles
+    )
+
+
+# Centre lines: capitals and digits 6 high, small letters 4.2. A stroke that ends where it starts
+# is closed. Beside them stands the letter's width.
+_STROKES: dict[str, tuple[float, tuple[Stroke, ...]]] = {
+    "A": (4.0, (((0, 0), (2, 6), (4, 0)), ((0.7, 2), (3.3, 2)))),
+    "K": (4.0, (((0, 0), (0, 6)), ((4, 6), (0, 2.4)), ((1.4, 3.6), (4, 0)))),
+    "N": (4.0, (((0, 0), (0, 6), (4, 0), (4, 6)),)),
+    "T": (4.0, (((2, 0), (2, 6)), ((0, 6), (4, 6)))),
+    "a": (3.2, (_arc((1.55, 2.1), (1.55, 2.1), 0, 360, 8), ((3.1, 4.2), (3.1, 0)))),
+    "k": (3.0, (((0, 0), (0, 6)), ((2.9, 4.2), (0, 1.7)), ((1.1, 2.6), (3.0, 0)))),
+    "n": (2.9, (((0, 0), (0, 4.2)), (*_arc((1.45, 2.5), (1.45, 1.7), 170, 0, 5), (2.9, 0)))),
+    "t": (
+        2.3,
+        (
+            ((0.8, 5.6), *_arc((1.7, 0.9), (0.9, 0.9), 180, 270, 3), (2.3, 0)),
+            ((0, 4.2), (2.2, 4.2)),
+        ),
+    ),
+    "0": (3.5, (_arc((1.75, 3.0), (1.75, 3.0), 0, 360, 10),)),
+    "4": (3.6, (((2.7, 0), (2.7, 6), (0, 1.9), (3.6, 1.9)),)),
+    "5": (
+        3.4,
+        (((3.2, 6), (0.5, 6), (0.2, 3.2), *_arc((1.6, 1.95), (1.8, 1.95), 120, -135, 6)),),
+    ),
 }
-_CELL_WIDTH, _CELL_HEIGHT, _ADVANCE, _BLANK = 4.0, 6.0, 5.6, 3.0
-_WEIGHT = 0.95
+_HEIGHT, _GAP, _BLANK = 6.0, 1.55, 3.0
+_WEIGHT = 1.05
+_SLANT = 0.16  # sideways for each mm of height
 
 
-def _bar(start: tuple[float, float], end: tuple[float, float]) -> CrossSection:
-    length, half = math.dist(start, end), _WEIGHT / 2
-    turn = math.degrees(math.atan2(end[1] - start[1], end[0] - start[0]))
-    bar = CrossSection([rectangle((-half, length + half), (-half, half))])
-    return bar.rotate(turn).translate(start)
+def _line(stroke: Stroke) -> CrossSection:
+    """Return ``stroke`` with the letters' weight, its bends mitred."""
+    path: NDArray[np.float64] = np.array(stroke, dtype=np.float64)
+    closed = math.dist(stroke[0], stroke[-1]) < 1e-9
+    side = np.diff(path, axis=0)
+    side /= np.sqrt((side * side).sum(axis=1))[:, None]
+    left = np.column_stack((-side[:, 1], side[:, 0]))
+    before = np.vstack((left[-1:] if closed else left[:1], left))
+    after = np.vstack((left, left[:1] if closed else left[-1:]))
+    # A sharp bend is cut blunt: its mitre would be a spike.
+    mitre = (before + after) / np.maximum(1.0 + (before * after).sum(axis=1), 0.75)[:, None]
+    if not closed:
+        path[0] -= side[0] * _WEIGHT / 2
+        path[-1] += side[-1] * _WEIGHT / 2
+    one, other = path + mitre * _WEIGHT / 2, path - mitre * _WEIGHT / 2
+    if closed:
+        return CrossSection([on_grid(one[:-1]), on_grid(other[:-1])], FillRule.EvenOdd)
+    return CrossSection([on_grid(np.vstack((one, other[::-1])))], FillRule.NonZero)
+
+
+def _widths(text: str) -> list[float]:
+    return [_BLANK if letter == " " else _STROKES[letter][0] + _GAP for letter in text]
 
 
 def width_of(text: str) -> float:
     """Return the width of ``text`` for letters 6 high."""
-    steps = sum(_BLANK if letter == " " else _ADVANCE for letter in text)
-    return steps - _ADVANCE + _CELL_WIDTH + _WEIGHT
+    return sum(_widths(text)) - _GAP + _WEIGHT
+
+
+def _slanted(sections: Sequence[CrossSection]) -> CrossSection:
+    flat = CrossSection()
+    for section in sections:
+        flat = flat + section
+    return flat.transform(np.array([[1.0, _SLANT, 0.0], [0.0, 1.0, 0.0]]))
 
 
 def lettering(text: str, height: float, thick: float) -> Manifold:
@@ -49,12 +100,24 @@ def lettering(text: str, height: float, thick: float) -> Manifold:
     unknown = sorted(set(text) - set(_STROKES) - {" "})
     if unknown:
         raise ValueError(f"no strokes for {unknown} in {text!r}: add them to lettering.py")
-    flat = CrossSection()
     x = (_WEIGHT - width_of(text)) / 2
-    for letter in text:
-        for stroke in _STROKES.get(letter, ()):
-            for start, end in pairwise(stroke):
-                flat = flat + _bar(start, end).translate((x, -_CELL_HEIGHT / 2))
-        x += _BLANK if letter == " " else _ADVANCE
-    scale = height / _CELL_HEIGHT
-    return flat.scale((scale, scale)).extrude(thick)
+    sections = []
+    for letter, width in zip(text, _widths(text), strict=True):
+        if letter != " ":
+            strokes = _STROKES[letter][1]
+            sections += [_line(stroke).translate((x, -_HEIGHT / 2)) for stroke in strokes]
+        x += width
+    scale = height / _HEIGHT
+    return _slanted(sections).scale((scale, scale)).extrude(thick)
+
+
+def wrapped(text: str, height: float, thick: float, radius: float) -> Manifold:
+    """Return ``text`` bent round the axis z, centred on +x at z 0, standing out from ``radius``."""
+
+    def bend(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        angle, reach = points[:, 0] / radius, radius + points[:, 2]
+        return on_grid(
+            np.column_stack((reach * np.cos(angle), reach * np.sin(angle), points[:, 1]))
+        )
+
+    return lettering(text, height, thick).warp_batch(bend)

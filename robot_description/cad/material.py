@@ -25,37 +25,31 @@ def _hex(code: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-ALUMINIUM = Material("champagne aluminium", _hex("d8d2c4"), 0.25, 0.42)
-BRIGHT = Material("bright aluminium", _hex("e2e1de"), 0.35, 0.34)
-STEEL = Material("dark steel", _hex("5a5955"), 0.50, 0.40)
-RUBBER = Material("black rubber", _hex("2a2a2c"), 0.0, 0.80)
-PLASTIC = Material("black plastic", _hex("343437"), 0.0, 0.55)
-PANEL = Material("light panel", _hex("e2e2de"), 0.0, 0.55)
-GREEN = Material("terminal green", _hex("1f8a4d"), 0.0, 0.50)
-BLUE = Material("blue lettering", _hex("24479e"), 0.0, 0.50)
-BRASS = Material("brass", _hex("c9a15a"), 0.45, 0.38)
-LENS = Material("sensor window", _hex("64202c"), 0.0, 0.30)
-PAD = Material("black pad", _hex("3b3b3f"), 0.0, 0.62)
+ALUMINIUM = Material("champagne aluminium", _hex("beb4a1"), 0.40, 0.42)
+GREY = Material("grey aluminium", _hex("a9aaab"), 0.45, 0.38)
+BRIGHT = Material("bright aluminium", _hex("cfcdc8"), 0.45, 0.33)
+STEEL = Material("dark steel", _hex("454340"), 0.50, 0.42)
+RUBBER = Material("black rubber", _hex("171615"), 0.0, 0.78)
+PLASTIC = Material("black plastic", _hex("1b1a1a"), 0.0, 0.50)
+PANEL = Material("light panel", _hex("d6d7d5"), 0.0, 0.50)
+GREEN = Material("terminal green", _hex("1c8549"), 0.0, 0.45)
+BLUE = Material("blue lettering", _hex("1f3f9c"), 0.0, 0.50)
+
+# The gripper's own
+BRASS = Material("brass", _hex("b98f4a"), 0.45, 0.38)
+LENS = Material("sensor window", _hex("561a26"), 0.0, 0.30)
+PAD = Material("black pad", _hex("27272a"), 0.0, 0.60)
+
+# The props'
 MELAMINE = Material("white melamine", _hex("ece9e2"), 0.0, 0.38)
 RIM = Material("blue rim", _hex("2c4f86"), 0.0, 0.38)
 LAMINATE = Material("grey laminate", _hex("8e9497"), 0.0, 0.85)
 BIRCH = Material("birch edge", _hex("c8a97a"), 0.0, 0.75)
 
 MATERIALS: tuple[Material, ...] = (
-    ALUMINIUM,
-    BRIGHT,
-    STEEL,
-    RUBBER,
-    PLASTIC,
-    PANEL,
-    GREEN,
-    BLUE,
-    BRASS,
-    LENS,
-    PAD,
-    MELAMINE,
-    RIM,
-    LAMINATE,
-    BIRCH,
+    *(ALUMINIUM, GREY, BRIGHT, STEEL),
+    *(RUBBER, PLASTIC, PANEL, GREEN, BLUE),
+    *(BRASS, LENS, PAD),
+    *(MELAMINE, RIM, LAMINATE, BIRCH),
 )
 """In the order their primitives are written."""

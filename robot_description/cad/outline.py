@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Outline = NDArray[np.float64]
 """(n, 2) corners, counter-clockwise, mm."""
 
-SAGITTA = 0.10
+SAGITTA = 0.15
 """How far a chord may lie inside its circle, mm."""
 FACETS_PER_QUARTER = 3
 """Facets a quarter turn of a fillet gets: 30 degrees each, under the shading crease."""
@@ -129,17 +129,21 @@ def octagon(across_flats: float, radius: float = 0.0) -> Outline:
     return rounded([(reach * math.cos(a), reach * math.sin(a), radius) for a in angles])
 
 
-def fluted(radius: float, depth: float, count: int, at: tuple[float, float]) -> Outline:
-    """Return a circle with ``count`` ribs that stand ``depth`` mm over grooves of equal width."""
+def toothed(
+    radius: float,
+    teeth: Sequence[tuple[float, float]],
+    count: int,
+    at: tuple[float, float] = (0.0, 0.0),
+) -> Outline:
+    """Return a circle with ``count`` teeth: each (share of the pitch, depth below ``radius``)."""
     step = 2.0 * math.pi / count
-    rib = ((0.0, depth), (0.12, 0.0), (0.56, 0.0), (0.68, depth))
     points = [
         (
-            at[0] + (radius - low) * math.cos((k + share) * step),
-            at[1] + (radius - low) * math.sin((k + share) * step),
+            at[0] + (radius - depth) * math.cos((k + share) * step),
+            at[1] + (radius - depth) * math.sin((k + share) * step),
         )
         for k in range(count)
-        for share, low in rib
+        for share, depth in teeth
     ]
     return on_grid(np.array(points))
 

@@ -150,3 +150,21 @@ def around(count: int, radius: float, phase: float = 0.0) -> list[tuple[float, f
     """Return ``count`` points evenly round a circle of ``radius`` mm, the first at ``phase``."""
     angles = [phase + 2.0 * math.pi * k / count for k in range(count)]
     return [(radius * math.cos(a), radius * math.sin(a)) for a in angles]
+
+
+def ball(diameter: float, at: Point, segments: int = 16) -> Manifold:
+    """Return a sphere with ``segments`` round its equator."""
+    radius, half = diameter / 2.0, segments // 2
+    angles = [math.pi * (k / half - 0.5) for k in range(1, half)]
+    profile = [(radius * math.sin(a), radius * math.cos(a), 0.0) for a in angles]
+    return lathe(profile, "+z", at, segments)
+
+
+def aimed(solid: Manifold, toward: Point, at: Point = (0.0, 0.0, 0.0)) -> Manifold:
+    """Return ``solid`` with its z axis turned along the unit vector ``toward``, then moved."""
+    z = np.array(toward)
+    side = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(side, z)
+    x /= math.sqrt(float((x * x).sum()))
+    turn = on_grid(np.column_stack((x, np.cross(z, x), z)))
+    return solid.transform(np.column_stack((turn, np.array(at))))

@@ -15,7 +15,7 @@ from robot_description.cad.build import parts
 from robot_description.cad.stl import build_stl, solid_of
 
 STL = URDF_PATH.parent / "stl"
-BYTE_BUDGET = 2_500_000
+BYTE_BUDGET = 3_000_000
 
 
 def load(link: str) -> trimesh.Trimesh:
