@@ -8,13 +8,13 @@ from manifold3d import Manifold
 
 from robot_description.cad import conduit
 from robot_description.cad.fittings import gland, name_round, plug, screws, seam
-from robot_description.cad.material import ALUMINIUM, BLUE, BRIGHT
+from robot_description.cad.material import ALUMINIUM, BLUE, BRIGHT, STEEL
 from robot_description.cad.part import Part
 from robot_description.cad.solid import around, block, lathe, rod
 
 # Heights above the base's underside.
 FLANGE_DIAMETER, FLANGE_HEIGHT = 110.0, 12.0
-FLANGE_SCREWS, FLANGE_SCREW_CIRCLE = 12, 51.0
+FLANGE_SCREWS, FLANGE_SCREW_CIRCLE = 6, 51.0
 RING_DIAMETER, RING_TOP = 94.0, 42.0
 STEP_DIAMETER, STEP_TOP = 84.0, 52.5
 COLUMN_DIAMETER, COLUMN_FOOT, COLUMN_TOP = 77.0, 55.0, 114.0
@@ -35,15 +35,13 @@ def _column() -> Manifold:
             (FLANGE_HEIGHT, FLANGE_DIAMETER / 2, 1.5),
             (FLANGE_HEIGHT, RING_DIAMETER / 2, 0.0),
             (RING_TOP, RING_DIAMETER / 2, 2.0),
-            (RING_TOP, STEP_DIAMETER / 2, 1.4),
-            (STEP_TOP, STEP_DIAMETER / 2, 2.0),
+            (RING_TOP, STEP_DIAMETER / 2, 0.0),
+            (STEP_TOP, STEP_DIAMETER / 2, 1.2),
             (STEP_TOP, radius - 1.2, 0.0),
             (COLUMN_FOOT, radius - 1.2, 0.0),
             (COLUMN_FOOT, radius, 0.0),
-            *seam(radius, COLUMN_TOP - 9.0),
             (COLUMN_TOP, radius, 0.0),
             (COLLAR_FOOT, collar, 0.0),
-            *seam(collar, COLLAR_FOOT + 8.0),
             (COLLAR_TOP, collar, 2.0),
             (COLLAR_TOP, BORE_DIAMETER / 2 + 3.0, 0.0),
         ]
@@ -58,6 +56,11 @@ def arm_base_link() -> Part:
         _column(),
         block(CABLE_BOX_X, CABLE_BOX_Y, CABLE_BOX_Z, 2.0),
         block(CONNECTOR_X, CONNECTOR_Y, CONNECTOR_Z, 1.5),
+    )
+    part.add(
+        STEEL,
+        seam(COLUMN_DIAMETER / 2, COLUMN_TOP - 9.0),
+        seam(COLLAR_DIAMETER / 2, COLLAR_FOOT + 8.0),
     )
     part.cut(rod(BORE_DIAMETER, BORE_FLOOR, 150.0))
     face = CABLE_BOX_Y[1] + PLATE_STANDS

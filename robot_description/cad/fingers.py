@@ -39,7 +39,7 @@ TIP_CHAMFER = 5.0
 PAD_THICK, PAD_HALF_HEIGHT, PAD_EDGE = 2.0, 9.9, 0.45
 PAD_START = 7.4  # mm after the foot's bend
 
-CROWN_TEETH, CROWN_SECTOR = 43, 11  # on a full turn, and how many there are
+CROWN_TEETH, CROWN_SECTOR = 43, 9  # on a full turn, and how many there are
 CROWN_RADII, CROWN_BACK = (6.6, 10.6), 7.0
 TOOTH_HEIGHT, TOOTH_CLEARANCE = 0.9, 0.12
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from itertools import pairwise
 from typing import Literal
@@ -12,7 +13,7 @@ from robot_description.cad import conduit
 from robot_description.cad.conduit import Eye, Gland
 from robot_description.cad.lettering import lettering, wrapped
 from robot_description.cad.material import ALUMINIUM, BLUE, BRIGHT, PLASTIC, STEEL
-from robot_description.cad.outline import circle, octagon
+from robot_description.cad.outline import circle
 from robot_description.cad.part import Part
 from robot_description.cad.solid import (
     Direction,
@@ -33,13 +34,13 @@ Sideways = Literal["+y", "-y"]
 SCREW_HEAD_HEIGHT = 1.6
 SOCKET_SHARE = 0.5  # of the head's diameter
 GLAND_NUT = 18.0  # across flats
-SLEEVE_DIAMETER, SLEEVE_MOUTH = 19.6, 14.4
+SLEEVE_DIAMETER, SLEEVE_MOUTH, SLEEVE_NECK = 19.6, 14.4, 7.0
 EYE_DIAMETER = 22.0
 DISC_EDGE, DISC_GAP = 4.0, 1.4
 STAR_SCREWS, STAR_CIRCLE, STAR_SCREW = 6, 0.26, 0.19  # shares of the cap's diameter
 LETTER_STANDS = 0.2
-BORE_CLEARANCE = 0.6  # on the diameter
-SEAM_WIDTH, SEAM_DEPTH = 1.0, 0.9
+BORE_CLEARANCE, BORE_SEGMENTS = 1.0, 24  # on the diameter
+SEAM_WIDTH, SEAM_STANDS = 0.8, 0.1
 
 
 def screws(part: Part, points: Iterable[Point], toward: Direction, head: float) -> None:
@@ -57,24 +58,30 @@ def screws(part: Part, points: Iterable[Point], toward: Direction, head: float) 
 
 def gland(part: Part, fitting: Gland) -> None:
     """Set a swivel gland: nut, ball and the sleeve that the conduit goes into."""
-    x, y, z = fitting.at
-    nut = prism(octagon(GLAND_NUT), -1.0, conduit.NUT_HEIGHT, (0.0, 1.0))
-    radius, mouth = SLEEVE_DIAMETER / 2, conduit.SLEEVE_LENGTH
+    nut = prism(
+        circle(GLAND_NUT / 2 / math.cos(math.pi / 6), segments=6),
+        -1.0,
+        conduit.NUT_HEIGHT,
+        (0.0, 1.0),
+    )
+    radius, mouth, neck = SLEEVE_DIAMETER / 2, conduit.SLEEVE_LENGTH, SLEEVE_NECK
+    neck_ring = rod(2 * radius, neck - 0.5, neck, segments=16)
+    body = Manifold.batch_hull([ball(GLAND_NUT - 2.5, (0.0, 0.0, 0.0), 16), neck_ring])
     sleeve = lathe(
         [
-            (1.5, radius - 2.2, 0.0),
-            (4.5, radius, 0.0),
+            (neck - 2.0, radius - 1.0, 0.0),
+            (neck + 0.8, radius - 1.0, 0.0),
+            (neck + 0.8, radius, 0.0),
             (mouth, radius, 1.2),
             (mouth, SLEEVE_MOUTH / 2, 0.0),
             (mouth - conduit.INSERTED - 1.0, SLEEVE_MOUTH / 2, 0.0),
         ],
-        segments=18,
+        segments=16,
     )
     part.add(
         PLASTIC,
-        placed(nut, "+y", (x, y, z)),
-        ball(GLAND_NUT - 2.0, fitting.swivel, 12),
-        aimed(sleeve, fitting.outward, fitting.swivel),
+        placed(nut, "+y", fitting.at),
+        aimed(body + sleeve, fitting.outward, fitting.swivel),
     )
 
 
@@ -148,13 +155,21 @@ def name_round(text: str, height: float, radius: float, azimuth: float) -> Manif
 def bored(part: Part, diameter: float, half_length: float, x: float = 0.0) -> None:
     """Bore everything there about the axis y at ``x`` for a shaft, out to both ``half_length``."""
     reach = half_length
-    part.cut(rod(diameter + BORE_CLEARANCE, -reach, reach, "+y", (x, 0.0, 0.0)))
+    part.cut(
+        rod(
+            diameter + BORE_CLEARANCE,
+            -reach,
+            reach,
+            "+y",
+            (x, 0.0, 0.0),
+            segments=BORE_SEGMENTS,
+        )
+    )
 
 
-def seam(radius: float, at: float) -> list[tuple[float, float, float]]:
-    """Return the part of a lathe's profile that runs a groove round a cylinder at height ``at``."""
-    low, high, floor = at - SEAM_WIDTH / 2, at + SEAM_WIDTH / 2, radius - SEAM_DEPTH
-    return [(low, radius, 0.0), (low, floor, 0.0), (high, floor, 0.0), (high, radius, 0.0)]
+def seam(radius: float, at: float, toward: Direction = "+z") -> Manifold:
+    """Return the dark line of a joint round a cylinder at height ``at`` along ``toward``."""
+    return rod(2 * (radius + SEAM_STANDS), at - SEAM_WIDTH / 2, at + SEAM_WIDTH / 2, toward)
 
 
 def terminal_box(part: Part, x: Range, y: Range, z: Range, glands: Iterable[Gland]) -> None:

@@ -46,7 +46,7 @@ def forearm_link() -> Part:
         *steps(STEP_DIAMETER, end, STEP_END),
         web,
         rod(TUBE_DIAMETER, 62.0, TUBE_END, "+x"),
-        clamp(82.0),
+        clamp(91.0),
         shaft(WRIST_SHAFT, WRIST_SHAFT_Y, LENGTH),
     )
     bored(part, ELBOW_SHAFT, max(map(abs, ELBOW_SHAFT_Y)) + 0.8)

@@ -10,7 +10,7 @@ from robot_description.cad.solid import Range, lathe, prism, rod
 TUBE_DIAMETER = 34.0
 CLAMP_DIAMETER, CLAMP_LENGTH = 41.0, 10.0
 
-BELLOWS_RADIUS, BELLOWS_HALF, BELLOWS_PLEATS, BELLOWS_DEPTH = 43.2, 21.4, 44, 2.0
+BELLOWS_RADIUS, BELLOWS_HALF, BELLOWS_PLEATS, BELLOWS_DEPTH = 43.2, 21.4, 44, 1.8
 COVER_RIBS, COVER_GROOVE, COVER_EDGE = 16, 3.0, 1.25
 
 CHEEK_RADIUS, CHEEK_NOSE_RADIUS, CHEEK_THICK = 38.0, 30.0, 10.0
@@ -23,12 +23,12 @@ def clamp(x: float) -> Manifold:
     radius, half = CLAMP_DIAMETER / 2, CLAMP_LENGTH / 2
     return lathe(
         [
-            (x - half, radius, 1.6),
+            (x - half, radius, 1.2),
             (x - 0.5, radius, 0.0),
             (x - 0.5, radius - 0.9, 0.0),
             (x + 0.5, radius - 0.9, 0.0),
             (x + 0.5, radius, 0.0),
-            (x + half, radius, 1.6),
+            (x + half, radius, 1.2),
         ],
         "+x",
     )
@@ -79,5 +79,5 @@ def steps(diameter: float, start: float, end: float) -> list[Manifold]:
 
 
 def shaft(diameter: float, y: Range, x: float) -> Manifold:
-    """Return the cross cylinder that turns in the next fork."""
-    return rod(diameter, y[0], y[1], "+y", (x, 0.0, 0.0), edge=0.8)
+    """Return the cross cylinder that turns in the next fork, coarse because the fork hides it."""
+    return rod(diameter, y[0], y[1], "+y", (x, 0.0, 0.0), segments=20)

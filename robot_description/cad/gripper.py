@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from manifold3d import Manifold
+from manifold3d import Manifold, OpType
 
 from robot_description.cad import roll
 from robot_description.cad.fittings import screws
@@ -24,14 +24,15 @@ COLLAR_RADIUS, COLLAR_END = 21.6, 4.5
 GROOVE_RADIUS = 18.4
 SOCKET_CLEARANCE = 0.1  # about the roll link's flange, which the plate takes in
 
-SEGMENTS = 56  # of the turned surfaces
+SEGMENTS = 60  # of the turned surfaces
 
 CONE_RADIUS, CONE_X, CONE_TAPER = 20.0, (5.3, 48.5), 3.6
+CONE_RINGS = 6  # so many facets a degree steeper each keep the flats' edges crisp
 FLAT_X = 10.5  # where the flats on both sides begin
 TIP_HALF_Y, TIP_HALF_Z = 7.0, 15.5
 TIP_CORNER = 4.0
 
-WINDOW_X, WINDOW_HALF_Z, WINDOW_CORNER = (22.0, 46.6), 13.0, 2.0
+WINDOW_X, WINDOW_HALF_Z, WINDOW_CORNER, WINDOW_RIM = (22.0, 46.6), 13.0, 2.0, 0.6
 LINING_THICK, LINING_HALF_Z, LINING_HALF_Y = 0.8, 12.4, 9.0
 BEARING_RADIUS, BEARING_END = 4.6, 23.1
 
@@ -61,14 +62,35 @@ def _wedge(half: float) -> Outline:
 
 
 def _cone() -> Manifold:
-    """Return the body's blank: turned, with four flats towards the tip."""
+    """Return the body's blank: turned to a slight barrel, with four flats towards the tip."""
     low, high = CONE_X
-    turned = lathe(
-        [(low, CONE_RADIUS, 0.8), (high, CONE_RADIUS - CONE_TAPER, 0.0)], "+x", segments=SEGMENTS
-    )
+    profile = [
+        (low + share * (high - low), CONE_RADIUS - CONE_TAPER * share * (1.0 + share) / 2.0, 0.0)
+        for share in (k / CONE_RINGS for k in range(1, CONE_RINGS + 1))
+    ]
+    turned = lathe([(low, CONE_RADIUS, 0.8), *profile], "+x", segments=SEGMENTS)
     sides = prism(_wedge(TIP_HALF_Y), -40.0, 40.0, 0.0, "z")
     cheeks = prism(_wedge(TIP_HALF_Z), -40.0, 40.0, 0.0, "y")
     return turned ^ sides ^ cheeks
+
+
+def _window() -> list[Manifold]:
+    """Return what to cut for the window: a slot through both flats, its rims chamfered."""
+    (low, high), half = WINDOW_X, WINDOW_HALF_Z
+    slot = prism(rectangle(WINDOW_X, (-half, half), WINDOW_CORNER), -30.0, 30.0, 0.0, "y")
+    slope = (CONE_RADIUS - TIP_HALF_Y) / (CONE_X[1] - FLAT_X)
+    middle = (low + high) / 2
+    reach = (high - low) / 2 * math.hypot(1.0, slope) + WINDOW_RIM
+    rim = prism(
+        rectangle((-reach, reach), (-half - WINDOW_RIM, half + WINDOW_RIM), WINDOW_CORNER + 0.6),
+        -WINDOW_RIM,
+        4.0,
+        (WINDOW_RIM, 0.0),
+        "y",
+    )
+    turned = rim.rotate((0.0, 0.0, -math.degrees(math.atan(slope))))
+    cut = turned.translate((middle, TIP_HALF_Y + slope * (CONE_X[1] - middle), 0.0))
+    return [slot, cut, cut.mirror((0.0, 1.0, 0.0))]
 
 
 def _pinion() -> Manifold:
@@ -96,11 +118,9 @@ def gripper_link() -> Part:
     """Return the gripper's body in its frame."""
     part = Part("gripper_link")
     low = WINDOW_X[0]
-    half = WINDOW_HALF_Z
-    window = prism(rectangle(WINDOW_X, (-half, half), WINDOW_CORNER), -30.0, 30.0, 0.0, "y")
     part.add(
         ALUMINIUM,
-        _cone() - window,
+        Manifold.batch_boolean([_cone(), *_window()], OpType.Subtract),
         lathe(
             [
                 (0.0, PLATE_RADIUS, PLATE_EDGE),

@@ -26,12 +26,12 @@ def _hex(code: str) -> tuple[float, float, float]:
 
 
 ALUMINIUM = Material("champagne aluminium", _hex("beb4a1"), 0.40, 0.42)
-GREY = Material("grey aluminium", _hex("a9aaab"), 0.45, 0.38)
+GREY = Material("grey aluminium", _hex("adaba7"), 0.45, 0.38)
 BRIGHT = Material("bright aluminium", _hex("cfcdc8"), 0.45, 0.33)
 STEEL = Material("dark steel", _hex("454340"), 0.50, 0.42)
 RUBBER = Material("black rubber", _hex("171615"), 0.0, 0.78)
-PLASTIC = Material("black plastic", _hex("1b1a1a"), 0.0, 0.50)
-PANEL = Material("light panel", _hex("d6d7d5"), 0.0, 0.50)
+PLASTIC = Material("black plastic", _hex("1e1d1c"), 0.0, 0.62)
+PANEL = Material("light panel", _hex("d0cfca"), 0.0, 0.50)
 GREEN = Material("terminal green", _hex("1c8549"), 0.0, 0.45)
 BLUE = Material("blue lettering", _hex("1f3f9c"), 0.0, 0.50)
 

@@ -14,7 +14,7 @@ from robot_description.cad.part import Part
 from robot_description.cad.solid import block, lathe, prism, rod
 
 RADIUS, BODY_X = 25.0, (-30.0, 30.0)
-SEGMENTS = 56  # of the turned surfaces
+SEGMENTS = 60  # of the turned surfaces
 SPIGOT_RADIUS, SPIGOT_LENGTH = 21.0, 1.5
 FOOT_RING, SEAM_WIDTH, SEAM_DEPTH = 3.6, 0.9, 0.6  # a seam above a narrow ring at the foot
 
@@ -65,7 +65,7 @@ def _ring() -> Manifold:
 def _dome() -> Manifold:
     crown = [  # a shallow cap, 12 degrees a facet are smooth
         (DOME_TOP - DOME_CROWN * share * share, (DOME_RADIUS - 1.0) * share, 0.0)
-        for share in (0.75, 0.5, 0.25)
+        for share in (0.7, 0.35)
     ]
     return lathe(
         [
@@ -77,7 +77,7 @@ def _dome() -> Manifold:
         ],
         "+z",
         (DOME_X, 0.0, 0.0),
-        segments=48,
+        segments=44,
     )
 
 
@@ -93,7 +93,7 @@ def _cover(part: Part, toward: Sideways) -> None:
     screws(part, [(x, sign * (face - 0.6), z) for x, z in spots], toward, COVER_SCREW_HEAD)
     for z in LAMPS_Z:
         at = (LAMP_X, sign * face, z)
-        part.add(PLASTIC, rod(LAMP_DIAMETER, -1.0, 0.5, toward, at, edge=0.3, segments=12))
+        part.add(PLASTIC, rod(LAMP_DIAMETER, -0.5, 0.4, toward, at, segments=10))
 
 
 def roll_link() -> Part:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-CREASE = math.radians(42.0)
-"""Faces that meet at a larger angle are shaded apart."""
+CREASE = math.radians(47.0)
+"""Faces that meet at a larger angle are shaded apart; a chamfer of 45 degrees reads as rounded."""
 COPLANAR = math.radians(0.5)
 """Faces that meet at a smaller angle count as one plane."""
 NORMAL_DIGITS = 4

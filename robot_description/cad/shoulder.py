@@ -73,10 +73,14 @@ def pan_link() -> Part:
     part.add(RUBBER, _apron(*FRONT_APRON), _apron(*BACK_APRON))
     bored(part, SHAFT_DIAMETER, SHAFT_HALF_LENGTH)
     hub(part, (DISC_START, DISC_END), DISC_DIAMETER, CAP_DIAMETER, CAP_END, star=True)
-    screws(part, [(x, CHEEK_OUTSIDE, -37.0) for x in (-36.0, 36.0)], "+y", 5.0)
+    screws(part, [(x, CHEEK_OUTSIDE, -37.0) for x in (-36.0, 38.0)], "+y", 5.0)
     screws(part, [(x, -CHEEK_OUTSIDE, -37.0) for x in (-36.0, 36.0)], "-y", 5.0)
     part.add(STEEL, rod(NECK_DIAMETER + 6.0, SKIRT_FOOT - 1.0, SKIRT_FOOT + 0.5))
     x, y, z = conduit.SHOULDER.at
     bracket = block((x - 5.0, x + 5.0), (CHEEK_OUTSIDE - 8.0, y - 9.0), (z - 5.0, z + 5.0), 1.2)
-    eye(part, conduit.SHOULDER, bracket)
+    plate = block(
+        (x - 11.0, x + 11.0), (CHEEK_OUTSIDE - 2.0, CHEEK_OUTSIDE + 2.6), (z - 5.0, z + 5.0), 1.2
+    )
+    eye(part, conduit.SHOULDER, bracket + plate)
+    screws(part, [(x + u, CHEEK_OUTSIDE + 2.6, z) for u in (-8.0, 8.0)], "+y", 3.4)
     return part

@@ -17,6 +17,9 @@ STL = Path(__file__).resolve().parent.parent / "stl"
 COARSER = 0.1
 """Details below this many mm are left out."""
 
+DIGITS = 4
+"""Decimals of a mm kept: readers that join corners by distance find the same ones."""
+
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -31,7 +34,7 @@ def solid_of(part: Part) -> Manifold:
 def stl_bytes(name: str, solid: Manifold) -> tuple[bytes, int]:
     """Return the file of ``solid`` (mm) in metres and its number of triangles."""
     mesh = solid.to_mesh64()
-    points = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] * MILLIMETRE
+    points = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3].round(DIGITS) * MILLIMETRE
     positions, triangles = weld(points, np.asarray(mesh.tri_verts, dtype=np.int64))
     corner = positions[triangles].astype(np.float64)
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])

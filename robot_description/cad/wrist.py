@@ -18,7 +18,7 @@ from robot_description.cad.fittings import (
 )
 from robot_description.cad.forearm import WRIST_SHAFT, WRIST_SHAFT_Y
 from robot_description.cad.fork import CHEEK_THICK, cheeks, steps
-from robot_description.cad.material import ALUMINIUM, BLUE, RUBBER
+from robot_description.cad.material import ALUMINIUM, BLUE, RUBBER, STEEL
 from robot_description.cad.part import Part
 from robot_description.cad.solid import lathe, placed
 
@@ -28,8 +28,9 @@ DISC_DIAMETER, DISC_END, CAP_DIAMETER, CAP_END = 54.0, 55.0, 23.0, 56.0
 BOX_X, BOX_Y, BOX_Z = (31.5, 55.0), (28.5, 71.5), (-19.0, 19.0)
 HOUSING_DIAMETER, HOUSING_X = 60.0, (62.5, 122.0)
 FOOT_DIAMETER, FOOT_END = 65.0, 72.0
+SEAMS_X = (79.0, 100.5)
 BUMPER_DIAMETER, BUMPER_X, BUMPER_EDGE = 76.0, (102.5, 119.0), 3.6
-NAME_HEIGHT, NAME_AT, NAME_AZIMUTH = 6.5, 89.0, -38.0
+NAME_HEIGHT, NAME_AT, NAME_AZIMUTH = 7.5, 90.0, 140.0
 
 
 def _housing() -> Manifold:
@@ -41,8 +42,6 @@ def _housing() -> Manifold:
             (low + 4.0, foot, 0.0),
             (FOOT_END, foot, 1.6),
             (FOOT_END, radius, 0.0),
-            *seam(radius, FOOT_END + 8.0),
-            *seam(radius, BUMPER_X[0] - 3.0),
             (high - 1.2, radius, 1.0),
             (high - 1.2, radius - 5.0, 0.0),
             (high, radius - 5.0, 0.5),
@@ -62,13 +61,13 @@ def wrist_link() -> Part:
         _housing(),
     )
     bored(part, WRIST_SHAFT, max(map(abs, WRIST_SHAFT_Y)) + 0.8)
-    bumper, middle = BUMPER_DIAMETER / 2, sum(BUMPER_X) / 2
+    bumper = BUMPER_DIAMETER / 2
+    part.add(STEEL, *(seam(HOUSING_DIAMETER / 2, x, "+x") for x in SEAMS_X))
     part.add(
         RUBBER,
         lathe(
             [
                 (BUMPER_X[0], bumper, BUMPER_EDGE),
-                *seam(bumper, middle),
                 (BUMPER_X[1], bumper, BUMPER_EDGE),
             ],
             "+x",

@@ -18,6 +18,7 @@ from robot_description.cad.fingers import CROWN_TEETH, pocket
 from robot_description.cad.gripper import PINION_TEETH, PINION_TIP, PIVOT_X
 from robot_description.cad.material import BRASS
 from robot_description.cad.solid import rod
+from tests.robot_description.solids import solid
 
 # Gap between the fingers 89.3 mm from the pivot by finger angle, of the manufacturer's shapes: mm.
 OPENING = {
@@ -32,13 +33,6 @@ OPENING = {
 }
 OPENING_RADIUS = 89.3
 MOTOR_RATIO = 0.32542  # finger radians a motor radian, of the manufacturer's configuration
-
-
-@functools.cache
-def solid(link: str) -> Manifold:
-    """Return everything of ``link`` as one solid, mm."""
-    part = next(part for part in parts() if part.link == link)
-    return functools.reduce(lambda a, b: a + b, (body for _, body in part.bodies()))
 
 
 @functools.cache

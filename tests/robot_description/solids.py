@@ -1,0 +1,16 @@
+"""The raw solids of the links, built once for all tests."""
+
+from __future__ import annotations
+
+import functools
+
+from manifold3d import Manifold
+
+from robot_description.cad.build import PARTS
+
+
+@functools.cache
+def solid(link: str) -> Manifold:
+    """Return everything of ``link`` as one solid, mm."""
+    part = next(make() for make in PARTS if make.__name__ == link)
+    return functools.reduce(lambda a, b: a + b, (body for _, body in part.bodies()))

@@ -1,0 +1,56 @@
+"""The raw solids in motion: no link of the arm cuts into its neighbour anywhere in the range."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+import yourdfpy
+from manifold3d import Manifold
+
+from robot_description import URDF_PATH
+from tests.robot_description.solids import solid
+
+AXES = ("axis_1", "axis_2", "axis_3", "axis_4", "axis_5")
+SAMPLES = 9
+AIR = 0.2  # mm that two links which turn in each other keep between them
+ROUNDING = 1e-6  # mm3
+
+
+@functools.cache
+def robot() -> yourdfpy.URDF:
+    return yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
+
+
+def pair(name: str, angle: float) -> tuple[Manifold, Manifold]:
+    """Return the links on both sides of a joint turned by ``angle`` [rad]."""
+    joint = robot().joint_map[name]
+    offset = np.zeros(3) if joint.origin is None else joint.origin[:3, 3] * 1e3
+    turned = solid(joint.child).rotate(tuple(np.degrees(angle) * np.asarray(joint.axis)))
+    return solid(joint.parent), turned.translate(tuple(offset))
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_neighbours_keep_apart_over_the_joint_range(name: str) -> None:
+    limit = robot().joint_map[name].limit
+    for angle in np.linspace(limit.lower, limit.upper, SAMPLES):
+        parent, child = pair(name, angle)
+        common = parent ^ child
+        assert common.volume() < ROUNDING, (
+            f"{name} at {np.degrees(angle):.1f} degrees: {common.volume():.2f} mm3 of both links "
+            f"in {np.round(common.bounding_box(), 1)}"
+        )
+
+
+@pytest.mark.parametrize("name", ["axis_2", "axis_3", "axis_4"])
+def test_forks_have_air_around_what_turns_in_them(name: str) -> None:
+    limit = robot().joint_map[name].limit
+    for angle in (limit.lower, limit.upper):
+        parent, child = pair(name, angle)
+        assert parent.min_gap(child, 1.0) >= AIR
+
+
+def test_a_link_moved_by_a_millimetre_is_noticed() -> None:
+    parent, child = pair("axis_3", 0.0)
+    assert (parent ^ child.translate((0.0, 2.0, 0.0))).volume() > ROUNDING
