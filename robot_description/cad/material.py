@@ -35,8 +35,21 @@ PANEL = Material("light panel", _hex("d0cfca"), 0.0, 0.50)
 GREEN = Material("terminal green", _hex("1c8549"), 0.0, 0.45)
 BLUE = Material("blue lettering", _hex("1f3f9c"), 0.0, 0.50)
 
+# The gripper's own
+BRASS = Material("brass", _hex("b98f4a"), 0.45, 0.38)
+LENS = Material("sensor window", _hex("561a26"), 0.0, 0.30)
+PAD = Material("black pad", _hex("27272a"), 0.0, 0.60)
+
+# The props'
+MELAMINE = Material("white melamine", _hex("ece9e2"), 0.0, 0.38)
+RIM = Material("blue rim", _hex("2c4f86"), 0.0, 0.38)
+LAMINATE = Material("grey laminate", _hex("8e9497"), 0.0, 0.85)
+BIRCH = Material("birch edge", _hex("c8a97a"), 0.0, 0.75)
+
 MATERIALS: tuple[Material, ...] = (
     *(ALUMINIUM, GREY, BRIGHT, STEEL),
     *(RUBBER, PLASTIC, PANEL, GREEN, BLUE),
+    *(BRASS, LENS, PAD),
+    *(MELAMINE, RIM, LAMINATE, BIRCH),
 )
 """In the order their primitives are written."""
