@@ -17,6 +17,7 @@ from app.exchange.reachability_file import StoredMap
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
+from app.robot.props import load_props
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
 from app.view.cameras import Cameras, Preset
@@ -28,6 +29,7 @@ from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
+from app.view.workcell import Workcell
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
@@ -66,6 +68,7 @@ class View:
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
         furnish(server)
+        Workcell(server, load_props())
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self._arm)
