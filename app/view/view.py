@@ -22,11 +22,13 @@ from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.scene import ArmNodes, Gap, GhostNodes, furnish
+from app.view.tint import Tint
 
 GHOST_COLOURS: dict[Status, tuple[int, int, int]] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
     Status.HELD: (234, 88, 12),
+    Status.BLOCKED: (214, 51, 108),
     Status.FAULT: (230, 45, 45),
 }
 
@@ -56,6 +58,7 @@ class View:
         furnish(server)
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
+        self._tint = Tint(server, model, self._arm.path)
         self._ghost = GhostNodes(server, model, GHOST_COLOURS[Status.OK])
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
@@ -103,6 +106,7 @@ class View:
         state = snapshot.state
         with self._server.atomic():
             self._arm.move(self._model.joint_angles(state.q, state.gripper))
+            self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
             self._panel.follow(

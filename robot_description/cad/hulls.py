@@ -152,4 +152,4 @@ def _stl_bytes(hull: Manifold) -> bytes:
     facets = np.zeros(len(triangles), dtype=[("values", "<f4", (4, 3)), ("attribute", "<u2")])
     # A facet's normal is left zero, which readers take from its corners.
     facets["values"][:, 1:] = triangles
-    return bytes(80) + np.uint32(len(facets)).astype("<u4").tobytes() + facets.tobytes()
+    return b"".join((bytes(80), np.array(len(facets), "<u4").tobytes(), facets.tobytes()))

@@ -74,7 +74,7 @@ def filled(link: str) -> Manifold:
         angles = [0.0] if limit is None else np.linspace(limit.lower, limit.upper, ANGLES)
         poses = [turned(joint, float(angle)) for angle in angles]
         if link == joint.child:
-            poses = [np.linalg.inv(T) for T in poses]
+            poses = [np.asarray(np.linalg.inv(T), dtype=np.float64) for T in poses]
         plain = solid(other).simplify(0.1)
         always = functools.reduce(lambda a, b: a ^ b, [plain.transform(T[:3]) for T in poses])
         result = result + always
