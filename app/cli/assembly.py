@@ -5,16 +5,21 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import viser
 
+from app.collision.shape import half_space
+from app.collision.world import obstacle
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
 from app.exchange.reachability_file import load_map
+from app.robot.collision import world_of
 from app.robot.model import load
 from app.runtime.clock import MonotonicClock
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
 from app.settings import Settings
+from app.view.texts import UNCHECKED
 from app.view.view import View
 
 
@@ -35,9 +40,15 @@ class Assembly:
         """
         stored = None if workspace is None else load_map(workspace)
         model = load(urdf, tool)
-        for note in model.notes:
+        world, left_out = world_of(model)
+        notes = [*model.notes, *left_out]
+        if world is None:
+            notes.append(UNCHECKED)
+        else:
+            world = world.with_obstacles([obstacle("table", np.eye(4), half_space())])
+        for note in notes:
             print(f"katana450: {note}", file=sys.stderr)
-        session = Session(model.arm, model.ready(settings.ready))
+        session = Session(model.arm, model.ready(settings.ready), world)
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)

@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from app import tolerances
+from app.collision.world import World
 from app.control import commands as cmd
 from app.control.arm import Arm
 from app.control.choices import choice, wish, wish_on
+from app.control.clearing import moved
 from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
 from app.errors import InputError
@@ -18,7 +20,6 @@ from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
 from app.kinematics.reading import nearest
 from app.kinematics.tracker import track
-from app.motion.approach import approach
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -28,9 +29,13 @@ must not turn into a leap."""
 class Session:
     """The rules of one arm. Holds no state of its own: ``step`` is a pure function."""
 
-    def __init__(self, arm: Arm, ready: FloatArray) -> None:
-        """``ready``: (n,) the posture [rad] that Home drives to, inside the limits."""
+    def __init__(self, arm: Arm, ready: FloatArray, world: World | None = None) -> None:
+        """``ready``: (n,) the posture [rad] that Home drives to, inside the limits.
+
+        ``world``: what the arm must not touch; without one nothing keeps it from touching.
+        """
         self.arm = arm
+        self.world = world
         self.ready = frozen(arm.chain.check_q(ready))
         if not arm.chain.within_limits(self.ready):
             raise InputError("The ready posture lies outside the joint limits.")
@@ -74,15 +79,7 @@ class Session:
             self.check(command)
             state = self._take(state, command)
         dt = min(t - state.t, LONGEST_STEP)
-        gripper = self.arm.gripper
-        reach = gripper.speed * max(dt, 0.0)
-        return replace(
-            state,
-            t=max(t, state.t),
-            setpoint=approach(state.setpoint, state.goal, self.arm.chain.speed, dt),
-            gripper_setpoint=state.gripper_setpoint
-            + min(max(state.gripper_goal - state.gripper_setpoint, -reach), reach),
-        )
+        return moved(self.arm, self.world, replace(state, t=max(t, state.t)), dt)
 
     @staticmethod
     def observe(state: State, q: FloatArray, gripper: float) -> State:
@@ -123,7 +120,8 @@ class Session:
                 return self._aim(state, PoseTarget(T))
             case cmd.Settle():
                 # The findings stay: they say why the handle springs back.
-                return replace(state, target=JointTarget(state.goal))
+                goal = state.setpoint if state.stopped else state.goal
+                return replace(state, goal=goal, target=JointTarget(goal), stopped=False)
             case cmd.SetTool(name=name):
                 return self._aim(replace(state, tool=name), JointTarget(state.goal))
             case cmd.SetReading(reading=reading):

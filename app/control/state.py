@@ -44,6 +44,7 @@ class Status(Enum):
 
     OK = "ok"
     LIMITED = "limited"
+    BLOCKED = "blocked"
     HELD = "held"
     FAULT = "fault"
 
@@ -51,6 +52,7 @@ class Status(Enum):
 class Reason(Enum):
     """Why the goal differs from what was wished."""
 
+    CONTACT = "contact"
     ACROSS_GAP = "across a gap"
     OUT_OF_REACH = "out of reach"
     POSITION_CHANGED = "position changed"
@@ -69,13 +71,15 @@ class Finding:
     Attributes:
         reason: what holds the goal back.
         amount: by how much [m or rad]; for a limit, the limit itself [rad]; for a gap, the leap
-            across it [rad].
+            across it [rad]; for a contact, the distance that is left [m].
         axis: the axis it is about, counted from 0, where it is about one.
+        parts: the two links or things it is about, where it is about two.
     """
 
     reason: Reason
     amount: float = 0.0
     axis: int | None = None
+    parts: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +95,8 @@ class State:
         target: what was wished, kept as it was wished.
         branch: the branch that dragging keeps.
         reading: which numbers of a target count, and what gives way.
-        findings: why the goal is not what was last wished; empty when it is.
+        findings: why the goal is not what was last wished, or is not gone to; else empty.
+        stopped: whether the arm waits on its way because it would touch something.
     """
 
     t: float
@@ -106,12 +111,15 @@ class State:
     branch: Branch
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
+    stopped: bool = False
 
     @property
     def status(self) -> Status:
         """What the findings come to."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
+        if any(finding.reason is Reason.CONTACT for finding in self.findings):
+            return Status.BLOCKED
         if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
             return Status.HELD
         return Status.LIMITED if self.findings else Status.OK
@@ -119,6 +127,11 @@ class State:
     @property
     def moving(self) -> bool:
         """Whether the arm or the gripper is still on its way."""
+        return self.under_way and not self.stopped
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the setpoints differ from the goals, whatever stands between them."""
         return bool(
             (self.setpoint != self.goal).any() or self.gripper_setpoint != self.gripper_goal
         )

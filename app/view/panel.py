@@ -20,7 +20,7 @@ from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList
 from app.view.looks import Shows, add_shows, add_views
-from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, degrees
+from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees
 
 ANGLE_WORTH_SENDING = 2e-6
 """[deg] Rounding on the way to radians and back is less."""
@@ -66,6 +66,8 @@ class Panel:
         self._told = ""
         self._readout = self._gui.add_html(readout.page(model, state))
         add_views(self._gui, shows)
+        if not model.collides:
+            self._gui.add_markdown(UNCHECKED)
         with self._gui.add_folder("Joints"):
             self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
             self._gripper = self._finger(state) if model.arm.gripper.moves else None

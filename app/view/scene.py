@@ -101,7 +101,7 @@ class GhostNodes(FrameTree):
         self.shapes = [
             server.scene.add_mesh_simple(
                 f"{self.path[body.name]}/shape{number}",
-                *_surface(visual),
+                *surface(visual),
                 color=colour,
                 opacity=opacity,
                 cast_shadow=False,
@@ -143,7 +143,7 @@ class Gap:
                 self._line.points = ends
 
 
-def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Vertices (n, 3) [m] and faces (m, 3) of a shape, its materials forgotten."""
     mesh = visual.mesh.copy()
     # One vertex a corner: half of what goes over the wire.

@@ -29,12 +29,14 @@ from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
+from app.view.tint import Tint
 from app.view.workcell import Workcell
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
     Status.HELD: (234, 88, 12),
+    Status.BLOCKED: (214, 51, 108),
     Status.FAULT: (230, 45, 45),
 }
 
@@ -72,6 +74,7 @@ class View:
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self._arm)
+        self._tint = Tint(server, model, self._arm.path)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
@@ -127,6 +130,7 @@ class View:
             angles = self._model.joint_angles(state.q, state.gripper)
             self._arm.move(angles)
             self._conduits.move(angles)
+            self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
             self._cameras.follow(state)

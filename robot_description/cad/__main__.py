@@ -9,6 +9,7 @@ from pathlib import Path
 
 from robot_description import URDF_PATH
 from robot_description.cad.build import CONDUITS, MESHES, Built, build, write_conduits
+from robot_description.cad.hulls import COLLISION, build_hulls, with_collisions
 from robot_description.cad.mass import write_inertials
 from robot_description.cad.props import PROPS, build_props
 from robot_description.cad.stl import STL, build_stl
@@ -34,10 +35,10 @@ def _report(title: str, files: Iterable[Built]) -> None:
 
 
 def main() -> None:
-    """Write meshes, props, STL files, the conduit's ends and the inertials in the URDF."""
+    """Write all files, and what the URDF says of masses and collision shapes."""
     parser = argparse.ArgumentParser(
         prog="python -m robot_description.cad",
-        description="Build meshes, props and STL files, and write the inertials into the URDF.",
+        description="Build meshes, props, STL files and collision shapes; keep the URDF to them.",
     )
     parser.add_argument(
         "folder",
@@ -50,12 +51,12 @@ def main() -> None:
     _report("meshes", build(folder / MESHES.name))
     _report("props", build_props(folder / PROPS.name))
     _report("stl", build_stl(folder / STL.name))
+    _report("collision", build_hulls(folder / COLLISION.name))
     write_conduits(folder / CONDUITS.name)
     urdf = folder / URDF_PATH.name
-    if urdf != URDF_PATH:
-        urdf.write_text(URDF_PATH.read_text("utf-8"), "utf-8")
+    urdf.write_text(with_collisions(URDF_PATH.read_text("utf-8"), folder / COLLISION.name), "utf-8")
     write_inertials(urdf)
-    print(f"inertials in {urdf}")
+    print(f"inertials and collision shapes in {urdf}")
 
 
 if __name__ == "__main__":
