@@ -18,7 +18,7 @@ from robot_description.cad.glb import Primitive, glb_bytes
 from robot_description.cad.gripper import gripper_link
 from robot_description.cad.part import Part
 from robot_description.cad.roll import roll_link
-from robot_description.cad.shading import shade, weld
+from robot_description.cad.shading import CREASE, PAINT_CREASE, shade, weld
 from robot_description.cad.shoulder import pan_link
 from robot_description.cad.upper_arm import upper_arm_link
 from robot_description.cad.wrist import wrist_link
@@ -59,7 +59,8 @@ def primitives_of(part: Part) -> list[Primitive]:
         mesh = solid.to_mesh64()
         positions = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] * MILLIMETRE
         triangles = np.asarray(mesh.tri_verts, dtype=np.int64)
-        primitives.append(Primitive(material, *shade(*weld(positions, triangles))))
+        crease = PAINT_CREASE if material.paint else CREASE
+        primitives.append(Primitive(material, *shade(*weld(positions, triangles), crease)))
     return primitives
 
 
