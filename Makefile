@@ -35,7 +35,7 @@ browser: $(dev_ok)            ## find a Chromium, or install one
 tests: $(dev_ok)
 	$(bin)/python -m pytest $(ARGS)
 
-robot: $(dev_ok)              ## rebuild robot_description/meshes from the numbers in robot_description/cad
+robot: $(dev_ok)              ## rebuild meshes, props, STL, inertials from the numbers in robot_description/cad
 	$(bin)/python -m robot_description.cad
 
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from manifold3d import Manifold, OpType
+from manifold3d import JoinType, Manifold, OpType
 
 from robot_description.cad import roll
 from robot_description.cad.fittings import screws
@@ -28,7 +28,7 @@ SEGMENTS = 60  # of the turned surfaces
 
 CONE_RADIUS, CONE_X, CONE_TAPER = 20.0, (5.3, 48.5), 3.6
 CONE_RINGS = 6  # so many facets a degree steeper each keep the flats' edges crisp
-FLAT_X = 10.5  # where the flats on both sides begin
+FLAT_X, FLAT_SINKS, FLAT_RIM = 10.5, 0.04, 0.5  # where the flats begin, and their rims
 TIP_HALF_Y, TIP_HALF_Z = 7.0, 15.5
 TIP_CORNER = 4.0
 
@@ -61,6 +61,20 @@ def _wedge(half: float) -> Outline:
     )
 
 
+def _milled(blank: Manifold, half: float, roll: float) -> Manifold:
+    """Return what to take off the flat of ``blank`` that ends ``half`` off the axis at the tip.
+
+    The flat sinks by a hair within a hair's breadth of its outline, so that it is shaded flat and
+    the rim catches the light. ``roll`` (degrees about x) tells which of the flats.
+    """
+    tilt = math.degrees(math.atan((CONE_RADIUS - half) / (CONE_X[1] - FLAT_X)))
+    level_with = blank.rotate((-roll, 0.0, 0.0)).rotate((0.0, -tilt, 0.0))
+    top = level_with.bounding_box()[5]
+    outline = level_with.slice(top - 2 * FLAT_SINKS).offset(-FLAT_RIM, JoinType.Miter)
+    tool = outline.extrude(1.0).translate((0.0, 0.0, top - FLAT_SINKS))
+    return tool.rotate((0.0, tilt, 0.0)).rotate((roll, 0.0, 0.0))
+
+
 def _cone() -> Manifold:
     """Return the body's blank: turned to a slight barrel, with four flats towards the tip."""
     low, high = CONE_X
@@ -71,7 +85,10 @@ def _cone() -> Manifold:
     turned = lathe([(low, CONE_RADIUS, 0.8), *profile], "+x", segments=SEGMENTS)
     sides = prism(_wedge(TIP_HALF_Y), -40.0, 40.0, 0.0, "z")
     cheeks = prism(_wedge(TIP_HALF_Z), -40.0, 40.0, 0.0, "y")
-    return turned ^ sides ^ cheeks
+    blank = turned ^ sides ^ cheeks
+    flats = [(TIP_HALF_Z, 0.0), (TIP_HALF_Y, 90.0), (TIP_HALF_Z, 180.0), (TIP_HALF_Y, 270.0)]
+    tools = [_milled(blank, half, roll) for half, roll in flats]
+    return Manifold.batch_boolean([blank, *tools], OpType.Subtract)
 
 
 def _window() -> list[Manifold]:

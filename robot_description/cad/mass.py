@@ -7,6 +7,7 @@ share that, with the motor, gives the link its mass. Overlapping bodies count on
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -172,7 +173,8 @@ def inertial(part: Part, mass: float, motor: Motor | None = None) -> Inertial:
     return Inertial(whole.mass, centre, np.trace(second) * np.eye(3) - second, fill)
 
 
-def inertials() -> dict[str, Inertial]:
+@functools.cache
+def inertials() -> Mapping[str, Inertial]:
     """Return the inertial of every link with a shape."""
     return {
         part.link: inertial(part, LINK_MASS[part.link], MOTORS.get(part.link)) for part in parts()
