@@ -60,7 +60,7 @@ def arm_base_link() -> Part:
     part.add(
         STEEL,
         seam(COLUMN_DIAMETER / 2, COLUMN_TOP - 9.0, FLANGE_DIAMETER / 2),
-        seam(COLLAR_DIAMETER / 2, COLLAR_FOOT + 8.0, FLANGE_DIAMETER / 2),
+        seam(COLLAR_DIAMETER / 2, COLLAR_FOOT + 7.0, FLANGE_DIAMETER / 2),
     )
     part.cut(rod(BORE_DIAMETER, BORE_FLOOR, 150.0))
     face = CABLE_BOX_Y[1] + PLATE_STANDS
