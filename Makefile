@@ -9,8 +9,8 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test check lint types contracts tests browser robot bench-drag bench-kinematics \
-        bench-start pictures lock clean
+.PHONY: run test check lint types contracts tests browser robot bench-collision bench-drag \
+        bench-kinematics bench-start pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -35,7 +35,7 @@ browser: $(dev_ok)            ## find a Chromium, or install one
 tests: $(dev_ok)
 	$(bin)/python -m pytest $(ARGS)
 
-robot: $(dev_ok)              ## rebuild meshes, props, STL, inertials from the numbers in robot_description/cad
+robot: $(dev_ok)              ## rebuild all files of the robot from the numbers in robot_description/cad
 	$(bin)/python -m robot_description.cad
 
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
@@ -43,6 +43,9 @@ bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)
+
+bench-collision: $(dev_ok)    ## distances and one control tick, beside raw meshes
+	$(bin)/python -m benchmarks.collision $(ARGS)
 
 pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
 	$(bin)/python -m docs.pictures

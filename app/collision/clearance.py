@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.collision.contact import Contact
-from app.collision.world import IndexArray, Placed, World
+from app.collision.world import Placed, World
 from app.geometry.arrays import FloatArray
 
 STOP = 0.005
@@ -69,76 +69,96 @@ def advance(world: World, x: FloatArray, towards: FloatArray, dt: float) -> Adva
     part = min(dt / SETTLING, 1.0)
     # What is so far away that the whole way does not matter needs no closer look.
     free = STOP + travel / part
-    watched, _ = here.nearer_than(np.where(travel > 0.0, free, -np.inf))
-    before = here.distances(watched)
-    close = before < free[watched]
-    if not close.any():
+    free[travel == 0.0] = -np.inf
+    way = _Way(world, x, towards)
+    for pair in here.nearer_than(free)[0].tolist():
+        before = here.distance(pair)
+        if before < free[pair]:
+            way.minded.append(_Minded(pair, float(travel[pair]), before, part))
+    if not way.minded:
         return Advance(towards)
-    way = _Way(world, x, towards, watched[close], travel[watched[close]], before[close])
-    spare = part * np.maximum(way.before - STOP, 0.0)
-    rounding = np.where(way.before > 0.0, SAME, SAME_DEPTH)
-    share, held, contact = 1.0, -1, None
+    share, held = 1.0, None
     for _ in range(TRIES):
-        # With less of the way to go fewer pairs can use up what they have to spare.
-        tight = np.nonzero(share * way.travel > spare)[0]
         there = way.at(share)
-        after = there.distances(way.pairs[tight])
-        used = way.before[tight] - after
-        over = used > spare[tight] + rounding[tight]
-        if over.any():
-            fits = spare[tight][over] / used[over]
-            held = int(tight[over][fits.argmin()])
-            share *= SHY * float(fits.min())
-        elif (passed := way.passing(tight, 0.0, way.before[tight], share, after)) >= 0:
+        after = [(each, there.distance(each.pair)) for each in way.minded if each.tight(share)]
+        fit, pressed = min(((each.fit(d), each) for each, d in after), default=(1.0, None))
+        if fit < 1.0:
+            held = pressed
+            share *= SHY * fit
+        elif passed := next((e for e, d in after if way.passes(e, 0.0, e.before, share, d)), None):
             held = passed
             share *= 0.5
         else:
-            contact = None if held < 0 else there.contact(int(way.pairs[held]))
-            return Advance(towards if share == 1.0 else way.x(share), contact)
-        if share * float(way.travel.max()) < CREEP:
+            contact = None if held is None else there.contact(held.pair)
+            return Advance(way.x(share), contact)
+        if share * float(travel.max()) < CREEP:
             break
-    return Advance(x, here.contact(int(way.pairs[held])), stopped=True)
+    return Advance(x, None if held is None else here.contact(held.pair), stopped=True)
 
 
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """A straight way from ``start`` to ``end`` (k,) [rad], and the pairs of bodies to mind on it.
+@dataclass(frozen=True, order=True)
+class _Minded:
+    """A pair of bodies that a step may bring too near.
 
-    pairs: (p,) their indices in the world. travel, before: (p,) at most how far the bodies of each
-    move against each other on the whole way, and how far apart they are at its start [m].
+    pair: its number in the world. travel: at most how far its bodies move against each other on the
+    whole way. before: how far apart they are at its start [m]. part: of what is beyond STOP then,
+    the step may take away so much [1].
     """
 
-    world: World
-    start: FloatArray
-    end: FloatArray
-    pairs: IndexArray
-    travel: FloatArray
-    before: FloatArray
+    pair: int
+    travel: float
+    before: float
+    part: float
+
+    @property
+    def spare(self) -> float:
+        """[m] How much nearer the step may bring them."""
+        return self.part * max(self.before - STOP, 0.0)
+
+    def tight(self, share: float) -> bool:
+        """Whether that much of the way could be too much."""
+        return share * self.travel > self.spare
+
+    def fit(self, after: float) -> float:
+        """What share of a step is allowed that ends with the distance ``after`` [m]."""
+        used = self.before - after
+        rounding = SAME if self.before > 0.0 else SAME_DEPTH
+        return self.spare / used if used > self.spare + rounding else 1.0
+
+
+class _Way:
+    """A straight way from ``start`` to ``end`` (k,) [rad], and the pairs to mind on it."""
+
+    def __init__(self, world: World, start: FloatArray, end: FloatArray) -> None:
+        self.minded: list[_Minded] = []
+        self._world = world
+        self._start = start
+        self._end = end
+        self._placed: dict[float, Placed] = {}
 
     def x(self, share: float) -> FloatArray:
-        return self.end if share == 1.0 else self.start + share * (self.end - self.start)
+        return self._end if share == 1.0 else self._start + share * (self._end - self._start)
 
     def at(self, share: float) -> Placed:
-        return self.world.at(self.x(share))
+        found = self._placed.get(share)
+        if found is None:
+            found = self._placed[share] = self._world.at(self.x(share))
+        return found
 
-    def passing(
-        self, mind: IndexArray, low: float, d_low: FloatArray, high: float, d_high: FloatArray
-    ) -> int:
-        """One of the pairs ``mind`` (m,) that comes too near between two shares of the way, or -1.
+    def passes(self, minded: _Minded, low: float, d_low: float, high: float, d_high: float) -> bool:
+        """Whether a pair comes too near between two shares of the way.
 
-        ``d_low``, ``d_high``: (m,) the distances at both [m].
+        ``d_low``, ``d_high``: how far apart its bodies are at both [m].
         """
-        kept = np.minimum(self.before[mind], STOP)
-        travel = (high - low) * self.travel[mind]
-        least = 0.5 * (d_low + d_high - travel)
-        unsure = (least < np.where(kept > 0.0, 0.5 * kept, kept)) & (travel > GRAZE)
-        if not unsure.any():
-            return -1
-        mind, d_low, d_high, kept = mind[unsure], d_low[unsure], d_high[unsure], kept[unsure]
+        travel = (high - low) * minded.travel
+        kept = min(minded.before, STOP)
+        # Bodies that are in each other have nothing left to pass.
+        if kept <= 0.0 or travel <= GRAZE or d_low + d_high - travel >= kept:
+            return False
         middle = 0.5 * (low + high)
-        d_middle = self.at(middle).distances(self.pairs[mind])
-        near = d_middle < kept - np.where(kept > 0.0, SAME, SAME_DEPTH)
-        if near.any():
-            return int(mind[near][0])
-        first = self.passing(mind, low, d_low, middle, d_middle)
-        return first if first >= 0 else self.passing(mind, middle, d_middle, high, d_high)
+        d_middle = self.at(middle).distance(minded.pair)
+        return (
+            d_middle < kept - SAME
+            or self.passes(minded, low, d_low, middle, d_middle)
+            or self.passes(minded, middle, d_middle, high, d_high)
+        )

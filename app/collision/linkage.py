@@ -54,23 +54,27 @@ class Linkage:
         self._chained = [
             (number, p) for number, p in enumerate(self.parent.tolist()) if p != GROUND
         ]
-        # T_parent_mover @ exp(hat(axis) angle) = A + sin angle * B + (1 - cos angle) * C
-        self._A = np.array([np.eye(4), *(mover.T_parent_mover for mover in movers)])
+        # T_parent_mover @ exp(hat(axis) angle) = A + sin angle * B + cos angle * C
+        A = np.array([np.eye(4), *(mover.T_parent_mover for mover in movers)])
         hats = np.zeros((m, 4, 4))
         for number, mover in enumerate(movers, 1):
             self.carries[number] = self.carries[mover.parent]
             self.carries[number, number] = True
             hats[number, :3, :3] = so3.hat(mover.axis)
-        self._B = self._A @ hats
-        self._C = self._B @ hats
+        B = A @ hats
+        C = -B @ hats
+        self._terms = np.stack((A - C, B, C), axis=1).reshape(m, 3, 16)
 
     def poses(self, x: FloatArray) -> FloatArray:
-        """T_base_mover (m, 4, 4) of every piece at ``x`` (k,) [rad], or (..., m, 4, 4) of many."""
-        angles = (self.factor * x[..., self.variable] + self._offset)[..., None, None]
-        T = self._A + np.sin(angles) * self._B + 2.0 * np.sin(0.5 * angles) ** 2 * self._C
+        """T_base_mover (m, 4, 4) of every piece at ``x`` (k,) [rad]."""
+        angles = self.factor * x[self.variable] + self._offset
+        shares = np.ones((self.count, 1, 3))
+        np.sin(angles, out=shares[:, 0, 1])
+        np.cos(angles, out=shares[:, 0, 2])
+        T = list((shares @ self._terms).reshape(-1, 4, 4))
         for number, parent in self._chained:
-            T[..., number, :, :] = T[..., parent, :, :] @ T[..., number, :, :]
-        return np.asarray(T)
+            T[number] = T[parent] @ T[number]
+        return np.array(T)
 
     def variables_between(self, a: int, b: int) -> frozenset[int]:
         """Which entries of x change where ``b`` is, seen from ``a``."""

@@ -18,6 +18,12 @@ from app.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
 
+SIGNED = coal.DistanceRequest()
+"""Of bodies that are in each other it asks how deep: a distance below zero."""
+
+FEW = 8
+"""Pairs that are measured as quickly as the boxes round their bodies are compared."""
+
 LONG_WAY = 1.05
 """[1] How much longer than its tangent the way of a point may be that several joints turn by the
 few hundredths of a radian of one tick."""
@@ -70,13 +76,14 @@ class World:
         self.part_of = np.array([number for number, _, _, _ in bodies], dtype=np.int64)
         self.mover_of = np.array([mover for _, mover, _, _ in bodies], dtype=np.int64)
         self.T_mover_body = np.array([T for _, _, T, _ in bodies]).reshape(-1, 4, 4)
-        self.geometry = [shape.geometry for shape in shapes]
         self.radius = np.array([shape.radius for shape in shapes])
         # Most bodies share their frame with others of the same link.
         frames: dict[tuple[int, bytes], int] = {}
-        self.frame_of = [
+        frame_of = [
             frames.setdefault((mover, T.tobytes()), len(frames)) for _, mover, T, _ in bodies
         ]
+        first_of = [frame_of.index(frame) for frame in range(len(frames))]
+        self.frames = [(int(self.mover_of[i]), self.T_mover_body[i]) for i in first_of]
         R = self.T_mover_body[:, :3, :3]
         at = self.T_mover_body[:, :3, 3]
         centres = np.array([shape.centre for shape in shapes]).reshape(-1, 3, 1)
@@ -95,10 +102,17 @@ class World:
         for a, b in self.pairs:
             met[a, b] = True
         self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
-        self.pair_bodies = list(zip(self.first.tolist(), self.second.tolist(), strict=True))
-        # Flat indices, into (b, b) and (b, m), of a pair and of a body seen from a piece.
-        self.flat = self.first * count + self.second
-        self.radii = self.radius[:, None] + self.radius[None, :]
+        # Of each pair what coal needs: both geometries, each with the number of its frame.
+        self.measured = [
+            (shapes[a].geometry, frame_of[a], shapes[b].geometry, frame_of[b])
+            for a, b in zip(self.first.tolist(), self.second.tolist(), strict=True)
+        ]
+        self.apart = self.spread[self.second] - self.spread[self.first]
+        self.radii = self.radius[self.first] + self.radius[self.second]
+        # Flat indices into (b, m) of a body seen from a piece.
+        directions = np.zeros((linkage.count, linkage.count, 4))
+        directions[range(linkage.count), range(linkage.count), :3] = linkage.axis
+        self.axes = directions.reshape(linkage.count, -1)
         self._carries = linkage.carries[self.mover_of].astype(np.float64)
         self._stays = (~linkage.carries).T.astype(np.float64)
         self._second_seen = self.second * linkage.count + self.mover_of[self.first]
@@ -124,7 +138,7 @@ class World:
 
         None when no two parts can meet at all.
         """
-        if not len(self.pair_bodies):
+        if not self.measured:
             return None
         placed = self.at(x)
         found = placed.likely_nearest()
@@ -156,41 +170,30 @@ class Placed:
         self._transforms: dict[int, Any] = {}
 
     @cached_property
-    def _request(self) -> Any:
-        """It asks, of bodies that are in each other, how deep: a distance below zero."""
-        return coal.DistanceRequest()
-
-    @cached_property
-    def _result(self) -> Any:
-        return coal.DistanceResult()
+    def _columns(self) -> FloatArray:
+        """The columns of all poses below each other, (4 m, 3)."""
+        return self._T[:, :3, :].transpose(0, 2, 1).reshape(-1, 3)
 
     @cached_property
     def _centre(self) -> FloatArray:
         """Of the ball round each body, (b, 3) in the base frame [m]."""
-        columns = self._T[:, :3, :].transpose(0, 2, 1).reshape(-1, 3)
-        return np.asarray(self._world.spread @ columns)
-
-    @cached_property
-    def _square(self) -> FloatArray:
-        """The square of the distance of each centre from the origin, (b,) [m^2]."""
-        return np.asarray((self._centre * self._centre).sum(axis=1))
+        return np.asarray(self._world.spread @ self._columns)
 
     @cached_property
     def _apart(self) -> FloatArray:
         """How far apart the balls round the bodies of each pair are, (p,) [m]."""
-        world, c = self._world, self._centre
-        square = self._square[:, None] + self._square - 2.0 * (c @ c.T)
-        return np.asarray((np.sqrt(np.maximum(square, 0.0)) - world.radii).ravel()[world.flat])
+        apart = self._world.apart @ self._columns
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)) - self._world.radii)
 
     def reach(self) -> FloatArray:
         """The farthest that each body is from each joint's axis, (b, m) [m]."""
-        axes = (self._T[:, :3, :3] @ self._world.linkage.axis[:, :, None])[:, :, 0]
-        origins = self._T[:, :3, 3]
+        axes = self._world.axes @ self._columns
+        origins = self._columns[3::4]
         c = self._centre
-        along = c @ axes.T - (origins * axes).sum(axis=1)
-        square = self._square[:, None] - 2.0 * (c @ origins.T) + (origins * origins).sum(axis=1)
-        off = np.sqrt(np.maximum(square - along * along, 0.0))
-        return np.asarray(off + self._world.radius[:, None])
+        along = c @ axes.T - np.einsum("ij,ij->i", origins, axes)
+        square = np.einsum("ij,ij->i", c, c)[:, None] - 2.0 * (c @ origins.T)
+        square += np.einsum("ij,ij->i", origins, origins) - along * along
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)) + self._world.radius[:, None])
 
     def likely_nearest(self) -> int:
         """The pair whose balls are nearest to each other, or farthest in each other."""
@@ -204,61 +207,53 @@ class Placed:
         """
         world = self._world
         pairs = np.nonzero(self._apart < limit)[0]
-        if not pairs.size:
+        if len(pairs) <= FEW:
             return pairs, self._apart[pairs]
+        # The ball of each against the box of the other, one way and the other.
         a, b = world.first[pairs], world.second[pairs]
-        bounds = np.maximum(
-            self._apart[pairs], np.maximum(self._box_to_ball(a, b), self._box_to_ball(b, a))
-        )
+        boxes, balls = np.concatenate((a, b)), np.concatenate((b, a))
+        T = self._T[world.mover_of[boxes]]
+        seen = np.einsum("ij,ijk->ik", self._centre[balls] - T[:, :3, 3], T[:, :3, :3])
+        outside = np.maximum(np.abs(seen - world.box_middle[boxes]) - world.box_half[boxes], 0.0)
+        away = np.sqrt(np.einsum("ij,ij->i", outside, outside))
+        # A centre inside the box tells nothing of how deep the ball is in it.
+        away = np.where(away > 0.0, away - world.radius[balls], -np.inf)
+        bounds = np.maximum(self._apart[pairs], away.reshape(2, -1).max(axis=0))
         near = bounds < (limit[pairs] if isinstance(limit, np.ndarray) else limit)
         return pairs[near], bounds[near]
 
-    def _box_to_ball(self, a: IndexArray, b: IndexArray) -> FloatArray:
-        """How far the ball round each ``b`` (k,) is from the box round each ``a`` (k,), [m]."""
-        world = self._world
-        T = self._T[world.mover_of[a]]
-        seen = ((self._centre[b] - T[:, :3, 3])[:, None, :] @ T[:, :3, :3])[:, 0, :]
-        outside = np.maximum(np.abs(seen - world.box_middle[a]) - world.box_half[a], 0.0)
-        away = np.sqrt((outside * outside).sum(axis=1))
-        # A centre inside the box tells nothing of how deep the ball is in it.
-        return np.where(away > 0.0, away - world.radius[b], -np.inf)
-
     def distances(self, pairs: IndexArray) -> FloatArray:
         """Between the bodies of each of ``pairs`` (k,), as ``distance``, (k,) [m]."""
-        return np.array([self.distance(pair) for pair in pairs.tolist()])
+        return np.array([self._measure(pair).min_distance for pair in pairs.tolist()])
 
     def distance(self, pair: int) -> float:
         """Between the bodies of a pair [m]; negative is how deep they are in each other."""
-        world, result = self._world, self._result
-        a, b = world.pair_bodies[pair]
-        result.clear()
-        distance: float = coal.distance(
-            world.geometry[a],
-            self._transform(a),
-            world.geometry[b],
-            self._transform(b),
-            self._request,
-            result,
-        )
-        return distance
+        return float(self._measure(pair).min_distance)
 
     def contact(self, pair: int) -> Contact:
         """Where the bodies of a pair are nearest."""
-        distance = self.distance(pair)
-        world, result = self._world, self._result
-        one, other = (world.parts[world.part_of[body]].name for body in world.pair_bodies[pair])
+        world, result = self._world, self._measure(pair)
+        bodies = world.first[pair], world.second[pair]
+        one, other = (world.parts[world.part_of[body]].name for body in bodies)
         return Contact(
             (one, other),
-            distance,
+            float(result.min_distance),
             frozen((result.getNearestPoint1(), result.getNearestPoint2())),
             frozen(result.normal),
         )
 
-    def _transform(self, body: int) -> Any:
-        world = self._world
-        frame = world.frame_of[body]
+    def _measure(self, pair: int) -> Any:
+        one, frame, other, other_frame = self._world.measured[pair]
+        result = coal.DistanceResult()
+        coal.distance(
+            one, self._transform(frame), other, self._transform(other_frame), SIGNED, result
+        )
+        return result
+
+    def _transform(self, frame: int) -> Any:
         found = self._transforms.get(frame)
         if found is None:
-            T = self._T[world.mover_of[body]] @ world.T_mover_body[body]
+            mover, T_mover_body = self._world.frames[frame]
+            T = self._T[mover] @ T_mover_body
             found = self._transforms[frame] = coal.Transform3s(T[:3, :3], T[:3, 3])
         return found

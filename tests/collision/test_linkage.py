@@ -24,12 +24,6 @@ def test_every_part_is_where_the_description_has_it(
             np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
 
 
-def test_many_postures_at_once_are_the_same(bare: World, postures: FloatArray) -> None:
-    together = bare.linkage.poses(postures)
-    for x, T in zip(postures[:10], together, strict=False):
-        np.testing.assert_allclose(bare.linkage.poses(x), T, atol=1e-15)
-
-
 def test_what_lies_between_two_pieces(bare: World) -> None:
     mover = {part.name: part.mover for part in bare.parts}
 
