@@ -92,6 +92,9 @@ class State:
         branch: the branch that dragging keeps.
         reading: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished; empty when it is.
+        since: how far along its way the target has been followed, while the goal is still on its
+            way to it; None once it is there. Until then the findings are those from before.
+        let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
     """
 
     t: float
@@ -106,6 +109,8 @@ class State:
     branch: Branch
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
+    since: ToolTarget | None = None
+    let_go: bool = False
 
     @property
     def status(self) -> Status:
