@@ -18,7 +18,7 @@ from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, T
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
-from app.kinematics.reading import nearest
+from app.kinematics.projection import project
 from app.kinematics.tracker import track
 
 LONGEST_STEP = 0.05
@@ -78,6 +78,8 @@ class Session:
         for command in commands:
             self.check(command)
             state = self._take(state, command)
+        if isinstance(state.target, ToolTarget) and state.since is not None:
+            state = self._follow(state, state.target, state.since)
         dt = min(t - state.t, LONGEST_STEP)
         return moved(self.arm, self.world, replace(state, t=max(t, state.t)), dt)
 
@@ -94,6 +96,8 @@ class Session:
             goal=state.setpoint,
             gripper_goal=state.gripper_setpoint,
             target=JointTarget(state.setpoint),
+            since=None,
+            let_go=False,
         )
         return replace(held, findings=(Finding(Reason.INTERNAL),))
 
@@ -113,63 +117,84 @@ class Session:
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 return self._aim(held, JointTarget(state.setpoint))
             case cmd.MoveTool(position=position):
-                return self._aim(state, replace(wish(self.arm, state), position=position))
+                return self._drag(state, replace(wish(self.arm, state), position=position))
             case cmd.TurnTool(pitch=pitch, roll=roll):
-                return self._aim(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
+                return self._drag(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
             case cmd.SetPose(T=T):
                 return self._aim(state, PoseTarget(T))
             case cmd.Settle():
+                if state.since is not None:
+                    return replace(state, let_go=True)
                 # The findings stay: they say why the handle springs back.
                 goal = state.setpoint if state.stopped else state.goal
                 return replace(state, goal=goal, target=JointTarget(goal), stopped=False)
             case cmd.SetTool(name=name):
                 return self._aim(replace(state, tool=name), JointTarget(state.goal))
             case cmd.SetReading(reading=reading):
-                reread = replace(state, reading=reading)
-                # Where a hand let go nothing is wished any more that could be reread.
-                let_go = isinstance(state.target, JointTarget)
-                return reread if let_go else self._aim(reread, state.target)
+                return self._reread(replace(state, reading=reading))
             case cmd.TakeBranch(branch=branch):
                 return self._take_branch(state, branch)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
 
-    def _aim(self, state: State, target: Target) -> State:
+    def _aim(self, state: State, target: JointTarget | PoseTarget) -> State:
         """Make ``target`` the target, and the nearest the arm can do the goal."""
         chain = self.arm.chain_to(state.tool)
-        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
         if isinstance(target, JointTarget):
             goal = frozen(chain.clamp(target.q))
-            return replace(
-                state,
-                target=target,
-                goal=goal,
-                branch=branch_of(chain, goal),
-                findings=of_joints(chain, target.q) + gripper,
-            )
-        if isinstance(target, PoseTarget):
-            best = nearest(chain, target.T, state.reading, branch=state.branch, q_hint=state.goal)
-            findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
-        else:
-            tracked = track(
-                chain,
-                state.goal,
-                target,
-                branch=state.branch,
-                reading=state.reading,
-                since=wish(self.arm, state),
-            )
-            best = tracked.best
-            findings = of_tracked(chain, tracked, state.reading)
+            state = replace(state, branch=branch_of(chain, goal))
+            return self._gone(state, target, goal, of_joints(chain, target.q))
+        best = project(
+            chain, target.T, reading=state.reading, branch=state.branch, q_hint=state.goal
+        )
+        findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
+        return self._gone(state, target, best.q, findings)
+
+    def _reread(self, state: State) -> State:
+        """Go for what is wished in the reading there is now."""
+        match state.target:
+            case PoseTarget() as target:
+                return self._aim(state, target)
+            case ToolTarget() as target:
+                return replace(self._drag(state, target), let_go=state.let_go)
+        # Where a hand let go nothing is wished any more that could be reread.
+        return state
+
+    def _drag(self, state: State, target: ToolTarget) -> State:
+        """Make ``target`` what is followed from now on, along the way the hand took there."""
+        since = wish(self.arm, state) if state.since is None else state.since
+        return replace(state, target=target, since=since, let_go=False)
+
+    def _follow(self, state: State, target: ToolTarget, since: ToolTarget) -> State:
+        """Take the goal on towards ``target``, as far as one tick has time for."""
+        chain = self.arm.chain_to(state.tool)
+        tracked = track(
+            chain, state.goal, target, branch=state.branch, reading=state.reading, since=since
+        )
+        if tracked.since is not None:
+            return replace(state, goal=tracked.best.q, since=tracked.since)
+        wished = JointTarget(tracked.best.q) if state.let_go else target
+        return self._gone(state, wished, tracked.best.q, of_tracked(chain, tracked, state.reading))
+
+    @staticmethod
+    def _gone(
+        state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]
+    ) -> State:
+        """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
+        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
         return replace(
-            state, target=target, goal=frozen(chain.clamp(best.q)), findings=findings + gripper
+            state,
+            target=target,
+            goal=goal,
+            findings=findings + gripper,
+            since=None,
+            let_go=False,
         )
 
     def _take_branch(self, state: State, branch: Branch) -> State:
         """Leap to ``branch`` with the tool where it is wished."""
         best = choice(self.arm, state, branch)
-        goal = frozen(self.arm.chain.clamp(best.q))
-        target: Target = JointTarget(goal)
+        target: Target = JointTarget(best.q)
         if isinstance(state.target, PoseTarget):
             target = state.target
         elif isinstance(state.target, ToolTarget):
@@ -180,8 +205,7 @@ class Session:
             state.reading,
             yaw_was_wished=isinstance(target, PoseTarget),
         )
-        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
-        return replace(state, branch=branch, target=target, goal=goal, findings=findings + gripper)
+        return self._gone(replace(state, branch=branch), target, best.q, findings)
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper

@@ -97,6 +97,9 @@ class State:
         reading: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished, or is not gone to; else empty.
         stopped: whether the arm waits on its way because it would touch something.
+        since: how far along its way the target has been followed, while the goal is still on its
+            way to it; None once it is there. Until then the findings are those from before.
+        let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
     """
 
     t: float
@@ -112,6 +115,8 @@ class State:
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
     stopped: bool = False
+    since: ToolTarget | None = None
+    let_go: bool = False
 
     @property
     def status(self) -> Status:

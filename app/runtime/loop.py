@@ -112,5 +112,7 @@ def _differs(a: State, b: State) -> bool:
         or a.gripper != b.gripper
         or a.setpoint is not b.setpoint
         or a.gripper_setpoint != b.gripper_setpoint
+        or a.goal is not b.goal
+        or a.target is not b.target
         or a.findings != b.findings
     )
