@@ -91,12 +91,11 @@ def test_mujoco_reads_the_stl_files_as_shapes(tmp_path: Path) -> None:
 
 
 def test_a_dropped_arm_moves_as_a_body_does(model: mujoco.MjModel) -> None:
-    """Free joints, gravity, no friction: energy stays."""
+    """Free joints, gravity, no friction, no contact: energy stays."""
     data = mujoco.MjData(model)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
-    model.opt.disableflags |= (
-        mujoco.mjtDisableBit.mjDSBL_LIMIT | mujoco.mjtDisableBit.mjDSBL_EQUALITY
-    )
+    for bit in ("LIMIT", "EQUALITY", "CONTACT"):
+        model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{bit}")
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     model.opt.timestep = 1e-3
     mujoco.mj_forward(model, data)
