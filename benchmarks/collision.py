@@ -23,7 +23,6 @@ from app.collision.shape import half_space
 from app.collision.world import World, obstacle
 from app.control.state import Status
 from app.geometry.arrays import FloatArray
-from app.motion.approach import approach
 from app.robot.collision import world_of
 from app.robot.model import RobotModel, load
 from app.settings import READY_POSTURE_DEG
@@ -40,6 +39,12 @@ DRIVES: dict[str, tuple[Sequence[float], Sequence[float]]] = {
     "folding up": (READY_POSTURE_DEG, (0.0, -124.0, 127.0, 107.0, 0.0)),
 }
 """Start and goal of each, joint angles [deg]."""
+
+
+def approach(x: FloatArray, end: FloatArray, speed: FloatArray, dt: float) -> FloatArray:
+    """``x`` (k,) a step of ``dt`` [s] on, straight towards ``end`` at the greatest speed."""
+    needed = float(np.max(np.abs(end - x) / speed))
+    return end if needed <= dt else np.asarray(x + (end - x) * (dt / needed))
 
 
 class Row(NamedTuple):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.collision.contact import Contact
-from app.collision.world import Placed, World
+from app.collision.world import LONG_WAY, Placed, World
 from app.geometry.arrays import FloatArray
 
 STOP = 0.005
@@ -33,6 +33,9 @@ GRAZE = 1e-3
 TRIES = 6
 """Shares of a step that are tried before the arm rather waits."""
 
+
+FAR = 0.6
+"""[rad] Joints that turn more than this together are not judged at a glance."""
 
 SHY = 0.98
 """[1] Share of what is left that is tried next: a way that bends seldom fits to the last bit."""
@@ -94,6 +97,21 @@ def advance(world: World, x: FloatArray, towards: FloatArray, dt: float) -> Adva
         if share * float(travel.max()) < CREEP:
             break
     return Advance(x, None if held is None else here.contact(held.pair), stopped=True)
+
+
+def surely_clear(world: World, x: FloatArray, towards: FloatArray) -> bool:
+    """Whether nothing comes nearer than STOP on any way from ``x`` to ``towards``, at a glance.
+
+    On the way no joint leaves the span between its two ends. False only says that it has to be
+    looked at: the joints may be too far apart for that, or something too near.
+    """
+    turns = float(np.abs(towards - x).sum())
+    if turns >= FAR:
+        return False
+    here = world.at(x)
+    needed = STOP + world.travel(here, x, towards) * (1.0 / (1.0 - turns)) / LONG_WAY
+    pairs, _ = here.nearer_than(needed)
+    return all(here.distance(pair) >= needed[pair] for pair in pairs.tolist())
 
 
 @dataclass(frozen=True, order=True)

@@ -24,9 +24,12 @@ SIGNED = coal.DistanceRequest()
 FEW = 8
 """Pairs that are measured as quickly as the boxes round their bodies are compared."""
 
-LONG_WAY = 1.05
-"""[1] How much longer than its tangent the way of a point may be that several joints turn by the
-few hundredths of a radian of one tick."""
+LONG_WAY = 1.2
+"""[1] How much longer than its tangent the way of a point may be: joints that turn by t_i at the
+distances r_i move it by d <= sum t_i (r_i + d), so this holds up to sum t_i = 1 - 1 / LONG_WAY."""
+
+LONGEST_WAY = 1.0 - 1.0 / LONG_WAY
+"""[rad] Up to which sum of turns `World.travel` is a bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +128,8 @@ class World:
     def travel(self, placed: Placed, x: FloatArray, towards: FloatArray) -> FloatArray:
         """At most how far the bodies of each pair move against each other, (p,) [m].
 
-        ``placed`` is at ``x`` (k,) [rad], and the way to ``towards`` (k,) that of one tick.
+        ``placed`` is at ``x`` (k,) [rad]; on the way to ``towards`` (k,) the joints turn by no more
+        than LONGEST_WAY together.
         """
         joints = self.linkage
         turns = np.abs(joints.factor * (towards - x)[joints.variable])

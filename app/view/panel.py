@@ -46,6 +46,13 @@ GESTURES: dict[str, cmd.Command] = {
     "Reset": cmd.Reset(),
 }
 
+ORDERS: dict[str, cmd.Command] = {
+    "Stop": cmd.Stop(),
+    "Release": cmd.Release(),
+    "Pause": cmd.Pause(),
+    "Resume": cmd.Resume(),
+}
+
 
 class Panel:
     """Sliders show the goal, as the gizmo does; the read-out shows the arm itself."""
@@ -78,6 +85,22 @@ class Panel:
             "Reset: stop here and forget the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
+        self._orders = self._gui.add_button_group(
+            "Motion",
+            tuple(ORDERS),
+            hint="Stop: rest as fast as the arm can, until Release. Pause: rest on the way, until "
+            "Resume.",
+        )
+        self._on_person(self._orders, lambda: ORDERS[self._orders.value])
+        self._speed = self._gui.add_slider(
+            "Speed",
+            min=1.0,
+            max=100.0,
+            step=1.0,
+            initial_value=round(100.0 * state.speed),
+            hint="Percent of the greatest speed, also of a motion under way",
+        )
+        self._on_person(self._speed, lambda: cmd.SpeedScale(self._speed.value / 100.0))
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
         with self._gui.add_folder("Branches", expand_by_default=False):
@@ -96,6 +119,7 @@ class Panel:
                 _set(slider, math.degrees(angle))
             if self._gripper is not None:
                 _set(self._gripper, self._opening(state.gripper_goal))
+            _set(self._speed, 100.0 * state.speed)
             if self._tool.value != state.tool:
                 self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
             if self._reading.value != READINGS[state.reading]:

@@ -61,6 +61,11 @@ def _contact(finding: Finding) -> str:
 
 
 REASONS: dict[Reason, Callable[[Finding], str]] = {
+    Reason.HALTED: lambda f: (
+        f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
+        "Release, then say afresh where to go"
+    ),
+    Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
     Reason.CONTACT: _contact,
     Reason.ACROSS_GAP: lambda f: (
         f"{axis(f.axis)} would have to leap {_short(math.degrees(f.amount))}° to follow: "
@@ -85,6 +90,8 @@ STATUS: dict[Status, str] = {
     Status.LIMITED: "As near as it can",
     Status.HELD: "Held at the edge",
     Status.BLOCKED: "Contact ahead",
+    Status.PAUSED: "Paused",
+    Status.HALTED: "Stopped",
     Status.FAULT: "Fault",
 }
 

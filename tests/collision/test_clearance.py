@@ -13,11 +13,16 @@ from app.collision.shape import box, cylinder
 from app.collision.world import Part, World, obstacle
 from app.geometry import se3
 from app.geometry.arrays import FloatArray
-from app.motion.approach import approach
 from app.robot.model import RobotModel
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks together
+
+
+def approach(x: FloatArray, end: FloatArray, speed: FloatArray, dt: float) -> FloatArray:
+    """``x`` (k,) a step of ``dt`` [s] on, straight towards ``end`` at the greatest speed."""
+    needed = float(np.max(np.abs(end - x) / speed))
+    return end if needed <= dt else np.asarray(x + (end - x) * (dt / needed))
 
 
 def at(x: float, y: float, z: float) -> FloatArray:

@@ -106,16 +106,12 @@ def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
     assert taken.branch == branch
     assert isinstance(taken.target, JointTarget)
     assert np.allclose(taken.goal, badge.q, atol=1e-12)
-    seconds = (np.abs(taken.goal - state.setpoint) / arm.chain.speed).max()
-    ticks = 1
     while taken.moving:
         before = taken.setpoint
         taken = take(session, taken)
-        ticks += 1
         step = np.abs(taken.setpoint - before)
         assert (step <= arm.chain.speed * TICK * (1 + 1e-9)).all()
         assert arm.chain.within_limits(taken.setpoint, slack=0.0)
-    assert ticks * TICK == pytest.approx(seconds, abs=2 * TICK)
     on = branch_of(arm.chain, taken.setpoint)
     assert on == branch
     # Dragging keeps to it from now on.

@@ -45,17 +45,8 @@ MOST_TICKS = 30
 
 ROUNDING = 1e-9
 
-NEAR_AXIS_1 = 0.05
-"""[m] The joints go straight to the goal, so the tool goes there in a bow. Only this near axis 1,
-where axis 1 has to turn far, and where the rings turn the tool on the spot, can the bow lead away
-from a target for a moment."""
-
-BOW = 1e-3
-"""[m] By how much in a tick, at most."""
-
-OVER_AXIS_1 = 0.02
-"""[m] By the same bow the tool point may pass axis 1 on the wrong side, where the goal keeps to the
-right one."""
+TINY = 1e-8
+"""[rad/s], [rad/s^2] What planning each tick anew leaves open."""
 
 
 def tool(chain: Chain, q: FloatArray) -> FloatArray:
@@ -73,9 +64,10 @@ def on_branch(chain: Chain, q: FloatArray, branch: Branch, over: float) -> bool:
     return bool(bend >= -ROUNDING and outward >= -over)
 
 
-def seconds_left(chain: Chain, state: State) -> float:
-    """How long the slowest joint needs to the goal [s]."""
-    return float((np.abs(state.goal - state.setpoint) / chain.speed).max())
+def on_elbow(chain: Chain, q: FloatArray, branch: Branch) -> bool:
+    """Whether ``q`` has the elbow of ``branch``, or none."""
+    bend = math.sin(arm_of(chain).canonical(q)[2])
+    return (bend if branch.elbow == "up" else -bend) >= -ROUNDING
 
 
 @dataclasses.dataclass(frozen=True)
@@ -132,17 +124,15 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
             target = np.clip(target + trip.way, -limit, limit)
             command = cmd.MoveTool(target)
         before = state
-        state = check_tick(chain, session, state, turning, command)
+        state = check_tick(chain, session, state, command)
         ticks = 1
         while state.since is not None:
             assert ticks < MOST_TICKS
-            state = check_tick(chain, session, state, turning)
+            state = check_tick(chain, session, state)
             ticks += 1
         assert isinstance(state.target, ToolTarget)
         check_goal(chain, before, state, state.target)
-        left = max(seconds_left(chain, state) - TICK, 0.0)
-        state = check_tick(chain, session, state, turning)
-        assert seconds_left(chain, state) <= left + ROUNDING
+        state = check_tick(chain, session, state)
         assert state.branch == branch
         yield state
         if number % trip.grab == trip.grab - 1:
@@ -173,24 +163,22 @@ def check_tick(
     chain: Chain,
     session: Session,
     before: State,
-    turning: bool,
     *commands: cmd.Command,
 ) -> State:
-    """A tick: the arm keeps to its speeds, limits and branch, and goes to a target it can reach."""
+    """A tick: the arm keeps to its speeds, limits and elbow, and the goal to its branch.
+
+    The arm itself has mass: it follows the goal as fast as it may, and turns no corner at once.
+    """
     state = session.step(before, commands, before.t + TICK)
-    assert (np.abs(state.setpoint - before.setpoint) <= chain.speed * TICK * (1 + ROUNDING)).all()
+    limits = session.arm.limits
+    dt = TICK * (1 + ROUNDING)
+    assert (np.abs(state.setpoint - before.setpoint) <= limits.speed * dt).all()
+    assert (np.abs(state.motion.qd - before.motion.qd) <= limits.acceleration * dt + TINY).all()
+    assert (np.abs(state.motion.qdd - before.motion.qdd) <= limits.jerk * dt + TINY).all()
     assert chain.within_limits(state.setpoint, slack=0.0)
     if state.goal is not before.goal:
         assert on_branch(chain, state.goal, state.branch, ROUNDING)
-    assert on_branch(chain, state.setpoint, state.branch, OVER_AXIS_1)
-    reachable = state.status is Status.OK and state.since is None
-    if reachable and isinstance(state.target, ToolTarget):
-        was, now = tool(chain, before.setpoint), tool(chain, state.setpoint)
-        target = state.target.position
-        T_C_S = arm_of(chain).T_C_S
-        near = min(math.hypot(*(T_C_S[:2, :3] @ point + T_C_S[:2, 3])) for point in (now, target))
-        bow = BOW if near < NEAR_AXIS_1 or turning else ROUNDING
-        assert math.dist(now, target) <= math.dist(was, target) + bow
+    assert on_elbow(chain, state.setpoint, state.branch)
     return state
 
 
