@@ -36,7 +36,7 @@ GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
     Status.HELD: (234, 88, 12),
-    Status.BLOCKED: (214, 51, 108),
+    Status.BLOCKED: (255, 153, 0),
     Status.PAUSED: (120, 130, 145),
     Status.HALTED: (230, 45, 45),
     Status.FAULT: (230, 45, 45),
