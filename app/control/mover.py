@@ -74,8 +74,8 @@ class Mover:
             fingers = float(hand.x[-1])
             if self._met(state, ahead, fingers) is not None and not ahead.at_rest:
                 fingers = state.gripper_setpoint
-        stands = ahead.at_rest and bool((ahead.q == state.setpoint).all())
-        pinched = stands and fingers == state.gripper_setpoint and hand is not None
+        stands = state.motion.at_rest and ahead.at_rest and (ahead.q == state.setpoint).all()
+        pinched = bool(stands) and fingers == state.gripper_setpoint and hand is not None
         after = replace(
             state,
             motion=state.motion if stands else ahead,
