@@ -95,10 +95,15 @@ class FiveAxisArm:
         return bool((np.eye(4) == self.T_C_S).all() and (self.T_K_tool == np.eye(4)).all())
 
     @cached_property
+    def is_mirrored(self) -> bool:
+        """Whether half a turn about axis 1 takes the arm's plane to its own mirror image."""
+        return self.a == self.d == self.tilt == 0.0
+
+    @cached_property
     def is_straight(self) -> bool:
         """Whether the chain is its own canonical arm, and without offsets: as the Katana is."""
-        shape = (self.a, self.d, self.tilt, *self.shifts)
-        return self.is_canonical and not any(shape) and self.signs == (1.0,) * 5
+        is_plain = not any(self.shifts) and self.signs == (1.0,) * 5
+        return self.is_canonical and self.is_mirrored and is_plain
 
     def pose(self, T: FloatArray) -> FloatArray:
         """T_C_K (4, 4) of the pose `T` (4, 4) = T_S_tool."""
