@@ -21,13 +21,11 @@ from app.geometry.arrays import FloatArray, finite_array
 Rows = list[list[float]]
 """A matrix as nested lists of floats, which beat arrays for one pose at a time."""
 
-SQUARES_EXACT: Final = 6.0 * tolerances.ROTATION_EXACT**2
-"""For the sum of squares of the six misfits that make a matrix no rotation."""
-
 # Looked up once, because this stands before every inverse kinematics.
 _ARRAY: Final = np.ndarray
 _FLOAT: Final = np.dtype(np.float64)
 _LAST_ROW: Final = [0.0, 0.0, 0.0, 1.0]
+_SQUARES_EXACT: Final = 6.0 * tolerances.ROTATION_EXACT**2
 
 
 def hat(V: npt.ArrayLike) -> FloatArray:
@@ -132,4 +130,4 @@ def _is_clean(rows: Rows) -> bool:
     u, v, w = d * h - g * e - c, g * b - a * h - f, a * e - d * b - i
     squares = one * one + two * two + both * both + u * u + v * v + w * w
     total = x + y + z
-    return squares <= SQUARES_EXACT and total - total == 0.0 and last == _LAST_ROW
+    return squares <= _SQUARES_EXACT and total - total == 0.0 and last == _LAST_ROW

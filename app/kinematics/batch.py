@@ -78,11 +78,15 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
     inside = np.empty((len(T), 4), dtype=np.bool_)
     position = np.empty((len(T), 4)) if residuals else None
     rotation = np.empty((len(T), 4)) if residuals else None
+    # In one piece: what malloc once gave in one piece it keeps, and no page is zeroed anew.
+    work = np.empty(36 * min(len(T), CHUNK))
     # What is not finite is refused, or left to the scalar solver.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for rows in _chunks(len(T)):
-            asked = _validated(T[rows].transpose(1, 2, 0).copy(), rows.start)
-            _solve(chain, solver, asked, q[rows], inside[rows])
+            asked, angles = _arrays(work, rows.stop - rows.start)
+            np.copyto(asked, T[rows].transpose(1, 2, 0))
+            _validate(asked, rows.start, angles.reshape(20, -1))
+            _solve(chain, solver, asked, angles, q[rows], inside[rows])
             if position is not None and rotation is not None:
                 for branch in range(4):
                     reached = _forward(chain, q[rows, branch].T)
@@ -94,6 +98,12 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
 
 def _chunks(n: int) -> Iterator[slice]:
     return (slice(start, min(start + CHUNK, n)) for start in range(0, n, CHUNK))
+
+
+def _arrays(work: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Poses (4, 4, count) and angles (2, 2, 5, count) in the memory of `work`."""
+    asked, angles = work[: 16 * count], work[16 * count : 36 * count]
+    return asked.reshape(4, 4, count), angles.reshape(2, 2, 5, count)
 
 
 def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
@@ -110,13 +120,18 @@ def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatAr
     return array.astype(np.float64, copy=False)
 
 
-def _validated(T: FloatArray, start: int) -> FloatArray:
-    """The poses `T` (4, 4, C), the first the `start`-th, made clean or refused as one by one."""
+def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
+    """Make the poses `T` (4, 4, C), the first the `start`-th, clean, or refuse as one by one.
+
+    work: (15, C) or more, to write into.
+    """
     x, y, z = T[:3, 0], T[:3, 1], T[:3, 2]
-    misfit = np.empty((6, T.shape[2]))
-    squares, products = T[:3, :2] * T[:3, :2], x * y
+    misfit, products = work[:6], work[12:15]
+    squares = work[6:12].reshape(3, 2, -1)
+    np.multiply(T[:3, :2], T[:3, :2], out=squares)
     np.add(squares[0] + squares[1], squares[2], out=misfit[:2])
     misfit[:2] -= 1.0
+    np.multiply(x, y, out=products)
     np.add(products[0] + products[1], products[2], out=misfit[2])
     # The third axis is right-handed: unit length and squareness follow.
     for i in range(3):
@@ -124,12 +139,11 @@ def _validated(T: FloatArray, start: int) -> FloatArray:
         np.subtract(x[j] * y[k] - x[k] * y[j], z[i], out=misfit[3 + i])
     # NaN and infinity fail every comparison.
     if (
-        not np.einsum("ic,ic->c", misfit, misfit).max() <= se3.SQUARES_EXACT
+        not np.abs(misfit, out=misfit).max() <= tolerances.ROTATION_EXACT
         or (T[3] != _LAST_ROW).any()
         or not np.isfinite(T[:3, 3]).all()
     ):
         _clean(T, start)
-    return T
 
 
 def _clean(T: FloatArray, start: int) -> None:
@@ -188,8 +202,15 @@ def _direction(y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, Fl
 _ARRAYS: Final = Functions(np.atan2, np.sqrt, _root, _direction)
 
 
-def _solve(chain: Chain, solver: Solver, T: FloatArray, q: FloatArray, inside: BoolArray) -> None:
-    """Fill q (C, 4, 5) and inside (C, 4) for the poses `T` (4, 4, C)."""
+def _solve(
+    chain: Chain,
+    solver: Solver,
+    T: FloatArray,
+    angles: FloatArray,
+    q: FloatArray,
+    inside: BoolArray,
+) -> None:
+    """Fill q (C, 4, 5), inside (C, 4) for the poses `T` (4, 4, C) by way of angles (2, 2, 5, C)."""
     arm = solver.arm
     rows = T
     if not arm.is_canonical:
@@ -200,7 +221,7 @@ def _solve(chain: Chain, solver: Solver, T: FloatArray, q: FloatArray, inside: B
     r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
     # Of what overflowed or lies inside the cylinder of radius d neither is true.
     beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
-    angles = _canonical(arm, rows, rho, r)
+    _canonical(arm, rows, rho, r, angles)
     _turn(chain, arm, angles)
     inside[...] = _inside(chain, angles).reshape(4, -1).T
     q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
@@ -209,11 +230,12 @@ def _solve(chain: Chain, solver: Solver, T: FloatArray, q: FloatArray, inside: B
         q[i], inside[i] = found, [solver.inside(branch) for branch in found]
 
 
-def _canonical(arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArray) -> FloatArray:
-    """alpha (2, 2, 5, C) of shoulder, elbow, joint in [-pi, pi]; tool points well off axis 1."""
+def _canonical(
+    arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
+) -> None:
+    """Fill alpha (2, 2, 5, C) of shoulder, elbow, joint, in [-pi, pi], well off axis 1."""
     posture = closed_form(arm, _ARRAYS)
     x, y = rows[0, 3], rows[1, 3]
-    alpha = np.empty((2, 2, 5, len(x)))
 
     def stand(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:
         """Fill one shoulder's `side` (2, 5, C) but for alpha1."""
@@ -230,7 +252,7 @@ def _canonical(arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArra
             c, s = (x * u + y * arm.d) * square, (y * u - x * arm.d) * square
             side[:, 0] = np.atan2(s, c)
             stand(side, c, s, u)
-        return alpha
+        return
     c, s, one = x / rho, y / rho, np.atan2(y, x)
     front[:, 0], back[:, 0] = one, _behind(one)
     stand(front, c, s, rho)
@@ -240,7 +262,6 @@ def _canonical(arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArra
         back[:, 4] = _behind(front[0, 4])
     else:
         stand(back, -c, -s, -rho)
-    return alpha
 
 
 def _behind(theta: FloatArray) -> FloatArray:
@@ -282,9 +303,7 @@ def _turn(chain: Chain, arm: FiveAxisArm, angles: FloatArray) -> None:
 def _inside(chain: Chain, angles: FloatArray) -> BoolArray:
     """(2, 2, C) whether the joint angles (2, 2, 5, C) are inside the limits."""
     lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
-    # Both elbows of a shoulder share angles 1 and 5.
-    sides, plane = angles[:, 0, ::4], angles[:, :, 1:4]
-    one_five = (sides >= lower[::4, None]) & (sides <= upper[::4, None])
-    between = (plane >= lower[1:4, None]) & (plane <= upper[1:4, None])
-    both = one_five[:, 0] & one_five[:, 1]
-    return np.asarray(between[:, :, 0] & between[:, :, 1] & between[:, :, 2] & both[:, None])
+    inside = angles >= lower[:, None]
+    inside &= angles <= upper[:, None]
+    one, two, three, four, five = inside.transpose(2, 0, 1, 3)
+    return np.asarray(one & two & three & four & five)
