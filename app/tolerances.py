@@ -8,8 +8,8 @@ from typing import Final
 # rotation: single-precision numbers and rounded text pass, a scale or a shear does not.
 ROTATION_INPUT: Final = 1e-6
 
-# How far from orthonormal a rotation is that a few products of rotations in double precision made:
-# finding the nearest one would only exchange this rounding for its own.
+# How far from orthonormal (root mean square of six misfits) a rotation is that a few products of
+# rotations in double precision made: the nearest one would only exchange this rounding for its own.
 ROTATION_EXACT: Final = 4e-15
 
 # How far from 0 0 0 1 the last row of a pose may be: rounding of a product of poses, no more.

@@ -95,6 +95,11 @@ class FiveAxisArm:
         """Whether {C} is {S} and {K} the tool, so that poses need no change of frames."""
         return bool((np.eye(4) == self.T_C_S).all() and (self.T_K_tool == np.eye(4)).all())
 
+    @cached_property
+    def is_mirrored(self) -> bool:
+        """Whether half a turn about axis 1 takes the arm's plane to its own mirror image."""
+        return self.a == self.d == self.tilt == 0.0
+
     def pose(self, T: FloatArray) -> FloatArray:
         """T_C_K (4, 4) of the pose `T` (4, 4) = T_S_tool."""
         return T if self.is_canonical else self.T_C_S @ T @ self.T_tool_K

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -22,14 +23,14 @@ MEMBERS, POSES = 200, 10
 # [m] and [rad]; {S} may stand two metres away, at which forward kinematics is no better.
 POSITION, ROTATION = 1e-14, 1e-12
 
-Case = tuple[Chain, Offsets, FloatArray, FloatArray, tuple[Solution, ...]]
+Case = tuple[Chain, Offsets, FloatArray, FloatArray, Sequence[Solution]]
 
 
 @pytest.fixture(scope="module")
 def solved() -> list[Case]:
     """(member, what it is made of, q, T, inverse(T)) of joint vectors anywhere."""
     rng = np.random.default_rng(25)
-    result = []
+    result: list[Case] = []
     for _ in range(MEMBERS):
         chain, offsets = random_member(rng)
         for q in rng.uniform(chain.lower, chain.upper, size=(POSES, 5)):
