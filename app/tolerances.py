@@ -32,6 +32,9 @@ FAMILY_EXACT: Final = 1e-9
 # [1, m] What is left of a 0 or a 1 after a few products of matrices in double precision.
 ROUNDING: Final = 1e-15
 
+# [1] Cosine of the tool's pitch up to which nothing but rounding is left of where it faces.
+UPRIGHT: Final = 1e-14
+
 # [m] Distance below which a point counts as lying on a rotation axis: its direction seen from the
 # axis is then known to fewer digits than a joint encoder resolves.
 ON_AXIS: Final = 1e-9

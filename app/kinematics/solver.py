@@ -62,23 +62,23 @@ def facing_near_axis_1(
 
     Sound everywhere, but meant for a tool point near axis 1 (or near the cylinder of radius d about
     it, which no tool point enters), where its place tells little of alpha1: the direction of the
-    tool's x axis (r11, r21) tells more, where it agrees. Neither does with the tool upright on axis
-    1: alpha1 is then `free`.
+    tool's x axis (r11, r21) tells more, where it agrees or is the longer of the two. Neither tells
+    anything with the tool upright on axis 1: alpha1 is then `free`.
     """
     d, rounding = arm.d, 2.0 * tolerances.ROUNDING * arm.reach
     rho, flat = math.hypot(x, y), math.hypot(r11, r21)
-    on_axis = rho <= tolerances.ON_AXIS
-    if flat > tolerances.ON_AXIS:
+    if flat > tolerances.UPRIGHT:
         c, s = r11 / flat, r21 / flat
         if abs(c * y - s * x + d) < abs(c * y - s * x - d):
             c, s = -c, -s
-        if on_axis or abs(c * y - s * x - d) <= rounding:
+        trusted = rho <= min(tolerances.ON_AXIS, flat * arm.reach)
+        if trusted or abs(c * y - s * x - d) <= rounding:
             u = c * x + s * y
             front, back = (c, s, u), _opposite(d, x, y, rho, c, s, u)
             if u < -rounding:
                 front, back = back, front
             return _with_angle(*front) + _with_angle(*back)
-    elif on_axis:
+    elif rho <= 0.5 * rounding:
         c, s = math.cos(free), math.sin(free)
         return free, c, s, 0.0, free + math.pi, -c, -s, 0.0
     sine = min(max(d / rho, -1.0), 1.0)
