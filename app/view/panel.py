@@ -10,6 +10,7 @@ import numpy as np
 import viser
 
 from app.control import commands as cmd
+from app.control.ledger import Entry
 from app.control.state import State
 from app.errors import InputError
 from app.geometry import se3, so3
@@ -19,6 +20,7 @@ from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList
+from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
 from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees
 
@@ -107,9 +109,13 @@ class Panel:
             self._branches = BranchList(server, model, self._on_person, state)
         with self._gui.add_folder("Show", expand_by_default=False):
             add_shows(self._gui, shows)
+        with self._gui.add_folder("Why", expand_by_default=False):
+            self._why = LedgerList(self._gui)
 
-    def follow(self, state: State, now: float, *, caught_up: bool) -> None:
-        """Show ``state`` at time ``now`` [s].
+    def follow(
+        self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool
+    ) -> None:
+        """Show ``state`` at time ``now`` [s], and ``ledger``, what held the arm back so far.
 
         ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
         that an older state never takes a slider out of the hand that moves it.
@@ -130,6 +136,7 @@ class Panel:
             if page != self._told:
                 self._told = self._readout.content = page
             self._branches.follow(state)
+            self._why.follow(ledger)
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
         chain = self._model.arm.chain

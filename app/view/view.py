@@ -139,6 +139,7 @@ class View:
             self._panel.follow(
                 state,
                 time.perf_counter(),
+                self._loop.ledger,
                 caught_up=snapshot.ticket == self._mailbox.last_ticket,
             )
         self._server.flush()
