@@ -23,6 +23,10 @@ they may be somewhat nearer."""
 
 SEED = 450
 
+BEYOND = 0.5
+"""Share of a range that postures are drawn beyond each of its ends and brought back: parts often
+come nearest where joints are at their limits, and so each joint is at one in half the postures."""
+
 
 def pairs_that_meet(
     linkage: Linkage, parts: Sequence[Part], lower: FloatArray, upper: FloatArray
@@ -46,7 +50,11 @@ def pairs_that_meet(
     )
     deep = np.zeros(len(candidates), dtype=int)
     near = np.zeros(len(candidates), dtype=bool)
-    postures = np.random.default_rng(SEED).uniform(lower, upper, (SAMPLES, len(lower)))
+    beyond = BEYOND * (upper - lower)
+    drawn = np.random.default_rng(SEED).uniform(
+        lower - beyond, upper + beyond, (SAMPLES, len(lower))
+    )
+    postures = np.clip(drawn, lower, upper)
     for number, x in enumerate(postures):
         placed = world.at(x)
         known = near if number >= ALWAYS else np.zeros_like(near)

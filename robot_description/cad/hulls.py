@@ -46,42 +46,44 @@ class Cut:
 UNCUT = Cut("x", ())
 
 CUTS: dict[str, Cut] = {
-    # Flange | drum and connector panel | the rim's two horns.
-    "base_link": Cut("z", (8.2, 69.5), {1: Cut("y", (-72.1,)), 2: Cut("y", (0.0,))}),
-    # Flange | connector, ring, cable box and gland | column and collar.
-    "arm_base_link": Cut("z", (13.7, 42.3), {1: Cut("x", (-46.0,), {1: Cut("y", (46.0, 60.0))})}),
-    # Neck and skirt | right disc, right cheek, left cheek, left disc.
-    "pan_link": Cut("z", (-44.4,), {1: Cut("y", (-49.2, 0.0, 49.2))}),
-    # Bellows on their shaft | tube | terminal box and its glands | tube | elbow cover on its shaft.
-    "upper_arm_link": Cut(
-        "x", (43.0, 74.0, 118.0, 154.0), {2: Cut("y", (52.2,), {1: Cut("x", (96.0,))})}
+    # Flange | drum with its connector panel and its saddle.
+    "base_link": Cut("z", (11.05,)),
+    # Flange | ring and connector, cable box | column and collar; beside them the gland.
+    "arm_base_link": Cut("y", (61.9,), {0: Cut("z", (18.9, 42.1), {1: Cut("y", (46.0,))})}),
+    # Right disc | neck and skirt, below the two cheeks | eye, below the left disc.
+    "pan_link": Cut(
+        "y",
+        (-49.2, 51.75),
+        {1: Cut("z", (-29.5,), {1: Cut("y", (0.0,))}), 2: Cut("z", (-38.0,))},
     ),
-    # The fork, from right to left: disc, cheek, web, cheek, disc beside terminal box and glands |
-    # tube | wrist cover on its shaft.
+    # Bellows on their shaft | tube | terminal box | tube | elbow cover on its shaft; two glands.
+    "upper_arm_link": Cut(
+        "y", (52.2,), {0: Cut("x", (43.3, 74.9, 117.1, 153.3)), 1: Cut("x", (96.0,))}
+    ),
+    # The fork, from right to left: disc, cheek, web, cheek, disc beside terminal box and, beyond
+    # them, two glands | tube | wrist cover on its shaft.
     "forearm_link": Cut(
         "x",
         (77.2, 105.0),
         {
             0: Cut(
                 "y",
-                (-38.8, -26.8, 26.8, 37.2),
-                {4: Cut("x", (29.0,), {1: Cut("y", (78.7,), {1: Cut("x", (49.0,))})})},
+                (-38.8, -26.8, 26.8, 37.2, 78.7),
+                {4: Cut("x", (28.5,)), 5: Cut("x", (49.0,))},
             )
         },
     ),
-    # The fork, as above | housing | bumper.
+    # The fork: disc, cheek, cheek, disc beside terminal box, gland | housing | bumper.
     "wrist_link": Cut(
         "x",
         (62.0, 101.0),
-        {0: Cut("y", (-31.3, 0.0, 29.7), {3: Cut("x", (30.0,), {1: Cut("y", (73.2,))})})},
+        {0: Cut("y", (-31.3, 0.0, 29.7, 73.2), {3: Cut("x", (30.4,))})},
     ),
-    # Cylinder | dome.
-    "roll_link": Cut("z", (22.2,)),
-    # Plate | root of the fork | its two prongs.
-    "gripper_link": Cut("x", (2.5, 22.0), {2: Cut("z", (0.0,))}),
-    # Lug beside the root of the strip | strip to its first, second bend | tip.
-    "finger_right_link": Cut("x", (20.0, 48.0, 63.0), {0: Cut("z", (6.0,))}),
-    "finger_left_link": Cut("x", (20.0, 48.0, 63.0), {0: Cut("z", (-6.0,))}),
+    # Plate and root of the fork | its two prongs | bridge.
+    "gripper_link": Cut("x", (26.0, 42.1), {1: Cut("z", (0.0,))}),
+    # Lug with its crown, foot | strip to its first, second bend | tip.
+    "finger_right_link": Cut("x", (9.6, 48.0, 63.0), {0: Cut("y", (12.0,))}),
+    "finger_left_link": Cut("x", (9.6, 48.0, 63.0), {0: Cut("y", (-12.0,))}),
 }
 """By link: a change of its outline asks for another plane here, and a test says where."""
 
