@@ -88,6 +88,8 @@ def _bend(branch: Branch) -> int:
 
 
 def _in_turn(limits: Interval, angle: float, hint: float) -> float:
+    if abs(hint - angle) <= math.pi:
+        return angle
     turned = angle + math.tau * round((hint - angle) / math.tau)
     return turned if limits.lower <= turned <= limits.upper else angle
 

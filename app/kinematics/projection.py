@@ -95,7 +95,7 @@ def measured(
     """
     arm, in_plane = arm_of(chain), stance.in_plane
     if q is None:
-        q = np.clip(arm.joints(stance.alpha), chain.lower, chain.upper)
+        q = np.minimum(np.maximum(arm.joints(stance.alpha), chain.lower), chain.upper)
     reached = forward(chain, q)
     theta1 = stance.alpha[0]
     outward, sideways, down = asked.heading(theta1)
@@ -119,7 +119,6 @@ def measured(
 def _binding(chain: Chain, q: FloatArray, stance: Stance) -> Iterator[int]:
     held = stance.in_plane.posture_bound
     may_bind = (stance.theta1_bound, held, held, held, stance.in_plane.roll_bound)
-    for i, bound in enumerate(may_bind):
-        gap = min(abs(float(q[i] - chain.lower[i])), abs(float(q[i] - chain.upper[i])))
-        if bound and gap <= tolerances.LIMIT_SLACK:
-            yield i
+    if any(may_bind):
+        at_end = np.minimum(abs(q - chain.lower), abs(q - chain.upper)) <= tolerances.LIMIT_SLACK
+        yield from (i for i, bound in enumerate(may_bind) if bound and at_end[i])

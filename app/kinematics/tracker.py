@@ -40,17 +40,18 @@ person sees motion and no leap."""
 STRIDE: Final = 0.02
 """[m] A faster drag is followed along its way in strides: about a hop of the joints."""
 
-LONGEST_WAY: Final = 64
+LONGEST_WAY: Final = 32
 """Strides along one drag; a longer one takes longer strides."""
-
-HOPS_A_STRIDE: Final = 2
-
-HOP_EFFORT: Final = 2
-"""Looking for the nearest pose within a hop takes that many times as long as among all."""
 
 EFFORT: Final = 18
 """Nearest poses sought in one call. What is farther is reached in the next: the joints need several
 ticks for a hop, so the goal stays ahead of them."""
+
+OUT_OF_REACH_EFFORT: Final = 3
+"""Looking for the nearest to what cannot be reached takes that many times as long."""
+
+EFFORT_A_STRIDE: Final = 2 * OUT_OF_REACH_EFFORT
+"""For the hops of one stride: two are enough unless something is in the way."""
 
 WORTH_A_HOP: Final = 1e-6
 """[m], [rad] Coming nearer by less is rounding."""
@@ -119,16 +120,16 @@ def track(
     ahead = nearest_stance(limited, asked, branch, alpha)
     if _within_hop(alpha, ahead.alpha):
         return Tracked(_projection(chain, target, asked, ahead))
-    effort = EFFORT
+    effort = EFFORT - _effort(ahead)
     for stop in () if since is None else _way(since, target):
         wish = stop.asked(limited.arm, reading)
         pursuit = _Pursuit(limited, wish, nearest_stance(limited, wish, branch, alpha))
-        found = pursuit.follow(alpha, HOPS_A_STRIDE)
-        alpha, effort = found.alpha, effort - 1 - HOP_EFFORT * pursuit.hops
+        found = pursuit.follow(alpha, EFFORT_A_STRIDE)
+        alpha, effort = found.alpha, effort - _effort(pursuit.best) - pursuit.effort
         if effort <= 0:
             return Tracked(_projection(chain, target, asked, found), since=stop)
     pursuit = _Pursuit(limited, asked, ahead)
-    found = pursuit.follow(alpha, math.ceil(effort / HOP_EFFORT))
+    found = pursuit.follow(alpha, effort)
     best = _projection(chain, target, asked, found)
     if not pursuit.ended:
         return Tracked(best, since=target)
@@ -170,26 +171,26 @@ def _way(since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
 class _Pursuit:
     """The way in hops to `asked`, of which `best` is the nearest pose.
 
-    hops: how many were tried. ended: whether no further one would lead nearer.
+    effort: what looking for them took. ended: whether no further one would lead nearer.
     """
 
     def __init__(self, limited: LimitedArm, asked: Asked, best: Stance) -> None:
         self.limited = limited
         self.asked = asked
         self.best = best
-        self.hops = 0
+        self.effort = 0
         self.ended = False
 
     def follow(self, alpha: Five, most: int) -> Stance:
-        """`best` if it is a hop away, else where at most `most` hops from `alpha` lead."""
+        """`best` if it is a hop away, else where hops from `alpha` of so much effort lead."""
         arm = self.limited.arm
         found, miss = None, _misses(arm, self.asked, alpha)
-        while not self.ended and self.hops < most:
+        while not self.ended and self.effort < most:
             if _within_hop(alpha, self.best.alpha):
                 found, self.ended = self.best, True
                 break
             hop = _hop(self.limited, alpha, self.asked, self.best.branch)
-            self.hops += 1
+            self.effort += _effort(hop)
             hop_miss = _misses(arm, self.asked, hop.alpha)
             worthwhile = _nearer(hop_miss, miss, WORTH_A_HOP)
             # Where not the bounds of the hop hold it, another one would lead nowhere.
@@ -197,6 +198,10 @@ class _Pursuit:
             if worthwhile or (found is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
                 found, alpha, miss = hop, hop.alpha, hop_miss
         return _standing(alpha, self.best.branch) if found is None else found
+
+
+def _effort(stance: Stance) -> int:
+    return 1 if stance.position_error <= tolerances.SAME_POSITION else OUT_OF_REACH_EFFORT
 
 
 def _standing(alpha: Five, branch: Branch) -> Stance:
