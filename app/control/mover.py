@@ -20,9 +20,9 @@ from app.control.state import Finding, Jogging, Reason, State
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
-from app.kinematics.forward import forward, jacobian_body
+from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitched_frame
-from app.kinematics.velocity import JogFrame, jog
+from app.kinematics.velocity import JogFrame, jog, tool_speed
 from app.motion.limiter import Limiter, Limits, Motion
 
 PROBE = 0.02
@@ -117,8 +117,8 @@ class Mover:
                 ahead = self._any.at_rate(motion, rates, dt)
             else:
                 ahead = limiter.towards(motion, state.goal, dt, share)
-            speed = _tool_speed(chain, ahead.q, ahead.qd)
-            if speed <= max(self._tool_speed, _tool_speed(chain, motion.q, motion.qd)):
+            speed = tool_speed(chain, ahead.q, ahead.qd)
+            if speed <= max(self._tool_speed, tool_speed(chain, motion.q, motion.qd)):
                 break
             share *= 0.9 * self._tool_speed / speed
         return ahead
@@ -135,7 +135,7 @@ class Mover:
         fastest = way / float(np.max(np.abs(way) / chain.speed))
         # Where the arm is by the time it could have slowed down the tool may be farther out.
         soon = np.clip(state.setpoint + AHEAD * state.motion.qd, chain.lower, chain.upper)
-        speed = max(_tool_speed(chain, q, fastest) for q in (state.setpoint, soon))
+        speed = max(tool_speed(chain, q, fastest) for q in (state.setpoint, soon))
         return min(1.0, self._tool_speed / speed) if speed > 0.0 else 1.0
 
     def _fingers(self, state: State, dt: float) -> float:
@@ -210,10 +210,6 @@ def _rates(chain: Chain, q: FloatArray, jogging: Jogging, dt: float) -> FloatArr
     v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
     omega = jogging.rates[3] * pitched[:, 1] + jogging.rates[4] * pitched[:, 0]
     return jog(chain, q, np.concatenate((omega, v)), JogFrame.BASE, dt)
-
-
-def _tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:
-    return float(np.linalg.norm(jacobian_body(chain, q)[3:] @ qd)) if qd.any() else 0.0
 
 
 def _told(state: State, contact: Contact | None) -> State:
