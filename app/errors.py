@@ -17,3 +17,7 @@ class RobotDescriptionError(KatanaError):
 
 class ConfigurationError(KatanaError):
     """A setting of the program is missing or contradicts another."""
+
+
+class LeaseError(KatanaError):
+    """Somebody asked of the lease of the arm what is not theirs to ask."""

@@ -46,12 +46,12 @@ class Side:
 
     def move(self) -> dict[str, float]:
         """Move the gizmo once and return the milliseconds of each span."""
-        self.page.page.evaluate("(quiet) => harness.arm(quiet)", QUIET_MILLISECONDS)
+        self.page.frame.evaluate("(quiet) => harness.arm(quiet)", QUIET_MILLISECONDS)
         # Else every move would meet the server's clocks at the same moment.
         self.page.page.wait_for_timeout(random.uniform(0.0, 50.0))
         self.moves += 1
         self.grip.to(STRIDE * (self.moves % 2))
-        timed: dict[str, float] = self.page.page.evaluate("() => harness.timed()")
+        timed: dict[str, float] = self.page.frame.evaluate("() => harness.timed()")
         return timed
 
 
@@ -63,8 +63,8 @@ def open_side(
     page = stack.enter_context(
         closing(ViserPage.open(browser, server.url, nodes=[GIZMO], stub_draws=True))
     )
-    page.page.evaluate(SCRIPT.read_text(encoding="utf-8"))
-    if not page.page.evaluate("(prefixes) => harness.watch(prefixes)", prefixes):
+    page.frame.evaluate(SCRIPT.read_text(encoding="utf-8"))
+    if not page.frame.evaluate("(prefixes) => harness.watch(prefixes)", prefixes):
         raise SystemExit(f"`{shlex.join(command)}` shows no node under {' or '.join(prefixes)}")
     grip = stack.enter_context(page.grip_arrow(GIZMO, axis))
     return Side(page, grip, {span: [] for span in SPANS})

@@ -6,13 +6,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import viser
 
 from app.collision.shape import half_space
 from app.collision.world import obstacle
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
 from app.exchange.reachability_file import load_map
+from app.gateway.gateway import Gateway
 from app.robot.collision import world_of
 from app.robot.model import load
 from app.runtime.clock import MonotonicClock
@@ -24,11 +24,11 @@ from app.view.view import View
 
 
 class Assembly:
-    """A simulated arm, its control loop, and the view of it on a server that is open already."""
+    """A simulated arm, its control loop, and the view of it behind a gateway that is open."""
 
     def __init__(
         self,
-        server: viser.ViserServer,
+        gateway: Gateway,
         settings: Settings,
         urdf: Path,
         tool: str | None,
@@ -52,7 +52,8 @@ class Assembly:
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
-        self._view = View(server, model, self._loop, mailbox, settings.frame_rate, stored)
+        self._view = View(gateway.viser, model, self._loop, mailbox, settings.frame_rate, stored)
+        gateway.attach(model.arm, self._loop, mailbox, self._view.let_go)
 
     def start(self) -> None:
         """Run the control loop and the view in threads of their own."""

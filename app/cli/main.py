@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.cli.access_options import add_access_options
 from app.cli.version import version
 from app.cli.workspace_options import add_workspace_options
 from app.errors import KatanaError
@@ -24,8 +25,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.command == "serve":
             from app.cli.serve import serve
 
-            settings = Settings(host=options.host, port=options.port)
+            settings = Settings(
+                host=options.host,
+                port=options.port,
+                access=options.access,
+                insecure=options.insecure,
+                tls_cert=options.tls_cert,
+                tls_key=options.tls_key,
+                public_url=options.public_url,
+            )
             return serve(settings, options.urdf, options.tool, options.workspace)
+        if options.command == "access":
+            from app.cli.access import access
+
+            return access(options)
         if options.command == "workspace":
             from app.cli.workspace import workspace
 
@@ -63,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument(
         "--host",
         default=Settings.host,
-        help="address to listen on; anything but the default lets the network drive the arm "
+        help="address to listen on; one that other machines can reach asks for --access "
         "(default: %(default)s)",
     )
     serve.add_argument(
@@ -74,6 +87,24 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="FILE.npz",
         help="a map written by `katana450 workspace --out`, to be shown in the scene",
+    )
+    serve.add_argument(
+        "--access",
+        type=Path,
+        metavar="FILE",
+        help="let in only people with a link that `katana450 access give` wrote into this file",
+    )
+    serve.add_argument(
+        "--insecure",
+        action="store_true",
+        help="let other machines in without a link: everybody there can drive the arm",
+    )
+    serve.add_argument("--tls-cert", type=Path, metavar="FILE", help="certificate, for https")
+    serve.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key")
+    serve.add_argument(
+        "--public-url",
+        metavar="URL",
+        help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
     )
     for name, what in (
         ("fk", 'joints to poses: {"q": [5 angles, rad], "tool": "tcp"} a line'),
@@ -99,7 +130,11 @@ def _parser() -> argparse.ArgumentParser:
             "workspace", help="map where the tool can be, and how freely it can be turned there"
         )
     )
-    for command in commands.choices.values():
+    with_an_arm = list(commands.choices.values())
+    add_access_options(
+        commands.add_parser("access", help="give people links by which they may come in")
+    )
+    for command in with_an_arm:
         command.add_argument(
             "--urdf",
             type=Path,

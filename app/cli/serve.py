@@ -9,8 +9,8 @@ import threading
 from pathlib import Path
 from types import FrameType
 
+from app.gateway.gateway import Gateway
 from app.settings import Settings
-from app.view.server import open_server
 from robot_description import URDF_PATH
 
 
@@ -33,17 +33,23 @@ def serve(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
-    server = open_server(settings.host, settings.port)
-    url = f"http://{_shown(settings.host)}:{server.get_port()}"
+    gateway = Gateway(settings)
+    gateway.start()
+    scheme = "https" if settings.tls_cert is not None else "http"
+    url = settings.public_url or f"{scheme}://{_shown(settings.host)}:{gateway.port}"
     print(f"Open {url} in a browser.", flush=True)
-    # The libraries that read the robot take most of a second: the page loads in the meantime.
-    from app.cli.assembly import Assembly
+    try:
+        # The libraries that read the robot take most of a second: the page loads in the meantime.
+        from app.cli.assembly import Assembly
 
-    assembly = Assembly(server, settings, urdf, tool, workspace)
-    assembly.start()
-    print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
-    stopping.wait()
-    assembly.stop()
+        assembly = Assembly(gateway, settings, urdf, tool, workspace)
+        assembly.start()
+        print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
+        stopping.wait()
+        gateway.stop()
+        assembly.stop()
+    finally:
+        gateway.stop()
     return 0
 
 

@@ -11,14 +11,14 @@ from typing import BinaryIO
 
 from app.errors import InputError
 
-Writer = Callable[[BinaryIO], None]
+Writer = Callable[[BinaryIO], object]
 
 
-def write_files(writers: Mapping[Path, Writer]) -> None:
+def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
     """Write every file, and only then put them in place, over what was there.
 
-    Whatever stops the writing leaves the old files as they were. Raises InputError when a file
-    cannot be written.
+    ``mode``: who may read and write them, less what the umask takes away. Whatever stops the
+    writing leaves the old files as they were. Raises InputError when a file cannot be written.
     """
     with ExitStack() as stack:
         written: list[tuple[Path, Path]] = []
@@ -26,7 +26,8 @@ def write_files(writers: Mapping[Path, Writer]) -> None:
             try:
                 temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
                 stack.callback(temporary.unlink, missing_ok=True)
-                with temporary.open("xb") as file:
+                opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+                with os.fdopen(opened, "wb") as file:
                     writer(file)
                     file.flush()
                     os.fsync(file.fileno())

@@ -89,6 +89,11 @@ class Gizmo:
             depth_test=False,
         )
 
+    def let_go(self) -> None:
+        """Forget every drag under way; nothing of it counts any more."""
+        self._held.clear()
+        self._turns.clear()
+
     def follow(self, state: State, T: FloatArray) -> None:
         """Go where the goal of ``state`` is, ``T`` (4, 4) in the base frame, unless held."""
         if not self._held:
@@ -104,6 +109,8 @@ class Gizmo:
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
         if event.phase == "start":
             self._held.add("move")
+            return
+        if "move" not in self._held:
             return
         if event.phase == "end":
             self._held.discard("move")
@@ -142,7 +149,7 @@ class Gizmo:
             self._held.add(ring)
             return None
         turn = self._turns.get(ring)
-        if turn is None:
+        if turn is None or ring not in self._held:
             return None
         D = turn.R_start.T @ R
         angle = (
@@ -153,7 +160,7 @@ class Gizmo:
         turn.turned += math.remainder(angle - turn.turned, math.tau)
         if event.phase == "end":
             self._held.discard(ring)
-            del self._turns[ring]
+            self._turns.pop(ring, None)
         return turn
 
 

@@ -1,14 +1,12 @@
 """Nothing enters from a browser but what a browser's person can really do.
 
 viser passes whatever a client sends to its handlers: an attribute of a control by any name, a
-value outside a slider's range, a pose that is not a number. Each client message is looked at here
-before viser sees it, and dropped when it is not one our page could have sent; the others notice
-nothing.
+value outside a slider's range, a pose that is not a number. Here is what a client message must be
+so that our page could have sent it; the gateway asks before viser sees any.
 """
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Iterable
 from typing import Any
@@ -16,7 +14,7 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-log = logging.getLogger(__name__)
+from app.view.looks import PERSONAL
 
 WORKSPACE = 1.5
 """[m] No gizmo goes farther from the base in any direction: more than twice the arm's reach."""
@@ -27,76 +25,70 @@ QUATERNION_SLACK = 1e-3
 LONGEST_TEXT = 200
 """Characters of a text field."""
 
-TOLD = 20
-"""Dropped messages that are logged one by one; a flood must not fill the log."""
-
 
 class Guard:
-    """Stands between viser's socket and viser's handlers."""
+    """Tells what our page can have sent from what it cannot. Changes nothing."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._drags: set[tuple[Any, str]] = set()
-        self.dropped = 0
-        """Client messages refused since the start."""
-        websocket = server._websock_server
-        handle = websocket._handle_incoming_message
 
-        async def guarded(client_id: Any, message: Any) -> None:
-            objection = self._objection(client_id, message)
-            if objection is None:
-                await handle(client_id, message)
-            else:
-                self._drop(client_id, message, objection)
-
-        websocket._handle_incoming_message = guarded  # type: ignore[method-assign]
-        websocket.on_client_connect(self._greet)
-        websocket.on_client_disconnect(self._forget)
-
-    def _greet(self, connection: Any) -> None:
-        """A browser's own handlers have its camera to follow and nothing else."""
-        handle = connection._handle_incoming_message
-
-        async def guarded(client_id: Any, message: Any) -> None:
-            if isinstance(message, wire.ViewerCameraMessage) and self._camera(message) is None:
-                await handle(client_id, message)
-
-        connection._handle_incoming_message = guarded
-
-    def _forget(self, connection: Any) -> None:
-        self._drags = {drag for drag in self._drags if drag[0] != connection.client_id}
-
-    def _drop(self, client_id: Any, message: Any, objection: str) -> None:
-        self.dropped += 1
-        if self.dropped <= TOLD:
-            kind = type(message).__name__
-            log.warning("Dropped a %s of browser %s: %s.", kind, client_id, objection)
-        if self.dropped == TOLD:
-            log.warning("More of that is dropped without a word.")
-
-    def _objection(self, client_id: Any, message: Any) -> str | None:
-        """Why ``message`` must not enter, or None when it may."""
+    def objection(self, message: Any) -> str | None:
+        """Why no page of ours can have sent ``message``, or None when one can."""
+        if getattr(message, "owner", ""):
+            return "no window owns a part of the scene"
         try:
             match message:
                 case wire.ViewerCameraMessage():
                     return self._camera(message)
                 case wire.GuiUpdateMessage():
                     return self._update(message)
-                case wire.TransformControlsDragStartMessage():
-                    self._drags.add((client_id, message.name))
-                    return None
                 case wire.TransformControlsUpdateMessage():
-                    if (client_id, message.name) not in self._drags:
-                        return "it drags what it has not taken hold of"
                     return self._gizmo(message)
-                case wire.TransformControlsDragEndMessage():
-                    self._drags.discard((client_id, message.name))
-                    return None
+                case (
+                    wire.TransformControlsDragStartMessage()
+                    | wire.TransformControlsDragEndMessage()
+                ):
+                    return self._handle(message)
                 case wire.SceneNodeClickMessage():
                     return self._click(message)
         except (TypeError, ValueError, AttributeError, OverflowError) as error:
             return f"it is malformed ({error})"
         return "the page has no use for it"
+
+    def drives(self, message: Any) -> bool:
+        """Whether ``message`` reaches beyond the window it comes from."""
+        if isinstance(message, wire.GuiUpdateMessage):
+            return getattr(self._control(message), "label", None) not in PERSONAL
+        return not isinstance(message, wire.ViewerCameraMessage)
+
+    def correction(self, message: Any) -> list[Any]:
+        """What the sender must be told so that its window shows the truth again.
+
+        For a ``message`` that passed ``objection`` and yet did not enter.
+        """
+        match message:
+            case wire.GuiUpdateMessage():
+                handle = self._control(message)
+                if isinstance(handle, viser.GuiButtonHandle | viser.GuiButtonGroupHandle):
+                    return []
+                value = getattr(handle, "value", None)
+                return [wire.GuiUpdateMessage(message.uuid, {"value": value})]
+            # Not in mid-drag: hand and truth would wrestle for the handle.
+            case wire.TransformControlsDragEndMessage():
+                node = self._node(message)
+                w, x, y, z = map(float, node.wxyz)
+                px, py, pz = map(float, node.position)
+                return [
+                    wire.SetOrientationMessage(message.name, (w, x, y, z)),
+                    wire.SetPositionMessage(message.name, (px, py, pz)),
+                ]
+        return []
+
+    def _control(self, message: wire.GuiUpdateMessage) -> Any:
+        return self._server.gui._gui_input_handle_from_uuid.get(message.uuid)
+
+    def _node(self, message: Any) -> Any:
+        return self._server.scene.get_handle_by_name(message.name)
 
     @staticmethod
     def _camera(message: wire.ViewerCameraMessage) -> str | None:
@@ -106,8 +98,11 @@ class Guard:
         )  # fmt: skip
         return None if _finite(numbers) else "a camera number is not finite"
 
-    @staticmethod
-    def _gizmo(message: Any) -> str | None:
+    def _handle(self, message: Any) -> str | None:
+        is_one = isinstance(self._node(message), viser.TransformControlsHandle)
+        return None if is_one else "there is nothing of that name to drag"
+
+    def _gizmo(self, message: Any) -> str | None:
         if len(message.wxyz) != 4 or len(message.position) != 3:
             return "a pose has 4 and 3 numbers"
         if not _finite((*message.wxyz, *message.position)):
@@ -116,17 +111,16 @@ class Guard:
             return "its rotation is none"
         if max(abs(x) for x in message.position) > WORKSPACE:
             return f"its position is more than {WORKSPACE} m away"
-        return None
+        return self._handle(message)
 
     def _click(self, message: wire.SceneNodeClickMessage) -> str | None:
-        node = self._server.scene.get_handle_by_name(message.name)
-        if not getattr(node, "visible", False):
+        if not getattr(self._node(message), "visible", False):
             return "there is nothing of that name to click"
         numbers = (*message.ray_origin, *message.ray_direction, *message.screen_pos)
         return None if _finite(numbers) else "a number of its ray is not finite"
 
     def _update(self, message: wire.GuiUpdateMessage) -> str | None:
-        handle = self._server.gui._gui_input_handle_from_uuid.get(message.uuid)
+        handle = self._control(message)
         if handle is None:
             return "there is no such control"
         if set(message.updates) != {"value"}:

@@ -12,6 +12,9 @@ from app.view.cameras import Preset
 from app.view.reachability import Cut, ReachabilityCloud
 from app.view.room import THEMES, give
 
+PERSONAL = ("View", "Theme")
+"""Labels of the controls that concern no window but the one they are clicked in."""
+
 
 @dataclass(frozen=True)
 class Shows:

@@ -1,37 +1,71 @@
-"""The viser server, opened on the port that was asked for or not at all."""
+"""The viser server, on a port of its own that only the gateway may use."""
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import io
-import socket
+import secrets
+from typing import Any
 
 import viser
 
-from app.errors import ConfigurationError
 from app.view.brand import dress
 from app.view.cameras import FOV, LOOKS, Preset
-from app.view.guard import Guard
+
+KEY_HEADER = "X-Katana450-Key"
+"""Header in which the gateway shows the key."""
 
 
-def open_server(host: str, port: int) -> viser.ViserServer:
-    """A guarded viser server on ``host``:``port``, its scene still empty; port 0 takes a free one.
+def open_server(key: str) -> viser.ViserServer:
+    """A viser server on a free port of this machine alone, its scene still empty.
 
-    Raises:
-        ConfigurationError: the port is busy, or cannot be had; says which and what to do.
+    viser asks nobody who they are, and any program and any web page on this machine can reach a
+    port of it; so whoever connects without ``key`` is sent away before anything is said.
     """
-    _check_free(host, port)
     # What viser prints of itself here would stand between a person and our own line.
     with contextlib.redirect_stdout(io.StringIO()):
-        server = viser.ViserServer(host=host, port=port, label="Katana450", verbose=False)
-    # viser takes the next port when another program was quicker; a person would look in vain.
-    if port not in (0, server.get_port()):
-        server.stop()
-        raise ConfigurationError(_busy(host, port))
-    Guard(server)
+        server = viser.ViserServer(host="127.0.0.1", port=0, label="Katana450", verbose=False)
+    _Lock(server, key)
     _dress(server)
     return server
+
+
+class _Lock:
+    """Lets in those who have the key.
+
+    The hook is no public interface of viser's: its version is exact, and tests knock at the port.
+    """
+
+    def __init__(self, server: viser.ViserServer, key: str) -> None:
+        self._key = key
+        self._friends: set[int] = set()
+        self._websocket = server._websock_server
+        handle = self._websocket._handle_incoming_message
+
+        async def guarded(client_id: Any, message: Any) -> None:
+            if client_id in self._friends:
+                await handle(client_id, message)
+
+        self._websocket._handle_incoming_message = guarded  # type: ignore[method-assign]
+        # Before viser's own, so that a stranger is closed before it is sent anything.
+        self._websocket._client_connect_cb.insert(0, self._meet)
+        self._websocket.on_client_disconnect(
+            lambda connection: self._friends.discard(connection.client_id)
+        )
+
+    async def _meet(self, connection: Any) -> None:
+        line = self._websocket._live_connections[connection.client_id]
+        shown = line.request.headers.get(KEY_HEADER, "") if line.request else ""
+        if secrets.compare_digest(shown.encode(), self._key.encode()):
+            self._friends.add(connection.client_id)
+            return
+        # What it has sent already would still be read.
+        connection._handle_incoming_message = _ignore
+        await line.close(1008, "Not here: the page is at another port.")
+
+
+async def _ignore(_client_id: Any, _message: Any) -> None:
+    return
 
 
 def _dress(server: viser.ViserServer) -> None:
@@ -44,36 +78,3 @@ def _dress(server: viser.ViserServer) -> None:
     server.initial_camera.position = look.position
     server.initial_camera.look_at = look.target
     server.initial_camera.fov = FOV
-
-
-def _check_free(host: str, port: int) -> None:
-    try:
-        family, _, _, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-    except (socket.gaierror, OverflowError) as error:
-        raise ConfigurationError(
-            f"{host!r} is not an address of this machine: {error}. Choose another with --host."
-        ) from error
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        # As the server itself will: a port that is only closing down is free.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(address)
-        except OSError as error:
-            raise ConfigurationError(_refused(host, port, error)) from error
-
-
-def _refused(host: str, port: int, error: OSError) -> str:
-    if error.errno == errno.EADDRINUSE:
-        return _busy(host, port)
-    if error.errno == errno.EACCES:
-        return f"Port {port} may not be opened by this user. Choose one above 1023 with --port."
-    return f"Cannot listen on {host}: {error.strerror}. Choose another with --host."
-
-
-def _busy(host: str, port: int) -> str:
-    return (
-        f"Port {port} on {host} is in use by another program. "
-        f"Stop it, or choose another port: --port {port + 1}"
-    )

@@ -100,6 +100,10 @@ class View:
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
 
+    def let_go(self) -> None:
+        """Take the handle out of every hand: what is dragged on with it moves nothing."""
+        self._gizmo.let_go()
+
     def _put_from_gizmo(self, command: Command) -> None:
         try:
             self._mailbox.put(command)

@@ -16,7 +16,7 @@ import imageio.v3 as imageio
 import numpy as np
 import viser.transforms as vtf
 from numpy.typing import ArrayLike, NDArray
-from playwright.sync_api import Browser, Locator, Page
+from playwright.sync_api import Browser, Frame, Locator, Page
 from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
 from tests.browser.grip import ArrowGrip, Grip, RingGrip
@@ -65,14 +65,16 @@ class Message:
 
 
 class ViserPage:
-    """One browser window on a viser server.
+    """One browser window on a viser server, bare or in the frame of the app's page.
 
-    Nodes are named as in viser's scene. Poses are 4x4 matrices, metres, radians; pixels are
-    counted from the window's top left corner.
+    ``page`` is the window and ``frame`` the document that viser fills. Nodes are named as in
+    viser's scene. Poses are 4x4 matrices, metres, radians; pixels are counted from the window's top
+    left corner.
     """
 
-    def __init__(self, page: Page, errors: list[str]) -> None:
+    def __init__(self, page: Page, frame: Frame, errors: list[str]) -> None:
         self.page = page
+        self.frame = frame
         self.errors = errors
 
     @classmethod
@@ -105,7 +107,7 @@ class ViserPage:
         page.on("pageerror", lambda error: errors.append(str(error)))
         try:
             page.goto(f"{url}/?{camera.query}")
-            viser_page = cls(page, errors)
+            viser_page = cls(page, _viser_frame(page), errors)
             viser_page.wait_ready(nodes)
         except BaseException:
             context.close()
@@ -133,7 +135,7 @@ class ViserPage:
         Raises AssertionError that names what is missing.
         """
         deadline = time.monotonic() + seconds
-        while missing := self.page.evaluate("(names) => harness.missing(names)", list(nodes)):
+        while missing := self.frame.evaluate("(names) => harness.missing(names)", list(nodes)):
             assert time.monotonic() < deadline, (
                 f"the page was not usable after {seconds:g} s; missing: {', '.join(missing)}"
                 + "".join(f"\n  console: {error}" for error in self.errors)
@@ -143,7 +145,7 @@ class ViserPage:
 
     def wait_drawn(self) -> None:
         """Return when one more frame is drawn, with every message that had come before it."""
-        self.page.evaluate("() => harness.drawn()")
+        self.frame.evaluate("() => harness.drawn()")
 
     def wait_lost(self, *, seconds: float = 10.0) -> None:
         """Return when the page has noticed that the server is away."""
@@ -152,7 +154,7 @@ class ViserPage:
     @property
     def connected(self) -> bool:
         """Whether the page's socket is open."""
-        state: str | None = self.page.evaluate("() => harness.links.at(-1)?.type ?? null")
+        state: str | None = self.frame.evaluate("() => harness.links.at(-1)?.type ?? null")
         return state == "connected"
 
     # The wire
@@ -175,7 +177,7 @@ class ViserPage:
         self, log: str, kind: str, node: str | None, since: float, last: int | None
     ) -> list[Message]:
         # Chosen in the page: a long record takes long to carry over.
-        found = self.page.evaluate(
+        found = self.frame.evaluate(
             """([log, type, node, since, last]) => {
                 const found = harness[log].filter((each) => each.type === type
                     && each.time >= since && (node === null || each.body.name === node));
@@ -206,38 +208,47 @@ class ViserPage:
 
     def node_pose(self, node: str) -> Matrix:
         """T_world_node as three.js drew it (4,4), with every message handled that had come."""
-        poses = self.page.evaluate("(name) => harness.poses(name)", node)
+        poses = self.frame.evaluate("(name) => harness.poses(name)", node)
         T_three_world, T_three_node = _matrix(poses["root"]), _matrix(poses["node"])
         return np.linalg.solve(T_three_world, T_three_node)
 
     def project(self, point: ArrayLike) -> Pixel:
         """Pixel at which the browser draws a point (3,) of viser's world, in metres."""
-        view = self.page.evaluate("() => harness.view()")
+        view = self.frame.evaluate("() => harness.view()")
         return self._pixel(view, _matrix(view["root"]) @ [*np.asarray(point, float), 1.0])
 
     def project_three(self, point: ArrayLike) -> Pixel:
         """Pixel at which the browser draws a point (3,) of three.js's world, in metres."""
-        return self._pixel(self.page.evaluate("() => harness.view()"), np.append(point, 1.0))
+        return self._pixel(self.frame.evaluate("() => harness.view()"), np.append(point, 1.0))
 
     def _pixel(self, view: dict[str, Any], point: Matrix) -> Pixel:
         clip = _matrix(view["projection"]) @ _matrix(view["inverse"]) @ point
         x, y = clip[:2] / clip[3]
         left, top, width, height = view["rectangle"]
-        return left + (1 + x) / 2 * width, top + (1 - y) / 2 * height
+        return self._in_window((left + (1 + x) / 2 * width, top + (1 - y) / 2 * height))
+
+    def _in_window(self, pixel: Sequence[float]) -> Pixel:
+        """The pixel of the window that is ``pixel`` of viser's document."""
+        left, top = 0.0, 0.0
+        if self.frame.parent_frame is not None:
+            box = self.frame.frame_element().bounding_box()
+            assert box is not None, "viser's frame is hidden"
+            left, top = box["x"], box["y"]
+        return left + pixel[0], top + pixel[1]
 
     # Dragging in the scene
 
     def grip_arrow(self, node: str, axis: Axis) -> Grip:
         """Take hold of the arrow along a control's own axis; values are metres along it."""
-        spot = self.page.evaluate("(which) => harness.grip(...which)", [node, "arrow", axis])
+        spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, "arrow", axis])
         matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
-        return ArrowGrip(self, node, spot["pixel"], hit, matrix)
+        return ArrowGrip(self, node, self._in_window(spot["pixel"]), hit, matrix)
 
     def grip_ring(self, node: str, axis: Axis) -> Grip:
         """Take hold of the ring about a control's own axis; values are radians about it."""
-        spot = self.page.evaluate("(which) => harness.grip(...which)", [node, "ring", axis])
+        spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, "ring", axis])
         matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
-        return RingGrip(self, node, spot["pixel"], hit, matrix)
+        return RingGrip(self, node, self._in_window(spot["pixel"]), hit, matrix)
 
     def drag_arrow(self, node: str, axis: Axis, metres: float, *, steps: int = DRAG_STEPS) -> None:
         """Drag a control along one of its own axes and let go."""
@@ -252,11 +263,11 @@ class ViserPage:
     # The panel
 
     def _label(self, label: str) -> Locator:
-        named = self.page.locator("label").filter(has_text=re.compile(f"^{re.escape(label)}$"))
+        named = self.frame.locator("label").filter(has_text=re.compile(f"^{re.escape(label)}$"))
         return named.filter(visible=True).first
 
     def _labelled(self, label: str) -> Locator:
-        return self.page.locator(f'[id="{self._label(label).get_attribute("for")}"]')
+        return self.frame.locator(f'[id="{self._label(label).get_attribute("for")}"]')
 
     def slider_value(self, label: str) -> float:
         """Value that a slider shows, in its own unit."""
@@ -296,15 +307,19 @@ class ViserPage:
     def choose(self, label: str, option: str) -> None:
         """Choose from a list."""
         self._labelled(label).click()
-        self.page.get_by_role("option", name=option, exact=True).click()
+        self.frame.get_by_role("option", name=option, exact=True).click()
 
     def click_button(self, label: str) -> None:
         """Click the button with this text."""
+        self.frame.get_by_role("button", name=label, exact=True).click()
+
+    def press_in_bar(self, label: str) -> None:
+        """Press the button with this text in the app's own page, around viser's."""
         self.page.get_by_role("button", name=label, exact=True).click()
 
     def text_of(self, selector: str) -> str:
         """Text that the first element for a CSS selector shows."""
-        return self.page.locator(selector).first.inner_text()
+        return self.frame.locator(selector).first.inner_text()
 
     def panel_text(self) -> str:
         """All text that viser shows, the panel's and that of its messages."""
@@ -329,8 +344,19 @@ class ViserPage:
             return self.page.screenshot(timeout=20_000)
         except PlaywrightTimeoutError:
             # The browser waits for a frame in vain while shaders compile; the canvas does not.
-            data: str = self.page.evaluate("() => __viserMutable.canvas.toDataURL('image/png')")
+            data: str = self.frame.evaluate("() => __viserMutable.canvas.toDataURL('image/png')")
             return base64.b64decode(data.partition(",")[2])
+
+
+def _viser_frame(page: Page) -> Frame:
+    """The document that viser fills: the page itself, or a frame in it."""
+    element = page.query_selector("iframe#scene")
+    if element is None:
+        return page.main_frame
+    frame = element.content_frame()
+    assert frame is not None
+    frame.wait_for_url("**/viser/**", wait_until="commit")
+    return frame
 
 
 def _matrix(elements: Sequence[float]) -> Matrix:

@@ -55,10 +55,15 @@ class AppServer:
     """
 
     def __init__(
-        self, command: Sequence[str] = APP, *, port: int | None = None, seconds: float = 60.0
+        self,
+        command: Sequence[str] = APP,
+        *,
+        port: int | None = None,
+        seconds: float = 60.0,
+        scheme: str = "http",
     ) -> None:
         self.port = free_port() if port is None else port
-        self.url = f"http://127.0.0.1:{self.port}"
+        self.url = f"{scheme}://127.0.0.1:{self.port}"
         self._command = [part.replace("{port}", str(self.port)) for part in command]
         self._seconds = seconds
         self._lines: deque[str] = deque(maxlen=KEPT_LINES)

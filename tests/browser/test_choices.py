@@ -41,8 +41,8 @@ def test_a_person_looks_at_the_branches_and_takes_one(
         assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
 
         for folder in ("Branches", "Show"):
-            page.page.get_by_text(folder, exact=True).click()
-        page.page.get_by_text("Velocity ellipsoid", exact=True).click()
+            page.frame.get_by_text(folder, exact=True).click()
+        page.frame.get_by_text("Velocity ellipsoid", exact=True).click()
         page.wait_until(
             lambda: any(
                 message.body["visible"]
@@ -61,7 +61,7 @@ def test_a_person_looks_at_the_branches_and_takes_one(
         ]
         assert "nothing" in page.text_of("[data-branch=front-up]")
 
-        page.page.get_by_role(
+        page.frame.get_by_role(
             "button", name="Take front-down", exact=True
         ).scroll_into_view_if_needed()
         page.screenshot(artefacts / "app-branches.png")
@@ -73,8 +73,8 @@ def test_a_person_looks_at_the_branches_and_takes_one(
 def test_a_person_clicks_the_ghost_of_a_branch(open_page: OpenPage, artefacts: Path) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm", MOVE))
-        page.page.get_by_text("Branches", exact=True).click()
-        page.page.get_by_text("Ghosts of the others", exact=True).click()
+        page.frame.get_by_text("Branches", exact=True).click()
+        page.frame.get_by_text("Ghosts of the others", exact=True).click()
         elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
         page.wait_ready((elbow,))
         page.screenshot(artefacts / "app-ghosts.png")
@@ -93,7 +93,7 @@ def test_a_map_of_the_workspace_is_looked_into(
     stored = load_map(path)
     with AppServer((*APP, "--workspace", str(path))) as server:
         page = open_page(server.url, nodes=("/arm", MOVE))
-        page.page.get_by_text("Show", exact=True).click()
+        page.frame.get_by_text("Show", exact=True).click()
 
         def drawn(cut: Cut) -> int:
             page.choose("Reachability", cut.value)

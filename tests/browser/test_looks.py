@@ -76,7 +76,7 @@ def test_a_theme_is_of_one_window(open_page: OpenPage, artefacts: Path) -> None:
             patch = window.picture()[760:790, 20:60].reshape(-1, 3)
             return np.asarray(np.median(patch, axis=0), dtype=float)
 
-        page.page.get_by_text("Show", exact=True).click()
+        page.frame.get_by_text("Show", exact=True).click()
         page.click_button("Dark")
         page.wait_until(lambda: corner(page).max() < max(DARK.floor) + 30, "the night")
         page.screenshot(artefacts / "look-dark.png")

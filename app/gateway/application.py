@@ -1,0 +1,130 @@
+"""The routes: our page, its files, viser behind its firewall, and what programs may ask."""
+
+from __future__ import annotations
+
+import logging
+from urllib.parse import urlsplit
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket
+
+from app.gateway import control_socket, files, headers, status, viser_page
+from app.gateway.bucket import Bucket
+from app.gateway.door import Address, Door, Visitor
+from app.gateway.hub import Hub
+from app.gateway.proxy import Proxy
+
+log = logging.getLogger(__name__)
+
+LARGEST_BODY = 1024
+"""Bytes of what is sent by POST."""
+
+TRIES, AT_ONCE = 2.0, 20.0
+"""Links that are tried a second, and at once, by everybody together."""
+
+
+class _Entry(msgspec.Struct, forbid_unknown_fields=True):
+    token: str
+
+
+def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp:
+    """Everything that answers at the port."""
+    static = files.load()
+    index = static.pop("index.html")
+    viser = viser_page.load()
+    viser_file = files.File.of(viser.html, files.TYPES[".html"])
+    page_policy, viser_policy = headers.page_policy(), headers.viser_policy(viser.script_hashes)
+    tries = Bucket(TRIES, AT_ONCE, hub.clock())
+
+    async def page(request: Request) -> Response:
+        return index.answer(request, page_policy)
+
+    async def file(request: Request) -> Response:
+        found = static.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        # A worker is under the policy of its own file.
+        return found.answer(request, page_policy)
+
+    async def viser_index(request: Request) -> Response:
+        _known(door, request)
+        _check_query(request, address)
+        return viser_file.answer(request, viser_policy)
+
+    async def enter(request: Request) -> Response:
+        """Come in: with the token of a link where the door asks for one."""
+        try:
+            entry = msgspec.json.decode(await _body(request), type=_Entry)
+        except msgspec.MsgspecError as error:
+            raise HTTPException(400, "A token is asked for.") from error
+        if not entry.token and door.visitor(request.cookies) is not None:
+            return Response(status_code=204)
+        if entry.token and not tries.take(hub.clock()):
+            raise HTTPException(429, "Too many tries. Wait a moment.")
+        cookie = door.welcome(entry.token)
+        if cookie is None:
+            log.warning("Somebody came with a link that is no good (any more).")
+            raise HTTPException(401, "This link is no good, or no good any more. Ask for another.")
+        return Response(status_code=204, headers={"Set-Cookie": cookie})
+
+    async def state(request: Request) -> Response:
+        _known(door, request)
+        return JSONResponse(status.common(hub))
+
+    async def stop(request: Request) -> Response:
+        """The same as the button, for programs and for a page whose socket is gone."""
+        visitor = _known(door, request)
+        hub.stop(visitor.name or "Somebody")
+        return Response(status_code=204)
+
+    async def health(_request: Request) -> Response:
+        return PlainTextResponse("ok\n")
+
+    async def control(socket: WebSocket) -> None:
+        await control_socket.serve(hub, door, socket)
+
+    routes = [
+        Route("/", page),
+        Route("/static/{name}", file),
+        Route("/viser/", viser_index),
+        Route("/enter", enter, methods=["POST"]),
+        Route("/status", state),
+        Route("/stop", stop, methods=["POST"]),
+        Route("/health", health),
+        WebSocketRoute("/viser", proxy.serve),
+        WebSocketRoute("/control", control),
+    ]
+    return headers.Threshold(Starlette(routes=routes), address)
+
+
+def _known(door: Door, request: Request) -> Visitor:
+    visitor = door.visitor(request.cookies)
+    if visitor is None:
+        raise HTTPException(401, "Come in by the front page.")
+    return visitor
+
+
+def _check_query(request: Request, address: Address) -> None:
+    """viser's page would run what any server named here sends it."""
+    if "playbackPath" in request.query_params:
+        raise HTTPException(400, "Recordings are not played here.")
+    for url in request.query_params.getlist("websocket"):
+        scheme = "wss:" if address.cookies_are_secure else "ws:"
+        parts = urlsplit(url)
+        if f"{parts.scheme}:" != scheme or parts.netloc != request.headers["host"]:
+            raise HTTPException(400, "The page may speak to this server alone.")
+
+
+async def _body(request: Request) -> bytes:
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > LARGEST_BODY:
+            raise HTTPException(413, "That is too long.")
+    return body

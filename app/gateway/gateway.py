@@ -1,0 +1,175 @@
+"""The front door, running: a thread of its own with the only port that others can reach."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import socket
+import ssl
+import threading
+import time
+from asyncio import BaseTransport, Transport
+from collections.abc import Callable
+from contextlib import suppress
+from typing import cast
+
+import uvicorn
+import viser
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+from app.control.arm import Arm
+from app.errors import ConfigurationError
+from app.gateway.access import AccessFile
+from app.gateway.application import application
+from app.gateway.door import LOOPBACK_NAMES, Address, Door, public_origin
+from app.gateway.firewall import LARGEST
+from app.gateway.hub import TICK, Hub
+from app.gateway.listen import listen, reaches_beyond
+from app.gateway.motion import Motion
+from app.gateway.proxy import Proxy
+from app.runtime.loop import ControlLoop
+from app.runtime.mailbox import Mailbox
+from app.settings import Settings
+from app.view.guard import Guard
+from app.view.server import open_server
+
+log = logging.getLogger(__name__)
+
+UNSENT = 16_384
+"""Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
+
+START_SECONDS = 10.0
+GOODBYE_SECONDS = 1
+
+
+class Gateway:
+    """Owns the port, and viser behind it."""
+
+    def __init__(self, settings: Settings) -> None:
+        """Opens both. Raises ConfigurationError when that cannot be, or must not: see ``open``."""
+        _check_tls(settings)
+        self._listening = listen(settings.host, settings.port)
+        try:
+            access = _access(settings, self._listening)
+            key = secrets.token_urlsafe(32)
+            self.viser: viser.ViserServer = open_server(key)
+            self.port: int = self._listening.getsockname()[1]
+            self.address = _address(settings, self._listening)
+            self._hub = Hub(time.monotonic)
+            door = Door(access, self.port, self.address)
+            proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
+            app = application(self._hub, door, proxy, self.address)
+        except BaseException:
+            self._listening.close()
+            raise
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                app,
+                http="h11",
+                ws=_BrowserSocket,
+                ws_max_size=LARGEST,
+                ws_per_message_deflate=False,
+                lifespan="off",
+                log_config=None,
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=GOODBYE_SECONDS,
+                ssl_certfile=settings.tls_cert,
+                ssl_keyfile=settings.tls_key,
+            )
+        )
+        self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
+        self._started = threading.Event()
+
+    def start(self) -> None:
+        """Answer from now on."""
+        self._thread.start()
+        if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
+            raise ConfigurationError("The gateway did not start; see the log above.")
+
+    def attach(
+        self, arm: Arm, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]
+    ) -> None:
+        """From now on the arm can be driven. ``let_go``: see ``Motion``."""
+        self._hub.arm = Motion(arm, loop, mailbox, let_go)
+
+    def stop(self) -> None:
+        """Close every socket and the port; viser is left to its view."""
+        self._server.should_exit = True
+        if self._thread.is_alive():
+            self._thread.join()
+        self._listening.close()
+
+    def _run(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        watch = asyncio.create_task(self._watch())
+        try:
+            await self._server.serve(sockets=[self._listening])
+        finally:
+            watch.cancel()
+            with suppress(asyncio.CancelledError):
+                await watch
+            self._started.set()
+
+    async def _watch(self) -> None:
+        while True:
+            if self._server.started:
+                self._started.set()
+            try:
+                self._hub.tick()
+            except Exception:
+                # Whatever went wrong, the watch over the arm goes on.
+                log.exception("The watch over who drives met an error.")
+            await asyncio.sleep(TICK)
+
+
+class _BrowserSocket(WebSocketsSansIOProtocol):
+    """A websocket in whose buffers little can wait, so that what is sent is new."""
+
+    def connection_made(self, transport: BaseTransport) -> None:
+        super().connection_made(transport)
+        cast(Transport, transport).set_write_buffer_limits(high=UNSENT)
+        line = transport.get_extra_info("socket")
+        if line is not None and hasattr(socket, "TCP_NOTSENT_LOWAT"):
+            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
+
+
+def _check_tls(settings: Settings) -> None:
+    if (settings.tls_cert is None) != (settings.tls_key is None):
+        raise ConfigurationError("https takes both --tls-cert and --tls-key.")
+    if settings.tls_cert is None or settings.tls_key is None:
+        return
+    try:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(settings.tls_cert, settings.tls_key)
+    except OSError as error:
+        raise ConfigurationError(
+            f"{settings.tls_cert} and {settings.tls_key} are no certificate and its key: {error}."
+        ) from error
+
+
+def _access(settings: Settings, listening: socket.socket) -> AccessFile | None:
+    if settings.access is not None:
+        return AccessFile.open(settings.access)
+    if reaches_beyond(listening) and not settings.insecure:
+        raise ConfigurationError(
+            f"On {settings.host} other machines can reach the arm. Make a link for each person "
+            "with `katana450 access give --file access.json --name NAME --role operator` and "
+            "start with --access access.json; or say --insecure, and everybody can drive it."
+        )
+    return None
+
+
+def _address(settings: Settings, listening: socket.socket) -> Address:
+    beyond = reaches_beyond(listening)
+    names = LOOPBACK_NAMES | ({settings.host, socket.gethostname().lower()} if beyond else set())
+    return Address(
+        frozenset(names),
+        any_address=beyond,
+        secure=settings.tls_cert is not None,
+        public=None if settings.public_url is None else public_origin(settings.public_url),
+    )

@@ -1,0 +1,259 @@
+"""Everybody who is here, who of them drives, and whether the arm is stopped.
+
+Lives in the gateway's one thread; what it decides reaches the arm through the mailbox.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from app.control.lease import HOLD_AFTER, Lease, Person
+from app.control.state import State
+from app.errors import LeaseError
+from app.gateway.door import Visitor
+from app.gateway.motion import Rates
+from app.kinematics.velocity import JogFrame
+
+log = logging.getLogger(__name__)
+
+TICK = 0.02
+"""[s] Between two looks at whether somebody has fallen silent."""
+
+JOG_LASTS = 0.2
+"""[s] A jog is over when no other follows within this time."""
+
+FIRST_SPEED = 0.5
+"""Share of full speed at which jogging begins."""
+
+REMEMBERED = 256
+"""Pages that are known again when they come back."""
+
+
+class Arm(Protocol):
+    """What the hub asks of the arm; ``Motion`` is one."""
+
+    @property
+    def state(self) -> State: ...
+
+    def hold(self) -> None: ...
+
+    def jog(self, rates: Rates, frame: JogFrame, dt: float) -> None: ...
+
+
+class Behind(Protocol):
+    """How far a window's picture is behind; ``Flow`` is one."""
+
+    def age(self, t: float) -> float: ...
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Why nothing moves. ``by`` is nobody when the gateway itself stopped the arm."""
+
+    by: str | None
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """One open page; ``tell`` leaves it a notice."""
+
+    person: Person
+    number: int
+    tell: Callable[[dict[str, Any]], None]
+
+
+class Hub:
+    """The one place where it is decided who may move the arm. Times are in seconds."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self.clock = clock
+        self.lease = Lease()
+        self.stopped: Stopped | None = None
+        self.speed = FIRST_SPEED
+        self.arm: Arm | None = None
+        """None until the arm is there."""
+        self._windows: dict[str, Window] = {}
+        self._pictures: dict[Behind, tuple[str, set[str]]] = {}
+        self._remembered: dict[str, tuple[Person, int]] = {}
+        self._numbers = 0
+        self._jogged = -JOG_LASTS
+        self._looked = clock()
+
+    # Coming and going
+
+    def join(self, visitor: Visitor, page: str, tell: Callable[[dict[str, Any]], None]) -> Window:
+        """A page opens its control socket; one that comes back is who it was."""
+        key = key_of(visitor, page)
+        known = self._remembered.pop(key) if key in self._remembered else None
+        person, number = known or self._meet(key, visitor)
+        self._remembered[key] = (person, number)
+        while len(self._remembered) > REMEMBERED:
+            self._remembered.pop(next(iter(self._remembered)))
+        window = Window(person, number, tell)
+        self._windows[key] = window
+        self.beat(window)
+        return window
+
+    def leave(self, window: Window) -> None:
+        """Its control socket is closed."""
+        if self._windows.get(window.person.key) is window:
+            del self._windows[window.person.key]
+            self.lease = self.lease.leave(window.person)
+
+    def window(self, key: str) -> Window | None:
+        """The window of that key, if its control socket is open."""
+        return self._windows.get(key)
+
+    def show(self, key: str, picture: Behind, drags: set[str]) -> None:
+        """A page opens its way to viser: how far it is behind, and which gizmos it drags."""
+        self._pictures[picture] = (key, drags)
+
+    def hide(self, picture: Behind) -> None:
+        """It is closed."""
+        del self._pictures[picture]
+
+    def age(self, window: Window) -> float:
+        """How old the picture is that the window shows [s]."""
+        of_it = [each for each, (key, _) in self._pictures.items() if key == window.person.key]
+        return of_it[-1].age(self.clock()) if of_it else 0.0
+
+    @property
+    def windows(self) -> list[Window]:
+        """All that are open, the oldest first."""
+        return sorted(self._windows.values(), key=lambda window: window.number)
+
+    # What people do
+
+    def stop(self, name: str) -> None:
+        """Anybody may, at any time."""
+        self._halt(Stopped(name, f"{name} pressed STOP."))
+
+    def reset(self, window: Window) -> None:
+        """End a stop; the arm stays where it is until somebody moves it afresh."""
+        self._grasp(window)
+        self.stopped = None
+
+    def acquire(self, window: Window) -> None:
+        self.lease = self.lease.acquire(window.person, self.clock())
+
+    def take(self, window: Window) -> None:
+        self._change(self.lease.take(window.person, self.clock()))
+
+    def request(self, window: Window) -> None:
+        self.lease = self.lease.request(window.person)
+
+    def withdraw(self, window: Window) -> None:
+        self.lease = self.lease.withdraw(window.person)
+
+    def give_up(self, window: Window) -> None:
+        self._change(self.lease.give_up(window.person))
+
+    def hand_over(self, window: Window, number: int) -> None:
+        """To the window of that number."""
+        taker = next((each for each in self.windows if each.number == number), None)
+        if taker is None:
+            raise LeaseError("They have closed their window.")
+        self._change(self.lease.hand_over(window.person, taker.person, self.clock()))
+
+    def beat(self, window: Window) -> None:
+        """A sign of life."""
+        if self.lease.holder == window.person:
+            self.lease = self.lease.hear(window.person, self.clock())
+
+    def drive(self, key: str) -> None:
+        """The window of ``key`` wants to move the arm by a control of its own.
+
+        Raises LeaseError with the reason why it must not. Who touches a control first when nobody
+        holds the arm, holds it.
+        """
+        window = self._windows.get(key)
+        if window is None:
+            raise LeaseError("Open the front page to drive the arm.")
+        self._check_runs()
+        self._grasp(window)
+
+    def jog(self, window: Window, rates: Rates, frame: JogFrame) -> None:
+        """Go with ``rates`` until the next jog, at most for JOG_LASTS."""
+        self._check_runs()
+        self._grasp(window)
+        assert self.arm is not None
+        t = self.clock()
+        since, self._jogged = t - self._jogged, t
+        if any(rates) and since < JOG_LASTS:
+            self.arm.jog(tuple(self.speed * rate for rate in rates), frame, since)  # type: ignore[arg-type]
+        elif not any(rates):
+            self.arm.hold()
+            self._jogged = -JOG_LASTS
+
+    def set_speed(self, window: Window, speed: float) -> None:
+        self._grasp(window)
+        self.speed = speed
+
+    # What time does
+
+    def tick(self) -> None:
+        """Look whether whoever drives is still there; to be called every TICK."""
+        t = self.clock()
+        late = t - self._looked > HOLD_AFTER / 2
+        self._looked = t
+        # When this thread was held up itself, what came in the meantime is read first.
+        if not late:
+            self._listen_for_silence(t)
+        if self.stopped is not None and self.arm is not None and self.arm.state.moving:
+            # Something that was on its way came in after the stop.
+            self.arm.hold()
+
+    def _listen_for_silence(self, t: float) -> None:
+        holder = self.lease.holder
+        if holder is None or self.arm is None:
+            return
+        moves = self.arm.state.moving or t - self._jogged < JOG_LASTS
+        if moves and self.stopped is None and self.lease.silence(t) >= HOLD_AFTER:
+            self._halt(Stopped(None, f"The line to {holder.name} broke while the arm moved."))
+        self._change(self.lease.expire(t))
+
+    def _change(self, lease: Lease) -> None:
+        """Another holder finds an arm that stands and wants nothing."""
+        if lease.holder != self.lease.holder:
+            self._hold()
+        self.lease = lease
+
+    def _halt(self, stopped: Stopped) -> None:
+        self._hold()
+        if self.stopped is None:
+            self.stopped = stopped
+            log.warning("Stopped: %s", stopped.why)
+
+    def _hold(self) -> None:
+        for _, drags in self._pictures.values():
+            drags.clear()
+        self._jogged = -JOG_LASTS
+        if self.arm is not None:
+            self.arm.hold()
+
+    def _check_runs(self) -> None:
+        if self.arm is None:
+            raise LeaseError("The arm is not there yet.")
+        if self.stopped is not None:
+            raise LeaseError("The arm is stopped: reset it first.")
+
+    def _grasp(self, window: Window) -> None:
+        if self.lease.holder != window.person:
+            self.acquire(window)
+
+    def _meet(self, key: str, visitor: Visitor) -> tuple[Person, int]:
+        self._numbers += 1
+        number = self._numbers
+        name = visitor.name or f"Window {number}"
+        if any(person.name == name for person, _ in self._remembered.values()):
+            name = f"{name} ({number})"
+        return Person(key, name, visitor.role), number
+
+
+def key_of(visitor: Visitor, page: str) -> str:
+    """What ties the sockets of one page together."""
+    return f"{visitor.session}/{page}"

@@ -1,0 +1,198 @@
+"""One browser's way to viser and back."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import time
+from contextlib import suppress
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from starlette.websockets import WebSocket, WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
+
+from app.errors import LeaseError
+from app.gateway.control_socket import PAGE
+from app.gateway.door import Door
+from app.gateway.firewall import Firewall, Ruling, Verdict
+from app.gateway.flow import Flow
+from app.gateway.hub import Hub, key_of
+from app.view.guard import Guard
+from app.view.server import KEY_HEADER
+
+log = logging.getLogger(__name__)
+
+SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
+
+BUFFER = 16_384
+"""Bytes that may wait in the machine between viser and us: what waits there is not replaced by
+what is newer."""
+
+LOOK_AGAIN = 0.1
+"""[s] How soon a browser that is behind is looked at again, should it say nothing."""
+
+MOST = 64
+"""Browsers at one time."""
+
+REFUSALS_EVERY = 0.5
+"""[s] A person who drags what is not theirs is told so, but not twenty times a second."""
+
+
+class Proxy:
+    """Joins browsers to viser, each by a connection of its own."""
+
+    def __init__(self, hub: Hub, door: Door, guard: Guard, port: int, key: str) -> None:
+        """``port`` of viser on this machine, and the ``key`` to it."""
+        self._hub = hub
+        self._door = door
+        self._guard = guard
+        self._port = port
+        self._key = key
+        self._open = 0
+
+    async def serve(self, browser: WebSocket) -> None:
+        """Answer a request for viser's socket."""
+        visitor = self._door.visitor(browser.cookies)
+        if visitor is None or SUBPROTOCOL not in browser.scope["subprotocols"]:
+            await browser.close(1008)
+            return
+        if self._open >= MOST:
+            await browser.close(1013)
+            return
+        page = browser.query_params.get("page", "")
+        # Without our page around it viser can be looked at, and no more.
+        key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
+        self._open += 1
+        try:
+            async with connect(
+                f"ws://127.0.0.1:{self._port}",
+                sock=await _narrow_socket(self._port),
+                subprotocols=[SUBPROTOCOL],
+                additional_headers={KEY_HEADER: self._key},
+                user_agent_header=None,
+                compression=None,
+                max_size=None,
+                max_queue=1,
+                ping_interval=None,
+            ) as upstream:
+                await browser.accept(SUBPROTOCOL)
+                line = _Line(self._hub, self._guard, browser, upstream, key)
+                await self._door.while_welcome(browser, line.run())
+        except OSError as error:
+            log.warning("viser is not there: %s", error)
+            await browser.close(1013)
+        finally:
+            self._open -= 1
+
+
+class _Line:
+    """Between one browser and viser."""
+
+    def __init__(
+        self, hub: Hub, guard: Guard, browser: WebSocket, upstream: ClientConnection, key: str
+    ) -> None:
+        self._hub = hub
+        self._browser = browser
+        self._upstream = upstream
+        self._key = key
+        self._flow = Flow()
+        self._room = asyncio.Event()
+        self._sending = asyncio.Lock()
+        self._drags: set[str] = set()
+        self._told_at = float("-inf")
+        window = hub.window(key)
+        who = window.person.name if window is not None else "a window without our page"
+        self._firewall = Firewall(guard, who, self._drags, self._drive, hub.clock())
+
+    async def run(self) -> None:
+        """Until either side closes."""
+        self._hub.show(self._key, self._flow, self._drags)
+        tasks = [asyncio.create_task(each) for each in (self._down(), self._up())]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                with suppress(ConnectionClosed, WebSocketDisconnect):
+                    task.result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            self._hub.hide(self._flow)
+
+    async def _down(self) -> None:
+        """Pictures, as fast as the browser sees them."""
+        async for frame in self._upstream:
+            while not self._flow.has_room(self._hub.clock()):
+                self._room.clear()
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._room.wait(), LOOK_AGAIN)
+            assert isinstance(frame, bytes)
+            await self._send(frame)
+
+    async def _up(self) -> None:
+        """What the firewall lets pass."""
+        while True:
+            message = await self._browser.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            data = message.get("bytes")
+            verdict = self._firewall.judge(data, self._hub.clock())
+            if verdict.ruling is Ruling.PASS and data is not None:
+                await self._upstream.send(data)
+            elif verdict.ruling is Ruling.CLOSE or not await self._answer(verdict):
+                log.warning("Closed a browser that sent too much that no page sends.")
+                await self._browser.close(1008)
+                return
+
+    async def _answer(self, verdict: Verdict) -> bool:
+        """To a message that stays here; False for one that lies."""
+        if verdict.seen is not None:
+            self._room.set()
+            return self._flow.seen(verdict.seen)
+        if verdict.corrections:
+            await self._send(_frame(verdict.corrections))
+        window = self._hub.window(self._key)
+        t = self._hub.clock()
+        if verdict.refusal and window is not None and t - self._told_at >= REFUSALS_EVERY:
+            self._told_at = t
+            window.tell({"is": "refused", "why": verdict.refusal})
+        return True
+
+    async def _send(self, frame: bytes) -> None:
+        async with self._sending:
+            await self._browser.send_bytes(frame)
+            self._flow.sent(self._hub.clock())
+
+    def _drive(self) -> None:
+        if not self._key:
+            raise LeaseError("Open the front page to drive the arm.")
+        self._hub.drive(self._key)
+
+
+async def _narrow_socket(port: int) -> socket.socket:
+    """A connection to viser in which little can wait."""
+    line = socket.socket()
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+    line.setblocking(False)
+    await asyncio.get_running_loop().sock_connect(line, ("127.0.0.1", port))
+    return line
+
+
+def _frame(messages: tuple[Any, ...]) -> bytes:
+    """As viser sends them: two sizes, and compressed msgpack."""
+    packed = msgspec.msgpack.encode(
+        {
+            "messages": [message.as_serializable_dict([]) for message in messages],
+            "timestampSec": time.perf_counter(),
+            "binaryBufferLengths": (),
+        }
+    )
+    compressed = zstandard.ZstdCompressor(level=1).compress(packed)
+    sizes = len(packed).to_bytes(8, "little") + len(compressed).to_bytes(8, "little")
+    return sizes + compressed

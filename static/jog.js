@@ -1,0 +1,200 @@
+// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates. Whatever is let go,
+// unplugged or out of sight counts as nothing, and without a new message the arm stands anyway.
+"use strict";
+const Jog = (() => {
+  const EVERY = 40; // ms
+  const LINEAR = 0.25; // m/s at full deflection
+  const ANGULAR = 1.2; // rad/s
+  const DEAD = 0.12; // share of a stick's way that counts as nothing
+  const MOUSE_FULL = 350; // what a SpaceMouse reports at full deflection
+  const MOUSE_FRESH = 150; // ms; it reports all the time while it is held
+  // x, y, z, pitch, roll
+  const KEYS = {
+    KeyW: [0, 1], KeyS: [0, -1], KeyA: [1, 1], KeyD: [1, -1], KeyR: [2, 1], KeyF: [2, -1],
+    KeyI: [3, 1], KeyK: [3, -1], KeyJ: [4, -1], KeyL: [4, 1],
+  };
+  const HOLDS = { "pitch+": [3, 1], "pitch-": [3, -1], "roll-": [4, -1], "roll+": [4, 1] };
+
+  const byId = (id) => document.getElementById(id);
+  const keys = new Set();
+  const pads = { plane: [0, 0, 0, 0, 0], lift: [0, 0, 0, 0, 0] };
+  const holds = new Set();
+  let mouse = { rates: [0, 0, 0, 0, 0], at: 0 };
+  let open = false;
+  let moving = false;
+  let say = () => {};
+  let stop = () => {};
+
+  function quiet() {
+    keys.clear();
+    holds.clear();
+    for (const pad of Object.keys(pads)) centre(byId(pad), pads[pad]);
+    mouse.at = 0;
+    show();
+  }
+
+  function show() {
+    for (const kbd of document.querySelectorAll("#jog kbd"))
+      kbd.classList.toggle("on", keys.has(`Key${kbd.textContent}`));
+    for (const button of document.querySelectorAll("[data-hold]"))
+      button.classList.toggle("on", holds.has(button.dataset.hold));
+  }
+
+  // True when the key was one of ours.
+  function key(event) {
+    if (!open || !(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
+    if (event.type === "keydown") keys.add(event.code);
+    else keys.delete(event.code);
+    show();
+    beat();
+    return true;
+  }
+
+  function centre(pad, rates) {
+    rates.fill(0);
+    pad.classList.remove("held");
+    pad.querySelector("i").style.translate = "";
+  }
+
+  function listen(pad, rates, place) {
+    const drag = (event) => {
+      const { left, top, width, height } = pad.getBoundingClientRect();
+      const limit = (value) => Math.max(-1, Math.min(1, value));
+      const right = limit((2 * (event.clientX - left)) / width - 1);
+      const down = limit((2 * (event.clientY - top)) / height - 1);
+      const [shownRight, shownDown] = place(rates, right, down);
+      pad.querySelector("i").style.translate =
+        `${(shownRight * (width - 38)) / 2}px ${(shownDown * (height - 38)) / 2}px`;
+      beat();
+    };
+    pad.addEventListener("pointerdown", (event) => {
+      if (event.button) return;
+      event.preventDefault();
+      pad.setPointerCapture(event.pointerId);
+      pad.classList.add("held");
+      drag(event);
+    });
+    pad.addEventListener("pointermove", (event) => pad.classList.contains("held") && drag(event));
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
+      pad.addEventListener(end, () => {
+        centre(pad, rates);
+        beat();
+      });
+  }
+
+  function bent(value) {
+    const size = Math.abs(value);
+    return size < DEAD ? 0 : (Math.sign(value) * (size - DEAD)) / (1 - DEAD);
+  }
+
+  let stopHeld = false;
+  function gamepad() {
+    const found = [...(navigator.getGamepads?.() ?? [])].find((each) => each?.connected);
+    byId("gamepad").textContent = found ? "Gamepad: hold LB or RB" : "No gamepad";
+    if (!found) return [0, 0, 0, 0, 0];
+    const pressed = (n) => found.buttons[n]?.pressed ?? false;
+    if (pressed(1) && !stopHeld) stop();
+    stopHeld = pressed(1);
+    if (!pressed(4) && !pressed(5)) return [0, 0, 0, 0, 0];
+    const [x = 0, y = 0, u = 0, v = 0] = found.axes;
+    return [-bent(y), -bent(x), -bent(v), pressed(12) - pressed(13), bent(u)];
+  }
+
+  function report({ reportId, data }) {
+    const number = (at) => (data.byteLength >= at + 2 ? data.getInt16(at, true) / MOUSE_FULL : 0);
+    const old = performance.now() - mouse.at > MOUSE_FRESH;
+    const rates = old ? [0, 0, 0, 0, 0] : mouse.rates;
+    if (reportId === 1) {
+      // Its x is to the right, y towards the person, z down.
+      [rates[0], rates[1], rates[2]] = [-number(2), -number(0), -number(4)].map(bent);
+      if (data.byteLength >= 12) [rates[3], rates[4]] = [-number(6), -number(8)].map(bent);
+    } else if (reportId === 2) [rates[3], rates[4]] = [-number(0), -number(2)].map(bent);
+    else if (reportId === 3) {
+      if (data.getUint8(0) & 1) stop();
+      return;
+    } else return;
+    mouse = { rates, at: performance.now() };
+    beat();
+  }
+
+  async function connect() {
+    const filters = [{ vendorId: 0x256f }, { vendorId: 0x046d, usagePage: 1, usage: 8 }];
+    for (const device of await navigator.hid.requestDevice({ filters })) await adopt(device);
+  }
+
+  async function adopt(device) {
+    if (!device.opened) await device.open();
+    device.addEventListener("inputreport", report);
+    byId("spacemouse").textContent = device.productName || "SpaceMouse";
+  }
+
+  function rates() {
+    if (!open) return [0, 0, 0, 0, 0];
+    const sum = [0, 0, 0, 0, 0];
+    const add = (other) => other.forEach((value, i) => (sum[i] += value));
+    for (const code of keys) sum[KEYS[code][0]] += KEYS[code][1];
+    for (const hold of holds) sum[HOLDS[hold][0]] += HOLDS[hold][1];
+    Object.values(pads).forEach(add);
+    add(gamepad());
+    if (performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
+    return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
+  }
+
+  let sentAt = 0;
+  function beat() {
+    const now = rates();
+    const any = now.some((value) => value !== 0);
+    if (!any && !moving) return;
+    if (any && moving && performance.now() - sentAt < EVERY / 2) return;
+    moving = any;
+    sentAt = performance.now();
+    say({ do: "jog", rates: now, frame: document.querySelector("[name=frame]:checked").value });
+  }
+
+  function begin(options) {
+    ({ say, stop } = options);
+    listen(byId("plane"), pads.plane, (rates, right, down) => {
+      [rates[0], rates[1]] = [-bent(down), -bent(right)];
+      return [right, down];
+    });
+    listen(byId("lift"), pads.lift, (rates, _, down) => {
+      rates[2] = -bent(down);
+      return [0, down];
+    });
+    for (const button of document.querySelectorAll("[data-hold]")) {
+      const { hold } = button.dataset;
+      button.addEventListener("pointerdown", (event) => {
+        event.preventDefault();
+        button.setPointerCapture(event.pointerId);
+        holds.add(hold);
+        show();
+        beat();
+      });
+      for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
+        button.addEventListener(end, () => {
+          holds.delete(hold);
+          show();
+          beat();
+        });
+      button.addEventListener("contextmenu", (event) => event.preventDefault());
+    }
+    if (navigator.hid) {
+      byId("spacemouse").hidden = false;
+      byId("spacemouse").addEventListener("click", () => connect().catch(() => {}));
+      navigator.hid.getDevices().then((known) => known.forEach(adopt)).catch(() => {});
+    }
+    document.addEventListener("visibilitychange", () => document.hidden && quiet());
+    setInterval(beat, EVERY);
+  }
+
+  return {
+    begin,
+    key,
+    quiet,
+    show(shown) {
+      open = shown;
+      quiet();
+      beat();
+    },
+  };
+})();

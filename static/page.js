@@ -1,0 +1,234 @@
+// The bar: STOP, who drives, what the arm does, how good the line is.
+"use strict";
+(() => {
+  const STALE = 1.0; // s after which a picture must not pass for the present
+  const QUIET = 1000; // ms without a word after which the line counts as bad
+  const ANSWER = 250; // ms that a STOP may take before it is sent another way too
+  const TOAST = 4000; // ms
+  const NOT_YOU = 4401;
+  // What of the address is for viser; anything else would be a stranger's wish.
+  const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr|darkMode)$/;
+
+  const byId = (id) => document.getElementById(id);
+  const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
+  const page = name();
+  const worker = new Worker("static/link.js");
+  const say = (message) => worker.postMessage({ say: message });
+  let status = null;
+  let up = false;
+  let since = performance.now(); // when the line was last lost
+  let silent = 0;
+  let trip = null;
+  let asking = null;
+
+  // A page that is loaded anew is the same page; a second tab is another.
+  function name() {
+    const again = performance.getEntriesByType("navigation")[0]?.type === "reload";
+    const old = again && sessionStorage.getItem("page");
+    const bytes = crypto.getRandomValues(new Uint8Array(16));
+    const fresh = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    sessionStorage.setItem("page", old || fresh);
+    return old || fresh;
+  }
+
+  // STOP
+
+  function stop() {
+    say({ do: "stop" });
+    Jog.quiet();
+    stopButton.classList.add("asked");
+    clearTimeout(asking);
+    asking = setTimeout(insist, ANSWER);
+  }
+
+  function insist() {
+    fetch("stop", { method: "POST", keepalive: true }).then(
+      ({ ok }) => ok && stopped(),
+      () => {},
+    );
+    asking = setTimeout(insist, 2 * ANSWER);
+  }
+
+  function stopped() {
+    clearTimeout(asking);
+    asking = null;
+    stopButton.classList.remove("asked");
+  }
+
+  // At once, not when the finger is lifted; a click without a pointer is the Enter key.
+  stopButton.addEventListener("pointerdown", (event) => {
+    event.preventDefault();
+    stop();
+  });
+  stopButton.addEventListener("click", (event) => event.detail === 0 && stop());
+
+  // In both documents. Space and Esc do nothing but stop, wherever the focus is.
+  function key(event) {
+    const ends = event.key === " " || event.key === "Escape";
+    if (ends && event.type === "keydown" && !event.repeat) stop();
+    if (ends) {
+      if (byId("help").open && event.key === "Escape" && event.type === "keydown") byId("help").close();
+    } else if (typing(event.target) || !Jog.key(event)) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  }
+
+  function typing(target) {
+    return target?.matches?.("input:not([type=range], [type=radio], [type=checkbox]), textarea, select");
+  }
+
+  function blur() {
+    // The focus may only have gone from one of the two documents to the other.
+    setTimeout(() => document.hasFocus() || Jog.quiet());
+  }
+
+  for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
+  window.addEventListener("blur", blur);
+  window.katana = { key, blur };
+
+  // What is shown
+
+  const text = (id, words) => {
+    const element = byId(id);
+    if (element.textContent !== words) element.textContent = words;
+  };
+
+  function act(label, request, main) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = label;
+    button.classList.toggle("main", Boolean(main));
+    button.addEventListener("click", () => say(request));
+    return button;
+  }
+
+  function acts() {
+    const { mine, holder, role, asked, asking: wanting, others } = status;
+    if (role === "viewer") return [];
+    if (mine) {
+      const buttons = wanting.map(({ number, name }) => act(`Give to ${name}`, { do: "give", to: number }, true));
+      const more = others.filter(({ number }) => !wanting.some((each) => each.number === number));
+      if (more.length) buttons.push(handOver(more));
+      return [...buttons, act("Let go", { do: "release" })];
+    }
+    if (holder === null) return [act("Take", { do: "acquire" }, true)];
+    const buttons = [asked ? act("Ask no more", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
+    if (role === "admin") buttons.push(act("Take over", { do: "take" }));
+    return buttons;
+  }
+
+  function handOver(others) {
+    const list = document.createElement("select");
+    list.setAttribute("aria-label", "Hand over to");
+    list.add(new Option("Hand over to …", ""));
+    for (const { number, name } of others) list.add(new Option(name, number));
+    list.addEventListener("change", () => list.value && say({ do: "give", to: Number(list.value) }));
+    return list;
+  }
+
+  let drawnActs = "";
+  function draw() {
+    if (!status) return;
+    body.dataset.mood = status.mood;
+    text("headline", { stopped: "Stopped", starting: "Starting" }[status.mood] ?? status.headline);
+    text("why", status.stopped ? `${status.stopped} Nothing moves until Reset.` : status.why);
+    byId("reset").hidden = !status.stopped || status.role === "viewer";
+    const { mine, holder, windows, asking: wanting } = status;
+    const wants = mine && wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
+    text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
+    const watching = windows > 1 ? `, ${windows} windows` : "";
+    text("name", wants || `${status.name}${status.role === "viewer" ? ", watching" : ""}${watching}`);
+    const key = JSON.stringify([mine, holder, status.asked, wanting, status.others]);
+    if (key !== drawnActs) {
+      drawnActs = key;
+      byId("acts").replaceChildren(...acts());
+    }
+    const slider = document.querySelector("#speed input");
+    if (document.activeElement !== slider) slider.value = Math.round(100 * status.speed);
+    document.querySelector("#speed output").value = `${Math.round(100 * status.speed)} %`;
+  }
+
+  function drawLink() {
+    const age = up ? Math.max(status?.age ?? 0, silent / 1000 - 0.2) : (performance.now() - since) / 1000;
+    const lost = !up;
+    const bad = !lost && (silent > QUIET || age >= STALE);
+    const line = byId("link");
+    line.className = lost ? "lost" : bad || age >= 0.4 || trip > 150 ? "slow" : "";
+    const old = age >= 0.3 ? `, ${age.toFixed(1)} s old` : "";
+    line.lastElementChild.textContent = lost ? "No line" : trip === null ? "" : `${Math.round(trip)} ms${old}`;
+    body.classList.toggle("stale", lost || bad);
+    const banner = byId("banner");
+    banner.hidden = !(lost || bad) || (lost && !status);
+    banner.className = lost ? "lost" : "";
+    const words = lost
+      ? "No line to the arm: what you see is old. Trying to get it back."
+      : "A slow line: what you see is old.";
+    if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
+  }
+
+  let toastTimer = null;
+  function toast(words) {
+    text("toast", words);
+    byId("toast").classList.add("shown");
+    clearTimeout(toastTimer);
+    toastTimer = setTimeout(() => byId("toast").classList.remove("shown"), TOAST);
+  }
+
+  worker.onmessage = ({ data }) => {
+    if (data.link === "up") up = true;
+    else if (data.link === "down") {
+      if (up) since = performance.now();
+      up = false;
+      trip = null;
+      Jog.quiet();
+      if (data.code === NOT_YOU) enter().catch(() => {});
+    } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
+    else if (data.silent !== undefined) silent = data.silent;
+    else if (data.unsaid === "stop") insist();
+    else if (data.heard?.is === "stopping") stopped();
+    else if (data.heard?.is === "refused") toast(data.heard.why);
+    else if (data.heard?.is === "status") {
+      silent = 0;
+      status = data.heard;
+      draw();
+    }
+    drawLink();
+  };
+  setInterval(drawLink, 200);
+
+  // The rest of the bar
+
+  byId("reset").addEventListener("click", () => say({ do: "reset" }));
+  byId("help-button").addEventListener("click", () => byId("help").showModal());
+  byId("jog-button").addEventListener("click", () => {
+    const shown = byId("jog").hidden;
+    byId("jog").hidden = !shown;
+    byId("jog-button").setAttribute("aria-expanded", String(shown));
+    Jog.show(shown);
+  });
+  document.querySelector("#speed input").addEventListener("input", ({ target }) => {
+    document.querySelector("#speed output").value = `${target.value} %`;
+    say({ do: "speed", value: target.value / 100 });
+  });
+  Jog.begin({ say, stop });
+
+  // Coming in
+
+  // A link carries its token behind the #, which browsers send to nobody; it goes by POST, once.
+  async function enter() {
+    const token = location.hash.slice(1);
+    if (token) history.replaceState(null, "", location.pathname + location.search);
+    const answer = await fetch("enter", { method: "POST", body: JSON.stringify({ token }) });
+    byId("gate").hidden = answer.ok;
+    if (token && !answer.ok) byId("gate-why").textContent = await answer.text();
+    return answer.ok;
+  }
+
+  enter().then((mayEnter) => {
+    if (!mayEnter) return;
+    const query = [...new URLSearchParams(location.search)].filter(([key]) => CAMERA.test(key));
+    scene.src = `viser/?${new URLSearchParams([["page", page], ...query])}`;
+    const { protocol, host } = location;
+    worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
+  });
+})();

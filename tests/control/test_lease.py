@@ -1,0 +1,167 @@
+"""The lease: every event, from everybody, in every state, does what is written or nothing."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.control.lease import HOLD_AFTER, LOST_AFTER, Lease, Person, Role
+from app.errors import LeaseError
+
+ANNA = Person("a", "Anna", Role.OPERATOR)
+BERT = Person("b", "Bert", Role.OPERATOR)
+CARA = Person("c", "Cara", Role.ADMIN)
+DORA = Person("d", "Dora", Role.VIEWER)
+PEOPLE = (ANNA, BERT, CARA, DORA)
+
+Event = Callable[[Lease, Person, Person, float], Lease]
+
+EVENTS: dict[str, Event] = {
+    "acquire": lambda lease, who, _, t: lease.acquire(who, t),
+    "take": lambda lease, who, _, t: lease.take(who, t),
+    "request": lambda lease, who, _, __: lease.request(who),
+    "withdraw": lambda lease, who, _, __: lease.withdraw(who),
+    "hand over": lambda lease, who, to, t: lease.hand_over(who, to, t),
+    "give up": lambda lease, who, _, __: lease.give_up(who),
+    "hear": lambda lease, who, _, t: lease.hear(who, t),
+    "leave": lambda lease, who, _, __: lease.leave(who),
+    "expire": lambda lease, _, __, t: lease.expire(t),
+}
+
+
+def legal(event: str, lease: Lease, who: Person, to: Person) -> bool:
+    """What is written in the lease's own words, once more."""
+    free, mine = lease.holder is None, lease.holder == who
+    drives = who.role is not Role.VIEWER
+    match event:
+        case "acquire":
+            return free and drives
+        case "take":
+            return drives and not mine and (free or who.role is Role.ADMIN)
+        case "request":
+            return drives and not free and not mine and who not in lease.waiting
+        case "withdraw":
+            return who in lease.waiting
+        case "hand over":
+            return mine and to != who and to.role is not Role.VIEWER
+        case "give up" | "hear":
+            return mine
+    return True
+
+
+def leases() -> list[Lease]:
+    """Every holder with every queue of the others."""
+    found = []
+    for holder in (None, ANNA, BERT, CARA):
+        others = [each for each in (ANNA, BERT, CARA) if each != holder]
+        for size in range(len(others) + 1):
+            for waiting in itertools.permutations(others, size):
+                found.append(Lease(holder, 10.0 if holder else -float("inf"), waiting))
+    return found
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_what_is_not_allowed_raises_and_what_is_allowed_does_not(event: str) -> None:
+    tried = 0
+    for lease, who, to in itertools.product(leases(), PEOPLE, PEOPLE):
+        before = replace(lease)
+        if legal(event, lease, who, to):
+            EVENTS[event](lease, who, to, 11.0)
+        else:
+            with pytest.raises(LeaseError):
+                EVENTS[event](lease, who, to, 11.0)
+        assert lease == before
+        tried += 1
+    assert tried == len(leases()) * 16
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(sorted(EVENTS)),
+            st.sampled_from(PEOPLE),
+            st.sampled_from(PEOPLE),
+            st.floats(0.0, 1.0),
+        ),
+        max_size=40,
+    )
+)
+def test_whatever_happens_one_person_at_most_holds_the_arm_and_waits_for_nothing(
+    story: list[tuple[str, Person, Person, float]],
+) -> None:
+    lease, t = Lease(), 0.0
+    for event, who, to, dt in story:
+        t += dt
+        before = lease
+        try:
+            lease = EVENTS[event](lease, who, to, t)
+        except LeaseError:
+            assert not legal(event, before, who, to)
+            continue
+        assert lease.holder is None or lease.holder.role is not Role.VIEWER
+        assert lease.holder not in lease.waiting
+        assert len(set(lease.waiting)) == len(lease.waiting)
+        assert DORA not in lease.waiting
+        if lease.holder != before.holder and before.holder is not None:
+            # Nobody loses the arm but by these.
+            assert event in {"take", "hand over", "give up", "expire"}
+        if event == "hear":
+            assert lease == replace(before, heard=t)
+
+
+def test_a_free_arm_goes_to_who_asks_and_a_held_one_does_not() -> None:
+    lease = Lease().acquire(ANNA, 1.0)
+    assert lease.holder == ANNA
+    with pytest.raises(LeaseError, match="Anna holds the arm"):
+        lease.acquire(BERT, 2.0)
+    with pytest.raises(LeaseError, match="Only an admin may take the arm from Anna"):
+        lease.take(BERT, 2.0)
+    assert lease.take(CARA, 2.0).holder == CARA
+
+
+def test_who_watches_can_do_nothing_to_it() -> None:
+    for holder in (Lease(), Lease().acquire(ANNA, 1.0)):
+        for event in ("acquire", "take", "request"):
+            with pytest.raises(LeaseError, match="Dora may only watch"):
+                EVENTS[event](holder, DORA, ANNA, 2.0)
+    with pytest.raises(LeaseError, match="Dora may only watch"):
+        Lease().acquire(ANNA, 1.0).hand_over(ANNA, DORA, 2.0)
+
+
+def test_who_asked_first_is_first_and_who_gets_it_waits_no_more() -> None:
+    lease = Lease().acquire(ANNA, 1.0).request(CARA).request(BERT)
+    assert lease.waiting == (CARA, BERT)
+    lease = lease.hand_over(ANNA, BERT, 2.0)
+    assert (lease.holder, lease.waiting) == (BERT, (CARA,))
+    lease = lease.give_up(BERT)
+    assert (lease.holder, lease.waiting) == (None, (CARA,))
+    assert lease.acquire(CARA, 3.0).waiting == ()
+
+
+def test_silence_ends_it_and_a_sign_of_life_keeps_it() -> None:
+    lease = Lease().acquire(ANNA, 1.0)
+    assert lease.silence(1.0 + HOLD_AFTER) == pytest.approx(HOLD_AFTER)
+    assert lease.expire(1.0 + LOST_AFTER - 1e-9) is lease
+    assert lease.expire(1.0 + LOST_AFTER).holder is None
+    heard = lease.hear(ANNA, 2.0)
+    assert heard.expire(1.0 + LOST_AFTER).holder == ANNA
+    assert heard.expire(2.0 + LOST_AFTER).holder is None
+    # Nobody is silent where nobody holds it.
+    assert Lease().silence(1e9) == 0.0
+
+
+def test_a_clock_that_stands_or_goes_back_takes_no_life_away() -> None:
+    lease = Lease().acquire(ANNA, 5.0)
+    assert lease.hear(ANNA, 4.0).heard == 5.0
+    assert lease.silence(4.0) == 0.0
+
+
+def test_who_leaves_keeps_it_until_the_silence_is_over() -> None:
+    lease = Lease().acquire(ANNA, 1.0).request(BERT)
+    assert lease.leave(BERT).waiting == ()
+    assert lease.leave(ANNA).holder == ANNA

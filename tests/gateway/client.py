@@ -1,0 +1,210 @@
+"""A browser without a browser: both sockets of a page, byte for byte."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+import urllib.request
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+from urllib.error import HTTPError
+
+import msgspec
+import viser
+import zstandard
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
+
+SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
+
+BEAT = 0.1
+"""[s] Between two signs of life, as the page gives them."""
+
+QUIET = 0.4
+"""[s] Long enough for the server to have sent whatever a message makes it send."""
+
+UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+
+
+def ask(
+    url: str, *, data: bytes | None = None, **headers: str
+) -> tuple[int, dict[str, str], bytes]:
+    """Status, headers and body of an answer, whatever it is; headers with _ for -."""
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    try:
+        with urllib.request.urlopen(
+            urllib.request.Request(url, data=data, headers=named), timeout=10
+        ) as answer:
+            return answer.status, dict(answer.headers), answer.read()
+    except HTTPError as answer:
+        with answer:
+            return answer.code, dict(answer.headers), answer.read()
+
+
+def enter(url: str, token: str = "") -> str:
+    """The cookie of a new session."""
+    body = json.dumps({"token": token}).encode()
+    status, headers, said = ask(f"{url}/enter", data=body, Origin=url)
+    assert status == 204, said
+    return headers["set-cookie"].partition(";")[0]
+
+
+def page_name() -> str:
+    """As our page gives itself one."""
+    return secrets.token_hex(16)
+
+
+def websocket(url: str, path: str, cookie: str = "", **options: Any) -> connect:
+    """To be entered; ``origin`` is our own page's unless told otherwise."""
+    origin = options.pop("origin", url)
+    headers = {"Cookie": cookie} if cookie else {}
+    headers |= options.pop("headers", {})
+    return connect(
+        url.replace("http", "ws", 1) + path,
+        origin=origin,
+        additional_headers=headers,
+        max_size=None,
+        compression=None,
+        **options,
+    )
+
+
+class Control:
+    """The page's own socket; gives a sign of life every BEAT until told not to."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.heard: list[dict[str, Any]] = []
+        self.alive = True
+        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """The last one told."""
+        return next(each for each in reversed(self.heard) if each["is"] == "status")
+
+    async def say(self, do: str, **request: Any) -> None:
+        await self.socket.send(json.dumps({"do": do, **request}))
+
+    async def wait(self, seconds: float = 5.0, **wanted: Any) -> dict[str, Any]:
+        """The first status from now on that has these values."""
+        async with asyncio.timeout(seconds):
+            while True:
+                with suppress(StopIteration):
+                    status = self.status
+                    if all(status[key] == value for key, value in wanted.items()):
+                        return status
+                await asyncio.sleep(0.01)
+
+    async def notice(self, kind: str, seconds: float = 5.0) -> dict[str, Any]:
+        """The first notice of that kind, forgotten afterwards."""
+        async with asyncio.timeout(seconds):
+            while True:
+                for each in self.heard:
+                    if each["is"] == kind:
+                        self.heard.remove(each)
+                        return each
+                await asyncio.sleep(0.01)
+
+    async def close(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self.socket.close()
+
+    async def _listen(self) -> None:
+        with suppress(ConnectionClosed):
+            async for text in self.socket:
+                message = json.loads(text)
+                if message["is"] != "echo":
+                    self.heard.append(message)
+
+    async def _beat(self) -> None:
+        n = 0
+        with suppress(ConnectionClosed):
+            while True:
+                if self.alive:
+                    n += 1
+                    await self.say("beat", n=n)
+                await asyncio.sleep(BEAT)
+
+
+class Peer:
+    """A viser client; what it hears is not told to be seen."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.controls: dict[str, dict[str, Any]] = {}
+
+    async def listen(self, quiet: float = QUIET) -> list[dict[str, Any]]:
+        """Messages until none has come for ``quiet`` [s]."""
+        heard: list[dict[str, Any]] = []
+        while True:
+            try:
+                frame = await asyncio.wait_for(self.socket.recv(), quiet)
+            except TimeoutError:
+                return heard
+            assert isinstance(frame, bytes)
+            packed = int.from_bytes(frame[8:16], "little")
+            body = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed])
+            heard += msgspec.msgpack.decode(body)["messages"]
+
+    async def learn(self) -> None:
+        """Take in the scene and the panel, and say where it looks from, as a page does.
+
+        viser counts a browser as there from its first camera on.
+        """
+        await self.say(
+            type="ViewerCameraMessage",
+            wxyz=UPRIGHT,
+            position=[1.0, 0.0, 1.0],
+            fov=0.7,
+            near=0.01,
+            far=100.0,
+            image_height=800,
+            image_width=1280,
+            look_at=[0.0, 0.0, 0.0],
+            up_direction=[0.0, 0.0, 1.0],
+        )
+        for message in await self.listen():
+            label = message.get("props", {}).get("label")
+            if message["type"].startswith("Gui") and label:
+                self.controls[label] = message
+
+    async def say(self, **message: Any) -> None:
+        await self.socket.send(msgspec.msgpack.encode(message))
+
+    async def set(self, label: str, **updates: Any) -> None:
+        """Change attributes of the control with this label."""
+        uuid = self.controls[label]["uuid"]
+        await self.say(type="GuiUpdateMessage", uuid=uuid, updates=updates)
+
+
+@asynccontextmanager
+async def controlling(
+    url: str, cookie: str | None = None, page: str | None = None
+) -> AsyncIterator[Control]:
+    """A page's control socket."""
+    cookie = enter(url) if cookie is None else cookie
+    async with websocket(url, f"/control?page={page or page_name()}", cookie) as socket:
+        control = Control(socket)
+        try:
+            yield control
+        finally:
+            await control.close()
+
+
+@asynccontextmanager
+async def opened(url: str, token: str = "") -> AsyncIterator[tuple[Peer, Control]]:
+    """A whole page: both its sockets, its scene learned."""
+    cookie, page = enter(url, token), page_name()
+    async with (
+        controlling(url, cookie, page) as control,
+        websocket(url, f"/viser?page={page}", cookie, subprotocols=[SUBPROTOCOL]) as socket,
+    ):
+        peer = Peer(socket)
+        await peer.learn()
+        yield peer, control

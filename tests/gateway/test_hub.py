@@ -1,0 +1,292 @@
+"""Who may move the arm, told by a clock of the test's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.control.lease import HOLD_AFTER, LOST_AFTER, Lease, Role
+from app.control.session import Session
+from app.control.state import State
+from app.errors import LeaseError
+from app.gateway.door import Visitor
+from app.gateway.hub import JOG_LASTS, TICK, Hub, Window, key_of
+from app.gateway.motion import Rates
+from app.kinematics.velocity import JogFrame
+
+PAGES = ("first-page-of-all", "second-page-of-all")
+
+
+class FakeArm:
+    """Remembers what it was told; moves when the test says so."""
+
+    def __init__(self, state: State) -> None:
+        self.rest = state
+        self.moves = False
+        self.holds = 0
+        self.jogs: list[tuple[Rates, JogFrame, float]] = []
+
+    @property
+    def state(self) -> State:
+        if not self.moves:
+            return self.rest
+        return replace(self.rest, goal=self.rest.setpoint + 0.1)
+
+    def hold(self) -> None:
+        self.holds += 1
+        self.moves = False
+
+    def jog(self, rates: Rates, frame: JogFrame, dt: float) -> None:
+        self.jogs.append((rates, frame, dt))
+
+
+class Table:
+    """A hub, its arm, and the hands of a clock."""
+
+    def __init__(self, state: State) -> None:
+        self.t = 100.0
+        self.hub = Hub(lambda: self.t)
+        self.arm = self.hub.arm = FakeArm(state)
+        self.told: dict[str, list[dict[str, Any]]] = {}
+
+    def join(self, page: str, role: Role = Role.ADMIN, name: str | None = None) -> Window:
+        told = self.told.setdefault(page, [])
+        return self.hub.join(Visitor("session", name, role), page, told.append)
+
+    def wait(self, seconds: float, *alive: Window) -> None:
+        """Let time pass, with signs of life of those who are ``alive``."""
+        end = self.t + seconds
+        while self.t < end - 1e-9:
+            self.t += min(TICK, end - self.t)
+            for window in alive:
+                self.hub.beat(window)
+            self.hub.tick()
+
+
+def moves(table: Table) -> bool:
+    return table.arm.moves
+
+
+@pytest.fixture
+def table(session: Session) -> Table:
+    return Table(session.begin(session.ready, 0.0, 0.0))
+
+
+def test_who_touches_a_control_first_has_the_arm(table: Table) -> None:
+    first, second = (table.join(page) for page in PAGES)
+    assert [first.person.name, second.person.name] == ["Window 1", "Window 2"]
+    table.hub.drive(second.person.key)
+    assert table.hub.lease.holder == second.person
+    with pytest.raises(LeaseError, match="Window 2 holds the arm"):
+        table.hub.drive(first.person.key)
+    assert table.arm.holds == 0
+
+
+def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:
+    window = table.join(PAGES[0])
+    table.hub.drive(window.person.key)
+    table.hub.leave(window)
+    with pytest.raises(LeaseError, match="front page"):
+        table.hub.drive(window.person.key)
+
+
+def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
+    watcher = table.join(PAGES[0], Role.VIEWER, "Vera")
+    acts: list[Callable[[], None]] = [
+        lambda: table.hub.drive(watcher.person.key),
+        lambda: table.hub.acquire(watcher),
+        lambda: table.hub.take(watcher),
+        lambda: table.hub.request(watcher),
+        lambda: table.hub.jog(watcher, (0.1, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE),
+        lambda: table.hub.set_speed(watcher, 1.0),
+    ]
+    for act in acts:
+        with pytest.raises(LeaseError):
+            act()
+    assert table.arm.holds == 0
+    table.hub.stop("Vera")
+    assert table.arm.holds == 1
+    with pytest.raises(LeaseError):
+        table.hub.reset(watcher)
+    assert table.hub.stopped is not None
+
+
+def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    drags = {"/target/move"}
+    table.hub.show(driver.person.key, FakePicture(), drags)
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    table.hub.stop("Window 2")
+    assert drags == set()
+    assert not moves(table)
+    acts: list[Callable[[], None]] = [
+        lambda: table.hub.drive(driver.person.key),
+        lambda: table.hub.jog(driver, (0.1, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE),
+    ]
+    for act in acts:
+        with pytest.raises(LeaseError, match="stopped"):
+            act()
+    # Only who drives may end it.
+    with pytest.raises(LeaseError, match="Window 1 holds"):
+        table.hub.reset(other)
+    table.hub.reset(driver)
+    assert not moves(table)
+    table.hub.drive(driver.person.key)
+
+
+def test_what_was_on_its_way_when_the_stop_came_is_held_too(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.stop("Window 1")
+    table.arm.moves = True
+    table.wait(TICK, driver)
+    assert not moves(table)
+
+
+class FakePicture:
+    def age(self, t: float) -> float:
+        return t - 100.0
+
+
+def test_a_driver_who_falls_silent_while_the_arm_moves_stops_it_in_time(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.wait(1.0, driver)
+    table.arm.moves = True
+    table.wait(HOLD_AFTER - TICK)
+    assert moves(table)
+    table.wait(2 * TICK)
+    assert not moves(table)
+    assert table.hub.stopped is not None
+    assert "line to Window 1 broke" in table.hub.stopped.why
+    # A word that comes late starts nothing anew.
+    table.hub.beat(driver)
+    with pytest.raises(LeaseError, match="reset"):
+        table.hub.drive(driver.person.key)
+
+
+def test_a_driver_who_falls_silent_at_rest_loses_the_arm_and_stops_nothing(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.wait(LOST_AFTER - 2 * TICK)
+    assert table.hub.lease.holder == driver.person
+    table.wait(3 * TICK)
+    assert (table.hub.lease, table.hub.stopped) == (Lease(), None)
+
+
+def test_when_the_gateway_itself_was_held_up_it_listens_before_it_judges(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    table.wait(0.1, driver)
+    table.t += 2.0
+    table.hub.tick()
+    assert moves(table)
+    table.hub.beat(driver)
+    table.wait(0.1, driver)
+    assert moves(table)
+    # Had nothing come in, the next look would have stopped it.
+    table.t += 2.0
+    table.hub.tick()
+    table.wait(TICK)
+    assert not moves(table)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda hub, driver, other: hub.hand_over(driver, other.number),
+        lambda hub, _, other: hub.take(other),
+        lambda hub, driver, _: hub.give_up(driver),
+    ],
+    ids=["handed over", "taken", "given up"],
+)
+def test_another_driver_finds_an_arm_that_wants_nothing(
+    table: Table, change: Callable[[Hub, Window, Window], None]
+) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    drags = {"/target/move"}
+    table.hub.show(driver.person.key, FakePicture(), drags)
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    change(table.hub, driver, other)
+    assert not moves(table)
+    assert drags == set()
+
+
+def test_a_page_that_comes_back_is_who_it_was(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.join(PAGES[1])
+    table.hub.drive(driver.person.key)
+    table.hub.leave(driver)
+    again = table.join(PAGES[0])
+    assert again.person == driver.person
+    table.hub.drive(again.person.key)
+    # The old socket's end comes after the new one's beginning.
+    fresh = table.join(PAGES[0])
+    table.hub.leave(again)
+    assert table.hub.window(fresh.person.key) is fresh
+
+
+def test_two_browsers_with_one_link_are_two_people(table: Table) -> None:
+    anna, second = (table.join(page, Role.OPERATOR, "Anna") for page in PAGES)
+    assert anna.person.name == "Anna"
+    assert second.person.name == "Anna (2)"
+    assert anna.person != second.person
+
+
+def test_a_guessed_page_of_another_session_is_somebody_else(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    stranger = Visitor("another session", None, Role.ADMIN)
+    with pytest.raises(LeaseError):
+        table.hub.drive(key_of(stranger, PAGES[0]))
+
+
+def test_a_jog_goes_on_while_it_is_held_and_is_over_by_itself(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    forward = (0.2, 0.0, 0.0, 0.0, 0.5)
+    for _ in range(5):
+        table.hub.jog(driver, forward, JogFrame.TOOL)
+        table.wait(0.04, driver)
+    # The first only says when it began.
+    assert len(table.arm.jogs) == 4
+    rates, frame, dt = table.arm.jogs[-1]
+    assert rates == pytest.approx(np.array(forward) * table.hub.speed)
+    assert frame is JogFrame.TOOL
+    assert dt == pytest.approx(0.04)
+    table.wait(JOG_LASTS, driver)
+    table.hub.jog(driver, forward, JogFrame.TOOL)
+    assert len(table.arm.jogs) == 4
+
+
+def test_a_jog_that_is_let_go_holds_the_arm(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.jog(driver, (0.2, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE)
+    table.hub.jog(driver, (0.0,) * 5, JogFrame.BASE)
+    assert table.arm.holds == 1
+
+
+def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:
+    first, second = (table.join(page) for page in PAGES)
+    picture = FakePicture()
+    table.hub.show(first.person.key, picture, set())
+    table.t += 1.5
+    assert table.hub.age(first) == pytest.approx(1.5)
+    assert table.hub.age(second) == 0.0
+    table.hub.hide(picture)
+    assert table.hub.age(first) == 0.0
+
+
+def test_before_the_arm_is_there_nobody_drives_it() -> None:
+    hub = Hub(lambda: 0.0)
+    window = hub.join(Visitor("session", None, Role.ADMIN), PAGES[0], lambda _: None)
+    with pytest.raises(LeaseError, match="not there yet"):
+        hub.drive(window.person.key)
+    hub.tick()
+    hub.stop("Window 1")
+    hub.reset(window)
