@@ -53,7 +53,7 @@ class Assembly:
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
         self._view = View(gateway.viser, model, self._loop, mailbox, settings.frame_rate, stored)
-        gateway.attach(model.arm, self._loop, mailbox, self._view.let_go)
+        gateway.attach(self._loop, mailbox, self._view.let_go)
 
     def start(self) -> None:
         """Run the control loop and the view in threads of their own."""

@@ -49,8 +49,6 @@ GESTURES: dict[str, cmd.Command] = {
 }
 
 ORDERS: dict[str, cmd.Command] = {
-    "Stop": cmd.Stop(),
-    "Release": cmd.Release(),
     "Pause": cmd.Pause(),
     "Resume": cmd.Resume(),
 }
@@ -90,8 +88,7 @@ class Panel:
         self._orders = self._gui.add_button_group(
             "Motion",
             tuple(ORDERS),
-            hint="Stop: rest as fast as the arm can, until Release. Pause: rest on the way, until "
-            "Resume.",
+            hint="Pause: rest on the way, until Resume. STOP is above, and on Space and Esc",
         )
         self._on_person(self._orders, lambda: ORDERS[self._orders.value])
         self._speed = self._gui.add_slider(
