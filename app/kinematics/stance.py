@@ -26,8 +26,15 @@ _TURNS: Final = 100
 """Most steps of the iterations that end by themselves, each step much nearer than the last."""
 
 
+_SLOW: Final = 0.9
+"""A step beside the roll axis that leaves so much of the error is on its way to no solution."""
+
+
 class Stance(NamedTuple):
-    """The canonical angles `alpha` on `branch`, what they miss, and what holds them there."""
+    """The canonical angles `alpha` on `branch`, what they miss, and what holds them there.
+
+    searches: how many it took to find them.
+    """
 
     alpha: Five
     branch: Branch
@@ -35,6 +42,7 @@ class Stance(NamedTuple):
     rotation_error: float
     theta1_bound: bool
     in_plane: InPlane
+    searches: int = 1
 
 
 def nearest_stance(
@@ -65,21 +73,21 @@ def _shifted(
     arm reaches it; beyond reach it ends near the nearest one, not always on it.
     """
     reached: Stance | None = best
-    least = math.inf
-    for _ in range(_TURNS):
-        if reached is None:
-            break
+    least, searches = math.inf, 1
+    while reached is not None and searches < _TURNS:
         tool = limited.arm.tool_point(reached.alpha)
         gap = [a - b for a, b in zip(asked.tool, tool, strict=True)]
         error = math.hypot(*gap)
         if error >= least:
             break
+        ended = error <= tolerances.SAME_POSITION * 1e-3 or error > _SLOW * least
         best, least = reached._replace(position_error=error), error
-        if error <= tolerances.SAME_POSITION * 1e-3:
+        if ended:
             break
         asked = asked.moved(*gap)
         reached = _solved(limited, asked, branch, hint)
-    return best
+        searches += 1
+    return best._replace(searches=searches)
 
 
 def _solved(

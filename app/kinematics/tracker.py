@@ -119,8 +119,11 @@ def track(
     asked = target.asked(limited.arm, reading)
     ahead = nearest_stance(limited, asked, branch, alpha)
     if _within_hop(alpha, ahead.alpha):
-        return Tracked(_projection(chain, target, asked, ahead))
-    effort = EFFORT - _effort(ahead)
+        return Tracked(
+            _projection(chain, target, asked, _not_away(limited.arm, alpha, asked, ahead))
+        )
+    # One hop at least, so that there is an end.
+    effort = max(EFFORT - _effort(ahead), 1)
     for stop in () if since is None else _way(since, target):
         wish = stop.asked(limited.arm, reading)
         pursuit = _Pursuit(limited, wish, nearest_stance(limited, wish, branch, alpha))
@@ -187,7 +190,7 @@ class _Pursuit:
         found, miss = None, _misses(arm, self.asked, alpha)
         while not self.ended and self.effort < most:
             if _within_hop(alpha, self.best.alpha):
-                found, self.ended = self.best, True
+                found, self.ended = _not_away(arm, alpha, self.asked, self.best), True
                 break
             hop = _hop(self.limited, alpha, self.asked, self.best.branch)
             self.effort += _effort(hop)
@@ -201,7 +204,17 @@ class _Pursuit:
 
 
 def _effort(stance: Stance) -> int:
-    return 1 if stance.position_error <= tolerances.SAME_POSITION else OUT_OF_REACH_EFFORT
+    reached = stance.position_error <= tolerances.SAME_POSITION
+    return stance.searches * (1 if reached else OUT_OF_REACH_EFFORT)
+
+
+def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: Stance) -> Stance:
+    """`best`, but not where it only ends near the nearest place, farther from it than `alpha`."""
+    if arm.off_axis == 0.0:
+        return best
+    miss, miss_best = (_misses(arm, asked, angles) for angles in (alpha, best.alpha))
+    away = _nearer(miss, miss_best, tolerances.SAME_POSITION)
+    return _standing(alpha, best.branch) if away else best
 
 
 def _standing(alpha: Five, branch: Branch) -> Stance:

@@ -24,7 +24,7 @@ from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitch_and_roll
 from app.kinematics.reading import Reading
 from app.robot.model import load
-from tests.kinematics.family import random_member
+from tests.kinematics.family import random_member, random_pose
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
@@ -195,16 +195,16 @@ def test_thousands_of_drags(arm: Arm, session: Session, reading: Reading) -> Non
 
 
 def others() -> Iterator[tuple[str, Chain]]:
+    """Arms with offsets of every kind, and tool points beside their roll axis."""
     for name in ("pincherx_150", "youbot_arm"):
         yield name, load(ARMS / f"{name}.urdf").arm.chain
     for seed in (1, 2, 3):
         rng = np.random.default_rng(seed)
         chain, _ = random_member(rng, lateral=seed != 1)
         middle, half = rng.uniform(-0.5, 0.5, 5), rng.uniform(1.0, 2.6, 5)
-        yield (
-            f"member {seed}",
-            dataclasses.replace(chain, lower=middle - half, upper=middle + half),
-        )
+        limited = dataclasses.replace(chain, lower=middle - half, upper=middle + half)
+        yield f"member {seed}", limited
+        yield f"member {seed} beside", limited.with_tool(chain.M @ random_pose(rng, 0.02))
 
 
 @pytest.mark.parametrize("chain", [pytest.param(chain, id=name) for name, chain in others()])
