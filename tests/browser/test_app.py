@@ -317,7 +317,7 @@ def test_killed_and_restarted_the_app_comes_back_whole(
         robot.settle()
         server.kill()
         come_back(robot, server)
-        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 1
+        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 2
         robot.page.drag_arrow(MOVE, "z", 0.05)
         robot.settle()
         robot.page.screenshot(artefacts / "app-restarted.png")
