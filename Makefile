@@ -9,8 +9,8 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test check lint types contracts tests browser robot bench-drag bench-kinematics \
-        bench-start pictures lock clean
+.PHONY: run test check lint types contracts tests browser robot bench-collision bench-drag \
+        bench-kinematics bench-start pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -35,7 +35,7 @@ browser: $(dev_ok)            ## find a Chromium, or install one
 tests: $(dev_ok)
 	$(bin)/python -m pytest $(ARGS)
 
-robot: $(dev_ok)              ## rebuild robot_description/meshes from the numbers in robot_description/cad
+robot: $(dev_ok)              ## rebuild all files of the robot from the numbers in robot_description/cad
 	$(bin)/python -m robot_description.cad
 
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
@@ -43,6 +43,9 @@ bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)
+
+bench-collision: $(dev_ok)    ## distances and one control tick, beside raw meshes
+	$(bin)/python -m benchmarks.collision $(ARGS)
 
 pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
 	$(bin)/python -m docs.pictures
@@ -58,7 +61,8 @@ lock: $(dev_ok)               ## resolve the dependencies anew into the two lock
 	  --output-file requirements-dev.lock
 
 clean:
-	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis test-artefacts
+	rm -rf $(VENV) .venv-bench .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis \
+	  test-artefacts
 
 $(bin)/python:
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else f"katana450 needs Python 3.11 or newer; $(PYTHON) is {v[0]}.{v[1]}. Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)")'

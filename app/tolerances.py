@@ -8,8 +8,8 @@ from typing import Final
 # rotation: single-precision numbers and rounded text pass, a scale or a shear does not.
 ROTATION_INPUT: Final = 1e-6
 
-# How far from orthonormal a rotation is that a few products of rotations in double precision made:
-# finding the nearest one would only exchange this rounding for its own.
+# How far from orthonormal (root mean square of six misfits) a rotation is that a few products of
+# rotations in double precision made: the nearest one would only exchange this rounding for its own.
 ROTATION_EXACT: Final = 4e-15
 
 # How far from 0 0 0 1 the last row of a pose may be: rounding of a product of poses, no more.
@@ -31,6 +31,9 @@ FAMILY_EXACT: Final = 1e-9
 
 # [1, m] What is left of a 0 or a 1 after a few products of matrices in double precision.
 ROUNDING: Final = 1e-15
+
+# [1] Cosine of the tool's pitch up to which nothing but rounding is left of where it faces.
+UPRIGHT: Final = 1e-14
 
 # [m] Distance below which a point counts as lying on a rotation axis: its direction seen from the
 # axis is then known to fewer digits than a joint encoder resolves.

@@ -5,3 +5,5 @@ from __future__ import annotations
 from pathlib import Path
 
 URDF_PATH: Path = Path(__file__).resolve().parent / "katana450.urdf"
+
+PROPS_PATH: Path = URDF_PATH.parent / "props" / "props.json"

@@ -5,15 +5,21 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
+
+from app.collision.shape import half_space
+from app.collision.world import obstacle
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
 from app.exchange.reachability_file import load_map
 from app.gateway.gateway import Gateway
+from app.robot.collision import world_of
 from app.robot.model import load
 from app.runtime.clock import MonotonicClock
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
 from app.settings import Settings
+from app.view.texts import UNCHECKED
 from app.view.view import View
 
 
@@ -34,14 +40,20 @@ class Assembly:
         """
         stored = None if workspace is None else load_map(workspace)
         model = load(urdf, tool)
-        for note in model.notes:
+        world, left_out = world_of(model)
+        notes = [*model.notes, *left_out]
+        if world is None:
+            notes.append(UNCHECKED)
+        else:
+            world = world.with_obstacles([obstacle("table", np.eye(4), half_space())])
+        for note in notes:
             print(f"katana450: {note}", file=sys.stderr)
-        session = Session(model.arm, model.ready(settings.ready))
+        session = Session(model.arm, model.ready(settings.ready), world)
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
         self._view = View(gateway.viser, model, self._loop, mailbox, settings.frame_rate, stored)
-        gateway.attach(model.arm, self._loop, mailbox, self._view.let_go)
+        gateway.attach(self._loop, mailbox, self._view.let_go)
 
     def start(self) -> None:
         """Run the control loop and the view in threads of their own."""

@@ -9,6 +9,7 @@ from functools import cached_property
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
+from app.motion.limiter import Limits
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,13 @@ class Gripper:
         return self.lower < self.upper
 
 
+GENTLE = 0.9
+"""[s] Until a joint runs at its greatest speed, as the Katana's own controllers have it at the
+quicker of their two settings."""
+
+SOFT = 0.1
+"""[s] Until it accelerates as it may."""
+
 NO_GRIPPER = Gripper(0.0, 0.0, 0.0)
 
 
@@ -40,12 +48,23 @@ class Arm:
         tools: home configuration M, (4, 4) in {S}, of each named tool frame.
         default_tool: a key of ``tools``.
         gripper: the finger joint, or ``NO_GRIPPER``.
+        acceleration, jerk: (n,) the most of each joint [rad/s^2, rad/s^3]; None where nobody says.
     """
 
     chain: Chain
     tools: Mapping[str, FloatArray]
     default_tool: str
     gripper: Gripper
+    acceleration: FloatArray | None = None
+    jerk: FloatArray | None = None
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Of the joints' motion, gentle where nobody says."""
+        chain = self.chain
+        acceleration = chain.speed / GENTLE if self.acceleration is None else self.acceleration
+        jerk = acceleration / SOFT if self.jerk is None else self.jerk
+        return Limits(chain.lower, chain.upper, chain.speed, acceleration, jerk)
 
     @cached_property
     def chains(self) -> Mapping[str, Chain]:

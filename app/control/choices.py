@@ -6,8 +6,7 @@ from app.control.arm import Arm
 from app.control.state import PoseTarget, State
 from app.kinematics.badge import Badge
 from app.kinematics.branch import BRANCHES, Branch
-from app.kinematics.projection import Projection
-from app.kinematics.reading import nearest
+from app.kinematics.projection import Projection, project
 from app.kinematics.tool import ToolTarget
 from app.kinematics.tracker import leap
 
@@ -30,7 +29,7 @@ def choice(arm: Arm, state: State, branch: Branch) -> Projection:
     chain = arm.chain_to(state.tool)
     if isinstance(state.target, PoseTarget):
         T = state.target.T
-        return nearest(chain, T, state.reading, branch=branch, q_hint=state.goal)
+        return project(chain, T, reading=state.reading, branch=branch, q_hint=state.goal)
     return leap(chain, state.goal, wish_on(arm, state, branch), branch, state.reading)
 
 

@@ -16,6 +16,13 @@ from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.reading import Reading
+from app.kinematics.velocity import JogFrame
+
+LEAST_SPEED = 0.01
+"""A share below this is a hold, for which there are Pause and Stop."""
+
+JOG_TIME = 0.2
+"""[s] How long a jog goes on by itself."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +145,54 @@ class Reset:
     """Forget the target: the arm holds where it is, and the gripper too."""
 
 
+@dataclass(frozen=True)
+class Stop:
+    """Come to rest as fast as the arm can, and stay until a person says Release."""
+
+
+@dataclass(frozen=True)
+class Release:
+    """After a stop: commands count again. Nothing moves by this."""
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Come to rest on the way, and keep the goal."""
+
+
+@dataclass(frozen=True)
+class Resume:
+    """Go on to the goal there is."""
+
+
+@dataclass(frozen=True)
+class SpeedScale:
+    """From now on no joint and no tool is faster than ``value`` of its most, above 0 up to 1."""
+
+    value: float
+
+    def __post_init__(self) -> None:
+        _check_finite("The speed", self.value)
+        if not LEAST_SPEED <= self.value <= 1.0:
+            raise InputError(f"The speed is a share from {LEAST_SPEED} to 1, not {self.value}.")
+
+
+@dataclass(frozen=True, eq=False)
+class Jog:
+    """Move at ``rates`` (5,) for JOG_TIME: vx, vy, vz [m/s] along ``frame``, pitch, roll [rad/s].
+
+    Sent again and again while a hand holds on; when it does not come the arm comes to rest.
+    """
+
+    rates: FloatArray
+    frame: JogFrame = JogFrame.BASE
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rates", _vector("The jog", self.rates, 5))
+        if not isinstance(self.frame, JogFrame):
+            raise InputError(f"A jog is along JogFrame.BASE or JogFrame.TOOL, not {self.frame!r}.")
+
+
 Command = (
     SetJoint
     | SetJoints
@@ -152,6 +207,12 @@ Command = (
     | Home
     | Stretch
     | Reset
+    | Stop
+    | Release
+    | Pause
+    | Resume
+    | SpeedScale
+    | Jog
 )
 
 

@@ -8,17 +8,35 @@ from dataclasses import replace
 import numpy as np
 
 from app import tolerances
+from app.collision.world import World
 from app.control import commands as cmd
 from app.control.arm import Arm
 from app.control.choices import choice, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
-from app.control.state import Finding, JointTarget, PoseTarget, Reason, State, Target, ToolTarget
+from app.control.mover import Mover
+from app.control.state import (
+    Finding,
+    Halt,
+    Jogging,
+    JointTarget,
+    PoseTarget,
+    Reason,
+    State,
+    Target,
+    ToolTarget,
+)
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
-from app.kinematics.reading import nearest
+from app.kinematics.projection import project
 from app.kinematics.tracker import track
-from app.motion.approach import approach
+from app.motion.limiter import Motion
+
+TOOL_SPEED = 0.5
+"""[m/s] The most of the tool point, unless somebody says otherwise: a person can follow it."""
+
+SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale)
+"""What counts while a stop holds the arm."""
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -28,9 +46,21 @@ must not turn into a leap."""
 class Session:
     """The rules of one arm. Holds no state of its own: ``step`` is a pure function."""
 
-    def __init__(self, arm: Arm, ready: FloatArray) -> None:
-        """``ready``: (n,) the posture [rad] that Home drives to, inside the limits."""
+    def __init__(
+        self,
+        arm: Arm,
+        ready: FloatArray,
+        world: World | None = None,
+        tool_speed: float = TOOL_SPEED,
+    ) -> None:
+        """``ready``: (n,) the posture [rad] that Home drives to, inside the limits.
+
+        ``world``: what the arm must not touch; without one nothing keeps it from touching.
+        ``tool_speed``: the most of the tool point [m/s].
+        """
         self.arm = arm
+        self.world = world
+        self._mover = Mover(arm, world, tool_speed)
         self.ready = frozen(arm.chain.check_q(ready))
         if not arm.chain.within_limits(self.ready):
             raise InputError("The ready posture lies outside the joint limits.")
@@ -42,7 +72,7 @@ class Session:
             t=t,
             q=q,
             gripper=gripper,
-            setpoint=q,
+            motion=Motion.rest(q),
             gripper_setpoint=gripper,
             goal=q,
             gripper_goal=gripper,
@@ -73,16 +103,11 @@ class Session:
         for command in commands:
             self.check(command)
             state = self._take(state, command)
+        if isinstance(state.target, ToolTarget) and state.since is not None:
+            state = self._follow(state, state.target, state.since)
         dt = min(t - state.t, LONGEST_STEP)
-        gripper = self.arm.gripper
-        reach = gripper.speed * max(dt, 0.0)
-        return replace(
-            state,
-            t=max(t, state.t),
-            setpoint=approach(state.setpoint, state.goal, self.arm.chain.speed, dt),
-            gripper_setpoint=state.gripper_setpoint
-            + min(max(state.gripper_goal - state.gripper_setpoint, -reach), reach),
-        )
+        state = self._mover.step(replace(state, t=max(t, state.t)), dt)
+        return state if state.jogging is None else self._jogged(state)
 
     @staticmethod
     def observe(state: State, q: FloatArray, gripper: float) -> State:
@@ -94,14 +119,38 @@ class Session:
         """Hold after an error of our own: no target survives it."""
         held = replace(
             state,
+            motion=Motion.rest(state.setpoint),
             goal=state.setpoint,
             gripper_goal=state.gripper_setpoint,
             target=JointTarget(state.setpoint),
+            since=None,
+            let_go=False,
+            jogging=None,
         )
         return replace(held, findings=(Finding(Reason.INTERNAL),))
 
     def _take(self, state: State, command: cmd.Command) -> State:
+        if state.halted is not None and not isinstance(command, SAFE):
+            return state
         match command:
+            case cmd.Stop():
+                return self._halt(state)
+            case cmd.Release():
+                goal = self._mover.halt(state)[0]
+                free = replace(state, halted=None, goal=goal, target=JointTarget(goal))
+                return self._without(free, Reason.HALTED)
+            case cmd.Pause():
+                told = self._without(state, Reason.PAUSED).findings
+                return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
+            case cmd.Resume():
+                return self._without(replace(state, paused=False), Reason.PAUSED)
+            case cmd.SpeedScale(value=value):
+                return replace(state, speed=value)
+            case cmd.Jog(rates=rates, frame=frame):
+                if state.paused:
+                    return state
+                jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
+                return replace(state, jogging=jogging, since=None, let_go=False)
             case cmd.SetJoint(axis=axis, value=value):
                 q = np.array(state.goal)
                 q[axis] = value
@@ -114,64 +163,125 @@ class Session:
                 return self._aim(state, JointTarget(frozen(np.zeros(self.arm.chain.n))))
             case cmd.Reset():
                 held = replace(state, gripper_goal=state.gripper_setpoint)
-                return self._aim(held, JointTarget(state.setpoint))
+                return self._aim(held, JointTarget(self._mover.halt(state)[0]))
             case cmd.MoveTool(position=position):
-                return self._aim(state, replace(wish(self.arm, state), position=position))
+                return self._drag(state, replace(wish(self.arm, state), position=position))
             case cmd.TurnTool(pitch=pitch, roll=roll):
-                return self._aim(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
+                return self._drag(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
             case cmd.SetPose(T=T):
                 return self._aim(state, PoseTarget(T))
             case cmd.Settle():
+                if state.since is not None:
+                    return replace(state, let_go=True)
                 # The findings stay: they say why the handle springs back.
-                return replace(state, target=JointTarget(state.goal))
+                goal = state.setpoint if state.blocked else state.goal
+                return replace(state, goal=goal, target=JointTarget(goal), blocked=False)
             case cmd.SetTool(name=name):
                 return self._aim(replace(state, tool=name), JointTarget(state.goal))
             case cmd.SetReading(reading=reading):
-                reread = replace(state, reading=reading)
-                # Where a hand let go nothing is wished any more that could be reread.
-                let_go = isinstance(state.target, JointTarget)
-                return reread if let_go else self._aim(reread, state.target)
+                return self._reread(replace(state, reading=reading))
             case cmd.TakeBranch(branch=branch):
                 return self._take_branch(state, branch)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
 
-    def _aim(self, state: State, target: Target) -> State:
+    def _aim(self, state: State, target: JointTarget | PoseTarget) -> State:
         """Make ``target`` the target, and the nearest the arm can do the goal."""
         chain = self.arm.chain_to(state.tool)
-        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
         if isinstance(target, JointTarget):
             goal = frozen(chain.clamp(target.q))
-            return replace(
-                state,
-                target=target,
-                goal=goal,
-                branch=branch_of(chain, goal),
-                findings=of_joints(chain, target.q) + gripper,
-            )
-        if isinstance(target, PoseTarget):
-            best = nearest(chain, target.T, state.reading, branch=state.branch, q_hint=state.goal)
-            findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
-        else:
-            tracked = track(
-                chain,
-                state.goal,
-                target,
-                branch=state.branch,
-                reading=state.reading,
-                since=wish(self.arm, state),
-            )
-            best = tracked.best
-            findings = of_tracked(chain, tracked, state.reading)
-        return replace(
-            state, target=target, goal=frozen(chain.clamp(best.q)), findings=findings + gripper
+            state = replace(state, branch=branch_of(chain, goal))
+            return self._gone(state, target, goal, of_joints(chain, target.q))
+        best = project(
+            chain, target.T, reading=state.reading, branch=state.branch, q_hint=state.goal
         )
+        findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
+        return self._gone(state, target, best.q, findings)
+
+    def _reread(self, state: State) -> State:
+        """Go for what is wished in the reading there is now."""
+        match state.target:
+            case PoseTarget() as target:
+                return self._aim(state, target)
+            case ToolTarget() as target:
+                return replace(self._drag(state, target), let_go=state.let_go)
+        # Where a hand let go nothing is wished any more that could be reread.
+        return state
+
+    def _drag(self, state: State, target: ToolTarget) -> State:
+        """Make ``target`` what is followed from now on, along the way the hand took there."""
+        since = wish(self.arm, state) if state.since is None else state.since
+        return replace(state, target=target, since=since, let_go=False)
+
+    def _follow(self, state: State, target: ToolTarget, since: ToolTarget) -> State:
+        """Take the goal on towards ``target``, as far as one tick has time for."""
+        chain = self.arm.chain_to(state.tool)
+        tracked = track(
+            chain, state.goal, target, branch=state.branch, reading=state.reading, since=since
+        )
+        if tracked.since is not None:
+            return replace(state, goal=tracked.best.q, since=tracked.since)
+        wished = JointTarget(tracked.best.q) if state.let_go else target
+        return self._gone(state, wished, tracked.best.q, of_tracked(chain, tracked, state.reading))
+
+    @staticmethod
+    def _gone(
+        state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]
+    ) -> State:
+        """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
+        kept = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
+        paused = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
+        return replace(
+            state,
+            target=target,
+            goal=goal,
+            findings=paused + findings + kept,
+            since=None,
+            let_go=False,
+            jogging=None,
+        )
+
+    def _halt(self, state: State) -> State:
+        """Brake, and forget every wish. The grip stays: what is held must not be dropped."""
+        if state.halted is not None:
+            return state
+        goal, way, time = self._mover.halt(state)
+        halted = replace(
+            state,
+            halted=Halt(way, time),
+            paused=False,
+            goal=goal,
+            gripper_goal=state.gripper_setpoint,
+            target=JointTarget(goal),
+            since=None,
+            let_go=False,
+            jogging=None,
+        )
+        return replace(halted, findings=(Finding(Reason.HALTED, way, time=time),))
+
+    def _jogged(self, state: State) -> State:
+        """The goal is where the jog would come to rest, so that it does when no more comes."""
+        assert state.jogging is not None
+        goal = self._mover.halt(state)[0]
+        chain = self.arm.chain_to(state.tool)
+        contact = tuple(f for f in state.findings if f.reason is Reason.CONTACT)
+        return replace(
+            state,
+            goal=goal,
+            target=JointTarget(goal),
+            branch=branch_of(chain, goal),
+            findings=contact,
+            jogging=None if state.t >= state.jogging.until else state.jogging,
+        )
+
+    @staticmethod
+    def _without(state: State, reason: Reason) -> State:
+        return replace(state, findings=tuple(f for f in state.findings if f.reason is not reason))
 
     def _take_branch(self, state: State, branch: Branch) -> State:
         """Leap to ``branch`` with the tool where it is wished."""
         best = choice(self.arm, state, branch)
-        goal = frozen(self.arm.chain.clamp(best.q))
-        target: Target = JointTarget(goal)
+        target: Target = JointTarget(best.q)
         if isinstance(state.target, PoseTarget):
             target = state.target
         elif isinstance(state.target, ToolTarget):
@@ -182,8 +292,7 @@ class Session:
             state.reading,
             yaw_was_wished=isinstance(target, PoseTarget),
         )
-        gripper = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
-        return replace(state, branch=branch, target=target, goal=goal, findings=findings + gripper)
+        return self._gone(replace(state, branch=branch), target, best.q, findings)
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper

@@ -9,9 +9,13 @@ from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
 from app.kinematics.reading import Reading
 from app.kinematics.tool import ToolTarget
+from app.kinematics.velocity import JogFrame
+from app.motion.limiter import Motion
 
 __all__ = [
     "Finding",
+    "Halt",
+    "Jogging",
     "JointTarget",
     "PoseTarget",
     "Reason",
@@ -44,13 +48,19 @@ class Status(Enum):
 
     OK = "ok"
     LIMITED = "limited"
+    PAUSED = "paused"
+    BLOCKED = "blocked"
     HELD = "held"
+    HALTED = "halted"
     FAULT = "fault"
 
 
 class Reason(Enum):
     """Why the goal differs from what was wished."""
 
+    HALTED = "halted"
+    PAUSED = "paused"
+    CONTACT = "contact"
     ACROSS_GAP = "across a gap"
     OUT_OF_REACH = "out of reach"
     POSITION_CHANGED = "position changed"
@@ -69,13 +79,38 @@ class Finding:
     Attributes:
         reason: what holds the goal back.
         amount: by how much [m or rad]; for a limit, the limit itself [rad]; for a gap, the leap
-            across it [rad].
+            across it [rad]; for a contact, the distance that is left [m]; for a stop, how far the
+            tool went until it was at rest [m].
         axis: the axis it is about, counted from 0, where it is about one.
+        parts: the two links or things it is about, where it is about two.
+        time: for a stop, how long that took [s].
     """
 
     reason: Reason
     amount: float = 0.0
     axis: int | None = None
+    parts: tuple[str, str] | None = None
+    time: float = 0.0
+
+
+@dataclass(frozen=True)
+class Halt:
+    """A stop: how far the tool went until it was at rest [m], and how long that took [s]."""
+
+    way: float
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Jogging:
+    """Rates (5,) for a while: v of the tool point [m/s], pitch and roll [rad/s].
+
+    frame: whose axes v is along. until: when it ends unless it is renewed [s].
+    """
+
+    rates: FloatArray
+    frame: JogFrame
+    until: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +120,27 @@ class State:
     Attributes:
         t: time of the tick [s].
         q, gripper: where the arm is, as the driver last said, (n,) and scalar [rad].
-        setpoint, gripper_setpoint: what the driver is told in this tick.
+        motion, gripper_setpoint: what the driver is told in this tick, and how it moves.
         goal, gripper_goal: where the arm is going: the nearest it can do to the target.
         tool: the tool frame that targets and read-outs are of.
         target: what was wished, kept as it was wished.
         branch: the branch that dragging keeps.
         reading: which numbers of a target count, and what gives way.
-        findings: why the goal is not what was last wished; empty when it is.
+        findings: why the goal is not what was last wished, or is not gone to; else empty.
+        blocked: whether the arm waits on its way because it would touch something.
+        halted: the stop that holds the arm until a person releases it; None when there is none.
+        paused: whether the arm waits on its way because a person wants it to.
+        speed: the share of every greatest speed that is allowed, above 0 and up to 1.
+        jogging: the jog under way, if one is.
+        since: how far along its way the target has been followed, while the goal is still on its
+            way to it; None once it is there. Until then the findings are those from before.
+        let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
     """
 
     t: float
     q: FloatArray
     gripper: float
-    setpoint: FloatArray
+    motion: Motion
     gripper_setpoint: float
     goal: FloatArray
     gripper_goal: float
@@ -106,12 +149,25 @@ class State:
     branch: Branch
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
+    blocked: bool = False
+    halted: Halt | None = None
+    paused: bool = False
+    speed: float = 1.0
+    jogging: Jogging | None = None
+    since: ToolTarget | None = None
+    let_go: bool = False
 
     @property
     def status(self) -> Status:
         """What the findings come to."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
+        if self.halted is not None:
+            return Status.HALTED
+        if self.paused:
+            return Status.PAUSED
+        if any(finding.reason is Reason.CONTACT for finding in self.findings):
+            return Status.BLOCKED
         if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
             return Status.HELD
         return Status.LIMITED if self.findings else Status.OK
@@ -119,6 +175,20 @@ class State:
     @property
     def moving(self) -> bool:
         """Whether the arm or the gripper is still on its way."""
+        resting = self.blocked or self.paused or self.halted is not None
+        return self.under_way and not (resting and self.motion.at_rest)
+
+    @property
+    def setpoint(self) -> FloatArray:
+        """Where the driver is told to be, (n,) [rad]."""
+        return self.motion.q
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the setpoints differ from the goals, whatever stands between them."""
         return bool(
-            (self.setpoint != self.goal).any() or self.gripper_setpoint != self.gripper_goal
+            (self.setpoint != self.goal).any()
+            or not self.motion.at_rest
+            or self.jogging is not None
+            or self.gripper_setpoint != self.gripper_goal
         )

@@ -18,7 +18,6 @@ import uvicorn
 import viser
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from app.control.arm import Arm
 from app.errors import ConfigurationError
 from app.gateway.access import AccessFile
 from app.gateway.application import application
@@ -89,11 +88,9 @@ class Gateway:
         if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
-    def attach(
-        self, arm: Arm, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]
-    ) -> None:
+    def attach(self, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]) -> None:
         """From now on the arm can be driven. ``let_go``: see ``Motion``."""
-        self._hub.arm = Motion(arm, loop, mailbox, let_go)
+        self._hub.arm = Motion(loop, mailbox, let_go)
 
     def stop(self) -> None:
         """Close every socket and the port; viser is left to its view."""

@@ -25,9 +25,6 @@ TICK = 0.02
 JOG_LASTS = 0.2
 """[s] A jog is over when no other follows within this time."""
 
-FIRST_SPEED = 0.5
-"""Share of full speed at which jogging begins."""
-
 REMEMBERED = 256
 """Pages that are known again when they come back."""
 
@@ -38,9 +35,15 @@ class Arm(Protocol):
     @property
     def state(self) -> State: ...
 
+    def stop(self) -> None: ...
+
+    def release(self) -> None: ...
+
     def hold(self) -> None: ...
 
-    def jog(self, rates: Rates, frame: JogFrame, dt: float) -> None: ...
+    def jog(self, rates: Rates, frame: JogFrame) -> None: ...
+
+    def limit(self, share: float) -> None: ...
 
 
 class Behind(Protocol):
@@ -73,7 +76,6 @@ class Hub:
         self.clock = clock
         self.lease = Lease()
         self.stopped: Stopped | None = None
-        self.speed = FIRST_SPEED
         self.arm: Arm | None = None
         """None until the arm is there."""
         self._windows: dict[str, Window] = {}
@@ -136,6 +138,8 @@ class Hub:
         """End a stop; the arm stays where it is until somebody moves it afresh."""
         self._grasp(window)
         self.stopped = None
+        if self.arm is not None:
+            self.arm.release()
 
     def acquire(self, window: Window) -> None:
         self.lease = self.lease.acquire(window.person, self.clock())
@@ -181,17 +185,13 @@ class Hub:
         self._check_runs()
         self._grasp(window)
         assert self.arm is not None
-        t = self.clock()
-        since, self._jogged = t - self._jogged, t
-        if any(rates) and since < JOG_LASTS:
-            self.arm.jog(tuple(self.speed * rate for rate in rates), frame, since)  # type: ignore[arg-type]
-        elif not any(rates):
-            self.arm.hold()
-            self._jogged = -JOG_LASTS
+        self.arm.jog(rates, frame)
+        self._jogged = self.clock() if any(rates) else -JOG_LASTS
 
     def set_speed(self, window: Window, speed: float) -> None:
         self._grasp(window)
-        self.speed = speed
+        if self.arm is not None:
+            self.arm.limit(speed)
 
     # What time does
 
@@ -203,9 +203,9 @@ class Hub:
         # When this thread was held up itself, what came in the meantime is read first.
         if not late:
             self._listen_for_silence(t)
-        if self.stopped is not None and self.arm is not None and self.arm.state.moving:
-            # Something that was on its way came in after the stop.
-            self.arm.hold()
+        if self.stopped is not None and self.arm is not None and self.arm.state.halted is None:
+            # An arm that came after the stop, or an error that undid it.
+            self.arm.stop()
 
     def _listen_for_silence(self, t: float) -> None:
         holder = self.lease.holder
@@ -223,15 +223,20 @@ class Hub:
         self.lease = lease
 
     def _halt(self, stopped: Stopped) -> None:
-        self._hold()
+        self._let_go()
+        if self.arm is not None:
+            self.arm.stop()
         if self.stopped is None:
             self.stopped = stopped
             log.warning("Stopped: %s", stopped.why)
 
-    def _hold(self) -> None:
+    def _let_go(self) -> None:
         for _, drags in self._pictures.values():
             drags.clear()
         self._jogged = -JOG_LASTS
+
+    def _hold(self) -> None:
+        self._let_go()
         if self.arm is not None:
             self.arm.hold()
 

@@ -7,17 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from app.control import commands as cmd
-from app.control.arm import Arm
 from app.control.state import State
 from app.errors import InputError
-from app.kinematics.forward import forward
-from app.kinematics.freedoms import pitched_frame
-from app.kinematics.velocity import JogFrame, jog
+from app.kinematics.velocity import JogFrame
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
-
-LONGEST_STEP = 0.1
-"""[s] A jog reaches no further than it goes in this time: without another the arm stands."""
 
 Rates = tuple[float, float, float, float, float]
 """Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
@@ -26,11 +20,8 @@ Rates = tuple[float, float, float, float, float]
 class Motion:
     """The arm as the gateway sees it."""
 
-    def __init__(
-        self, arm: Arm, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]
-    ) -> None:
+    def __init__(self, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]) -> None:
         """``let_go`` takes the handles of the view out of every hand."""
-        self._arm = arm
         self._loop = loop
         self._mailbox = mailbox
         self._let_go = let_go
@@ -40,24 +31,31 @@ class Motion:
         """The newest."""
         return self._loop.snapshot.state
 
-    def hold(self) -> None:
-        """Stop here and forget every target; no hand holds a handle any more."""
+    def stop(self) -> None:
+        """Rest as fast as the arm can; it obeys nothing until it is released."""
+        self._mailbox.put(cmd.Stop())
         self._let_go()
-        self._mailbox.put(cmd.Reset())
 
-    def jog(self, rates: Rates, frame: JogFrame, dt: float) -> None:
-        """Go with these rates for ``dt`` [s]."""
-        state = self.state
-        chain = self._arm.chain_to(state.tool)
-        R = forward(chain, state.goal)[:3, :3]
-        pitched = R.T @ pitched_frame(chain, state.goal)
-        v = np.array(rates[:3])
-        omega = pitched[:, 1] * rates[3] + pitched[:, 0] * rates[4]
-        V = np.concatenate((omega, v if frame is JogFrame.TOOL else R.T @ v))
-        dt = min(dt, LONGEST_STEP)
-        qd = jog(chain, state.goal, V, JogFrame.TOOL, dt)
+    def release(self) -> None:
+        """After a stop: obey again. Nothing moves by this."""
+        self._mailbox.put(cmd.Release())
+
+    def hold(self) -> None:
+        """Come to rest and forget every target; no hand holds a handle any more."""
+        self._let_go()
+        self._put(cmd.Reset())
+
+    def jog(self, rates: Rates, frame: JogFrame) -> None:
+        """Go with these rates for a moment."""
+        self._put(cmd.Jog(np.array(rates), frame))
+
+    def limit(self, share: float) -> None:
+        """No motion is faster than this share of the most."""
+        self._put(cmd.SpeedScale(share))
+
+    def _put(self, command: cmd.Command) -> None:
         try:
-            self._mailbox.put(cmd.SetJoints(state.goal + qd * dt))
+            self._mailbox.put(command)
         except InputError:
-            # The mailbox is full: the arm stands, which is what a jog without successor means.
+            # The mailbox is full: what is asked again and again is, and a stop always has room.
             return

@@ -29,7 +29,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "why": "" if state is None else sentence(state),
         "stopped": None if stopped is None else stopped.why,
         "holder": None if holder is None else holder.name,
-        "speed": hub.speed,
+        "speed": 1.0 if state is None else state.speed,
         "windows": len(hub.windows),
     }
 

@@ -8,6 +8,7 @@ in rad. A twist V (6,) is (omega, v): the angular part first. Source: Lynch & Pa
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,12 @@ from app.geometry.arrays import FloatArray, finite_array
 
 Rows = list[list[float]]
 """A matrix as nested lists of floats, which beat arrays for one pose at a time."""
+
+# Looked up once, because this stands before every inverse kinematics.
+_ARRAY: Final = np.ndarray
+_FLOAT: Final = np.dtype(np.float64)
+_LAST_ROW: Final = [0.0, 0.0, 0.0, 1.0]
+_SQUARES_EXACT: Final = 6.0 * tolerances.ROTATION_EXACT**2
 
 
 def hat(V: npt.ArrayLike) -> FloatArray:
@@ -99,7 +106,7 @@ def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
 
 def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
     """What `validated` returns, as nested lists of floats."""
-    if type(T) is np.ndarray and T.dtype == np.float64 and T.shape == (4, 4):
+    if type(T) is _ARRAY and T.dtype == _FLOAT and T.shape == (4, 4):
         rows: Rows = T.tolist()
         if _is_clean(rows):
             return rows
@@ -118,15 +125,9 @@ def _is_clean(rows: Rows) -> bool:
     On plain floats, because this stands before every inverse kinematics. NaN fails every test.
     """
     (a, b, c, x), (d, e, f, y), (g, h, i, z), last = rows
-    exact = tolerances.ROTATION_EXACT
-    return (
-        last == [0.0, 0.0, 0.0, 1.0]
-        and -exact <= a * a + d * d + g * g - 1.0 <= exact
-        and -exact <= b * b + e * e + h * h - 1.0 <= exact
-        and -exact <= a * b + d * e + g * h <= exact
-        # The third axis is right-handed: unit length and squareness follow.
-        and -exact <= d * h - g * e - c <= exact
-        and -exact <= g * b - a * h - f <= exact
-        and -exact <= a * e - d * b - i <= exact
-        and x - x == y - y == z - z == 0.0
-    )
+    one, two, both = a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, a * b + d * e + g * h
+    # The third axis is right-handed: unit length and squareness follow.
+    u, v, w = d * h - g * e - c, g * b - a * h - f, a * e - d * b - i
+    squares = one * one + two * two + both * both + u * u + v * v + w * w
+    total = x + y + z
+    return squares <= _SQUARES_EXACT and total - total == 0.0 and last == _LAST_ROW

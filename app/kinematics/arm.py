@@ -35,6 +35,7 @@ from app.kinematics.chain import Chain
 from app.kinematics.turns import wrapped
 
 Five = tuple[float, float, float, float, float]
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +96,9 @@ class FiveAxisArm:
         return bool((np.eye(4) == self.T_C_S).all() and (self.T_K_tool == np.eye(4)).all())
 
     @cached_property
-    def is_straight(self) -> bool:
-        """Whether the chain is its own canonical arm, and without offsets: as the Katana is."""
-        shape = (self.a, self.d, self.tilt, *self.shifts)
-        return self.is_canonical and not any(shape) and self.signs == (1.0,) * 5
+    def is_mirrored(self) -> bool:
+        """Whether half a turn about axis 1 takes the arm's plane to its own mirror image."""
+        return self.a == self.d == self.tilt == 0.0
 
     def pose(self, T: FloatArray) -> FloatArray:
         """T_C_K (4, 4) of the pose `T` (4, 4) = T_S_tool."""
@@ -112,6 +112,46 @@ class FiveAxisArm:
         """q (..., 5) [rad] of the canonical angles `alpha` (..., 5) [rad]."""
         # + 0.0 leaves no negative zero behind.
         return (np.asarray(alpha) - self.shifts) * self.signs + 0.0
+
+    def angles(self, q: FloatArray) -> Five:
+        """`canonical` of one joint vector (5,), as plain floats."""
+        one, two, three, four, five = self.canonical(q).tolist()
+        return one, two, three, four, five
+
+    def pitch(self, alpha: Five) -> float:
+        """Angle [rad] of the roll axis below the horizontal at the canonical angles `alpha`."""
+        return alpha[1] + alpha[2] + alpha[3] - self.tilt
+
+    def beside(self, pitch: float, roll: float) -> Vector:
+        """The tool point [m] from that of {K}, as the arm's plane sees it: outward, sideways, up.
+
+        pitch of the roll axis below the horizontal, and roll about it [rad].
+        """
+        if self.off_axis == 0.0:
+            return 0.0, 0.0, 0.0
+        x, y, z = self._tool_in_K
+        c, s = math.cos(roll), math.sin(roll)
+        y, z = c * y - s * z, s * y + c * z
+        c, s = math.cos(pitch), math.sin(pitch)
+        return c * x + s * z, y, c * z - s * x
+
+    def tool_point(self, alpha: Five) -> Vector:
+        """The tool point [m] in {C} at the canonical angles `alpha` [rad]."""
+        one, two, three, four, five = alpha
+        b = two + three
+        phi = b + four
+        outward, sideways, up = self.beside(phi - self.tilt, five)
+        l1, l2, l3 = self.l1, self.l2, self.l3
+        u = outward + self.a + l1 * math.cos(two) + l2 * math.cos(b) + l3 * math.cos(phi)
+        v = sideways + self.d
+        z = up - l1 * math.sin(two) - l2 * math.sin(b) - l3 * math.sin(phi)
+        c, s = math.cos(one), math.sin(one)
+        return c * u - s * v, s * u + c * v, z
+
+    @cached_property
+    def _tool_in_K(self) -> Vector:
+        x, y, z = self.T_K_tool[:3, 3].tolist()
+        return x, y, z
 
 
 @lru_cache(maxsize=64)

@@ -24,8 +24,13 @@ from app.kinematics.solver import Solver
 
 BoolArray = npt.NDArray[np.bool_]
 
+_LAST_ROW: Final = np.array([[0.0], [0.0], [0.0], [1.0]])
+
 CHUNK: Final = 4096
-"""Poses at a time: what one step holds of them fits in a megabyte."""
+"""Poses at a time: of fewer the calls cost more than the arithmetic, more leave the cache."""
+
+_SQUARES_HOLD: Final = 1e-150
+"""Lengths from here on have a square that keeps its digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,21 +78,32 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
     inside = np.empty((len(T), 4), dtype=np.bool_)
     position = np.empty((len(T), 4)) if residuals else None
     rotation = np.empty((len(T), 4)) if residuals else None
-    for rows in _chunks(len(T)):
-        asked = _validated(T[rows].transpose(1, 2, 0).copy(), rows.start)
-        found = _solve(chain, solver, asked)
-        q[rows] = found.transpose(2, 0, 1)
-        inside[rows] = _inside(chain, found).T
-        if position is not None and rotation is not None:
-            for branch in range(4):
-                reached = _forward(chain, found[branch])
-                position[rows, branch] = np.sqrt(((reached[:3, 3] - asked[:3, 3]) ** 2).sum(axis=0))
-                rotation[rows, branch] = _angle(reached, asked)
+    # In one piece: what malloc once gave in one piece it keeps, and no page is zeroed anew.
+    work = np.empty(36 * min(len(T), CHUNK))
+    # What is not finite is refused, or left to the scalar solver.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for rows in _chunks(len(T)):
+            asked, angles = _arrays(work, rows.stop - rows.start)
+            np.copyto(asked, T[rows].transpose(1, 2, 0))
+            _validate(asked, rows.start, angles.reshape(20, -1))
+            _solve(chain, solver, asked, angles, q[rows], inside[rows])
+            if position is not None and rotation is not None:
+                for branch in range(4):
+                    reached = _forward(chain, q[rows, branch].T)
+                    miss = reached[:3, 3] - asked[:3, 3]
+                    position[rows, branch] = np.sqrt((miss * miss).sum(axis=0))
+                    rotation[rows, branch] = _angle(reached, asked)
     return Solutions(q, inside, position, rotation)
 
 
 def _chunks(n: int) -> Iterator[slice]:
     return (slice(start, min(start + CHUNK, n)) for start in range(0, n, CHUNK))
+
+
+def _arrays(work: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Poses (4, 4, count) and angles (2, 2, 5, count) in the memory of `work`."""
+    asked, angles = work[: 16 * count], work[16 * count : 36 * count]
+    return asked.reshape(4, 4, count), angles.reshape(2, 2, 5, count)
 
 
 def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
@@ -104,41 +120,43 @@ def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatAr
     return array.astype(np.float64, copy=False)
 
 
-def _validated(T: FloatArray, start: int) -> FloatArray:
-    """The poses `T` (4, 4, C), the first the `start`-th, made clean or refused as one by one."""
-    x, y, z, p = T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3]
-    misfit = np.empty((6, T.shape[2]))
-    for row, (a, b) in zip(misfit, ((x, x), (y, y), (x, y)), strict=False):
-        np.add(a[0] * b[0] + a[1] * b[1], a[2] * b[2], out=row)
+def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
+    """Make the poses `T` (4, 4, C), the first the `start`-th, clean, or refuse as one by one.
+
+    work: (15, C) or more, to write into.
+    """
+    x, y, z = T[:3, 0], T[:3, 1], T[:3, 2]
+    misfit, products = work[:6], work[12:15]
+    squares = work[6:12].reshape(3, 2, -1)
+    np.multiply(T[:3, :2], T[:3, :2], out=squares)
+    np.add(squares[0] + squares[1], squares[2], out=misfit[:2])
     misfit[:2] -= 1.0
+    np.multiply(x, y, out=products)
+    np.add(products[0] + products[1], products[2], out=misfit[2])
     # The third axis is right-handed: unit length and squareness follow.
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         np.subtract(x[j] * y[k] - x[k] * y[j], z[i], out=misfit[3 + i])
-    np.abs(misfit, out=misfit)
-    last_row = np.abs(T[3] - ((0.0,), (0.0,), (0.0,), (1.0,)))
     # NaN and infinity fail every comparison.
     if (
-        not (misfit <= tolerances.ROTATION_EXACT).all()
-        or last_row.any()
-        or not np.isfinite(p).all()
+        not np.abs(misfit, out=misfit).max() <= tolerances.ROTATION_EXACT
+        or (T[3] != _LAST_ROW).any()
+        or not np.isfinite(T[:3, 3]).all()
     ):
         _clean(T, start)
-    return T
 
 
 def _clean(T: FloatArray, start: int) -> None:
     R, p = T[:3, :3].transpose(2, 0, 1), T[:3, 3]
-    with np.errstate(invalid="ignore", over="ignore"):
-        misfit = np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max(axis=(1, 2))
-        last_row = np.abs(T[3] - ((0.0,), (0.0,), (0.0,), (1.0,))).max(axis=0)
-        usable = (misfit <= tolerances.ROTATION_INPUT) & (np.linalg.det(R) > 0.0)
+    misfit = np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max(axis=(1, 2))
+    last_row = np.abs(T[3] - _LAST_ROW).max(axis=0)
+    usable = (misfit <= tolerances.ROTATION_INPUT) & (np.linalg.det(R) > 0.0)
     usable &= (last_row <= tolerances.POSE_LAST_ROW) & np.isfinite(p).all(axis=0)
     for i in np.flatnonzero(~usable):
         T[:, :, i] = se3.validated(T[:, :, i], f"Pose {start + i}")
     U, _, Vt = np.linalg.svd(R)
     T[:3, :3] = (U @ Vt).transpose(1, 2, 0)
-    T[3] = ((0.0,), (0.0,), (0.0,), (1.0,))
+    T[3] = _LAST_ROW
 
 
 def _forward(chain: Chain, q: FloatArray) -> FloatArray:
@@ -169,57 +187,81 @@ def _angle(Ta: FloatArray, Tb: FloatArray) -> FloatArray:
     return np.asarray(np.atan2(np.sqrt(x * x + y * y + z * z), trace - 1.0))
 
 
-def _distance(u: FloatArray, v: FloatArray, near: float, far: float) -> FloatArray:
-    return np.asarray(np.minimum(np.maximum(np.sqrt(u * u + v * v), near), far))
+def _root(x: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(x, 0.0)))
 
 
-_ARRAYS: Final = Functions(np.atan2, np.sqrt, np.sin, np.cos, _distance)
+def _direction(y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    angle, length = np.atan2(y, x), np.sqrt(x * x + y * y)
+    # Sine and cosine cost more than all the rest here.
+    if np.minimum.reduce(length) > _SQUARES_HOLD:
+        return angle, x / length, y / length
+    return angle, np.cos(angle), np.sin(angle)
 
 
-def _solve(chain: Chain, solver: Solver, T: FloatArray) -> FloatArray:
-    """q (4, 5, C) of the poses `T` (4, 4, C)."""
+_ARRAYS: Final = Functions(np.atan2, np.sqrt, _root, _direction)
+
+
+def _solve(
+    chain: Chain,
+    solver: Solver,
+    T: FloatArray,
+    angles: FloatArray,
+    q: FloatArray,
+    inside: BoolArray,
+) -> None:
+    """Fill q (C, 4, 5), inside (C, 4) for the poses `T` (4, 4, C) by way of angles (2, 2, 5, C)."""
     arm = solver.arm
     rows = T
     if not arm.is_canonical:
         # T_C_S T T_tool_K, the last product row by row.
         rows = arm.T_tool_K.T @ (arm.T_C_S @ T.reshape(4, -1)).reshape(T.shape)
-    x, y = rows[:2, 3]
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        rho = np.sqrt(x * x + y * y)
-        r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
-        # Not "<": what overflowed or lies inside the cylinder of radius d goes there too.
-        beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & np.isfinite(rho))
-        alpha = _canonical(arm, rows, rho, r)
-    q = _joints(chain, arm, alpha)
-    for i in np.flatnonzero(beside):
-        q[:, :, i] = solver.solve(T[:, :, i].tolist())
-    return q
+    x, y = rows[0, 3], rows[1, 3]
+    rho = np.sqrt(x * x + y * y)
+    r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
+    # Of what overflowed or lies inside the cylinder of radius d neither is true.
+    beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
+    _canonical(arm, rows, rho, r, angles)
+    _turn(chain, arm, angles)
+    inside[...] = _inside(chain, angles).reshape(4, -1).T
+    q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
+    for i in beside.nonzero()[0]:
+        found = solver.solve(T[:, :, i].tolist())
+        q[i], inside[i] = found, [solver.inside(branch) for branch in found]
 
 
-def _canonical(arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArray) -> FloatArray:
-    """alpha (4, 5, C), not yet in its turn, with tool points well off axis 1."""
-    orient, reach = closed_form(arm, _ARRAYS)
-    x, y, z = rows[:3, 3]
-    alpha = np.empty((4, 5, len(x)))
+def _canonical(
+    arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
+) -> None:
+    """Fill alpha (2, 2, 5, C) of shoulder, elbow, joint, in [-pi, pi], well off axis 1."""
+    posture = closed_form(arm, _ARRAYS)
+    x, y = rows[0, 3], rows[1, 3]
+
+    def stand(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:
+        """Fill one shoulder's `side` (2, 5, C) but for alpha1."""
+        up, down = side
+        phi, up[1], down[1], up[2], side[:, 4] = posture(c, s, u, rows)
+        np.negative(up[2], out=down[2])
+        np.subtract(phi - side[:, 1], side[:, 2], out=side[:, 3])
+        _wrap(side[:, 1::2])
+
+    front, back = alpha
     if arm.d:
         square = 1.0 / (rho * rho)
-        planes = [((x * u + y * arm.d) * square, (y * u - x * arm.d) * square, u) for u in (r, -r)]
-        facings = [(np.atan2(s, c), u, *orient(c, s, rows)[:4]) for c, s, u in planes]
+        for side, u in ((front, r), (back, -r)):
+            c, s = (x * u + y * arm.d) * square, (y * u - x * arm.d) * square
+            side[:, 0] = np.atan2(s, c)
+            stand(side, c, s, u)
+        return
+    c, s, one = x / rho, y / rho, np.atan2(y, x)
+    front[:, 0], back[:, 0] = one, _behind(one)
+    stand(front, c, s, rho)
+    if arm.is_mirrored:
+        np.negative(_behind(front[::-1, 1]), out=back[:, 1])
+        np.negative(front[::-1, 2:4], out=back[:, 2:4])
+        back[:, 4] = _behind(front[0, 4])
     else:
-        phi, five, lu, lv, lu2, lv2 = orient(x / rho, y / rho, rows)
-        one = np.atan2(y, x)
-        # The plane is the same, seen from behind.
-        facings = [
-            (one, rho, phi, five, lu, lv),
-            (_behind(one), -rho, np.pi + 2.0 * arm.tilt - phi, _behind(five), lu2, lv2),
-        ]
-    for shoulder, (one, u, phi, five, lu, lv) in enumerate(facings):
-        up, down, bend = reach(u - arm.a - lu, -z - lv)
-        for elbow, (two, three) in enumerate(((up, bend), (down, -bend))):
-            branch = alpha[2 * shoulder + elbow]
-            branch[0], branch[1], branch[2], branch[4] = one, two, three, five
-            np.subtract(phi, two + three, out=branch[3])
-    return alpha
+        stand(back, -c, -s, -rho)
 
 
 def _behind(theta: FloatArray) -> FloatArray:
@@ -227,37 +269,41 @@ def _behind(theta: FloatArray) -> FloatArray:
     return theta - np.copysign(np.pi, theta)
 
 
-def _joints(chain: Chain, arm: FiveAxisArm, alpha: FloatArray) -> FloatArray:
-    """q (4, 5, C), each angle in the turn inside its limits if there is one, else in [-pi, pi]."""
-    for i, (sign, shift) in enumerate(zip(arm.signs, arm.shifts, strict=True)):
-        angle = alpha[:, i]
+def _wrap(theta: FloatArray) -> None:
+    """Set `theta` into [-pi, pi]."""
+    turns = theta * (0.5 / np.pi)
+    np.rint(turns, out=turns)
+    turns *= 2.0 * np.pi
+    theta -= turns
+
+
+def _turn(chain: Chain, arm: FiveAxisArm, angles: FloatArray) -> None:
+    """From alpha (2, 2, 5, C) to q, each angle in the turn inside its limits if there is one."""
+    slack = tolerances.LIMIT_SLACK
+    limits = zip(chain.lower.tolist(), chain.upper.tolist(), strict=True)
+    for i, (sign, shift, (lower, upper)) in enumerate(
+        zip(arm.signs, arm.shifts, limits, strict=True)
+    ):
+        if sign == 1.0 and not shift and max(-lower, upper) <= np.pi:
+            continue
+        angle = angles[:, :, i]
         if shift:
             angle -= shift
+            _wrap(angle)
         if sign < 0.0:
             np.negative(angle, out=angle)
-        if shift or i in (1, 3):
-            turns = angle * (0.5 / np.pi)
-            np.rint(turns, out=turns)
-            turns *= 2.0 * np.pi
-            angle -= turns
-    slack = tolerances.LIMIT_SLACK
-    for i, (lower, upper) in enumerate(zip(chain.lower - slack, chain.upper + slack, strict=True)):
-        if max(-lower, upper) <= np.pi + slack:
-            continue
-        angle = alpha[:, i]
-        outside = (angle < lower) | (angle > upper)
-        for turn in (-2.0 * np.pi, 2.0 * np.pi):
-            other = angle + turn
-            np.copyto(angle, other, where=outside & (other >= lower) & (other <= upper))
-    return alpha
+        if max(-lower, upper) > np.pi:
+            outside = (angle < lower - slack) | (angle > upper + slack)
+            for turn in (-2.0 * np.pi, 2.0 * np.pi):
+                other = angle + turn
+                fits = (other >= lower - slack) & (other <= upper + slack)
+                np.copyto(angle, other, where=outside & fits)
 
 
-def _inside(chain: Chain, q: FloatArray) -> BoolArray:
-    """(4, C) whether the angles q (4, 5, C) are inside the limits."""
-    slack = tolerances.LIMIT_SLACK
-    lower, upper = chain.lower - slack, chain.upper + slack
-    inside = np.ones((4, q.shape[2]), dtype=np.bool_)
-    for i in range(5):
-        inside &= q[:, i] >= lower[i]
-        inside &= q[:, i] <= upper[i]
-    return inside
+def _inside(chain: Chain, angles: FloatArray) -> BoolArray:
+    """(2, 2, C) whether the joint angles (2, 2, 5, C) are inside the limits."""
+    lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
+    inside = angles >= lower[:, None]
+    inside &= angles <= upper[:, None]
+    one, two, three, four, five = inside.transpose(2, 0, 1, 3)
+    return np.asarray(one & two & three & four & five)

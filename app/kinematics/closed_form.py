@@ -17,6 +17,10 @@ Every angle is an atan2 of sides, and differences of squares are factored: no di
 the arm is stretched, folded, or the tool upright. A wrist out of reach is taken at the nearest
 distance that is in reach, an x axis out of the plane at its nearest pitch and roll, so every pose
 has an answer; on exact poses nothing of that shows.
+
+An arm with a = d = tilt = 0 is its own mirror image: half a turn about axis 1 gives the postures
+with the back to p from those facing it. alpha5 is turned by pi as well, the angles in the plane are
+mirrored, alpha2 to pi - alpha2, alpha3 and alpha4 to their negatives, elbow up to elbow down.
 """
 
 from __future__ import annotations
@@ -34,56 +38,51 @@ Number = Any
 class Functions(NamedTuple):
     """What the formulas need of `math` or of numpy.
 
-    distance(u, v, near, far): that of (u, v) from the origin, or the nearest to it in [near, far].
+    root(x): sqrt(x), and 0 where x < 0. direction(y, x): atan2(y, x), its cosine, its sine.
     """
 
     atan2: Callable[[Number, Number], Number]
     sqrt: Callable[[Number], Number]
-    sin: Callable[[Number], Number]
-    cos: Callable[[Number], Number]
-    distance: Callable[[Number, Number, float, float], Number]
+    root: Callable[[Number], Number]
+    direction: Callable[[Number, Number], tuple[Number, Number, Number]]
 
 
-class ClosedForm(NamedTuple):
-    """The steps for one arm.
+Posture = tuple[Number, Number, Number, Number, Number]
 
-    orient(c, s, rows of T_C_K): (phi, alpha5, l3 cos phi, l3 sin phi), and the last two as they are
-    for the opposite plane, with c, s = cos, sin alpha1. reach(u, v): (alpha2 with the elbow up,
-    down, alpha3 with the elbow up) for the wrist at (u, v) from the shoulder.
+
+def closed_form(arm: FiveAxisArm, functions: Functions) -> Callable[..., Posture]:
+    """All steps for `arm` but the first, its lengths bound once.
+
+    What is returned is posture(c, s, u, rows of T_C_K): (phi, alpha2 with the elbow up, alpha2 with
+    it down, alpha3 with it up, alpha5), where c, s = cos, sin alpha1 and u is how far outward p is
+    in the plane. alpha2 is in [-2 pi, 2 pi], alpha3 in [0, pi], alpha5 in [-pi, pi].
     """
-
-    orient: Callable[..., tuple[Number, Number, Number, Number, Number, Number]]
-    reach: Callable[[Number, Number], tuple[Number, Number, Number]]
-
-
-def closed_form(arm: FiveAxisArm, functions: Functions) -> ClosedForm:
-    """The steps for `arm`, its lengths bound once."""
-    atan2, sqrt, sin, cos, distance = functions
+    atan2, sqrt, root, direction = functions
+    a, tilt, mirrored = arm.a, arm.tilt, arm.is_mirrored
     far, near = arm.l1 + arm.l2, abs(arm.l1 - arm.l2)
     squares = (arm.l1 - arm.l2) * far
-    tilt = arm.tilt
     ahead, below = arm.l3 * math.cos(tilt), arm.l3 * math.sin(tilt)
 
-    def orient(
-        c: Number, s: Number, rows: Sequence[Sequence[Number]]
-    ) -> tuple[Number, Number, Number, Number, Number, Number]:
-        (r11, r12, r13, _), (r21, r22, r23, _), (r31, r32, r33, _), _ = rows
-        pitch = atan2(-r31, c * r11 + s * r21)
-        cp, sp = cos(pitch), sin(pitch)
-        roll = atan2(
-            sp * (c * r12 + s * r22) + cp * r32 - c * r23 + s * r13,
-            sp * (c * r13 + s * r23) + cp * r33 + c * r22 - s * r12,
-        )
-        ac, bs, as_, bc = ahead * cp, below * sp, ahead * sp, below * cp
-        return pitch + tilt, roll, ac - bs, as_ + bc, -ac - bs, as_ - bc
-
-    def reach(u: Number, v: Number) -> tuple[Number, Number, Number]:
-        rho = distance(u, v, near, far)
-        stretched = sqrt((far - rho) * (far + rho))
-        folded = sqrt((rho - near) * (rho + near))
+    def posture(c: Number, s: Number, u: Number, rows: Sequence[Sequence[Number]]) -> Posture:
+        (r11, r12, r13, _), (r21, r22, r23, _), (r31, r32, r33, z), _ = rows
+        pitch, cp, sp = direction(-r31, c * r11 + s * r21)
+        # The tool's y and z axes along the normal, in the plane, of its x axis.
+        roll = atan2(sp * (c * r12 + s * r22) + cp * r32, sp * (c * r13 + s * r23) + cp * r33)
+        # The wrist from the shoulder.
+        if mirrored:
+            u, v, phi = u - ahead * cp, -z - ahead * sp, pitch
+        else:
+            u, v = u - a - ahead * cp + below * sp, -z - ahead * sp - below * cp
+            phi = pitch + tilt
+        square = u * u + v * v
+        rho = sqrt(square)
+        # By the law of cosines 2 l1 l2 (1 -+ cos alpha3); out of reach one of them is negative.
+        stretched, folded = (far - rho) * (far + rho), (rho - near) * (rho + near)
+        sine = root(stretched * folded)
         towards = atan2(v, u)
-        # The angle between upper arm and shoulder-wrist line, by the law of cosines.
-        beside = atan2(stretched * folded, rho * rho + squares)
-        return towards - beside, towards + beside, 2.0 * atan2(stretched, folded)
+        # The angle between the upper arm and the line from shoulder to wrist.
+        beside = atan2(sine, square + squares)
+        bend = atan2(2.0 * sine, folded - stretched)
+        return phi, towards - beside, towards + beside, bend, roll
 
-    return ClosedForm(orient, reach)
+    return posture

@@ -12,6 +12,8 @@ from app.geometry import screws, se3
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
 
+_IDENTITY = np.eye(4)
+
 
 def _exponentials(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     """exp(hat(S_i) q_i) of every joint, (n, 4, 4)."""
@@ -19,7 +21,7 @@ def _exponentials(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     # 1 - cos q written so that it keeps its digits near 0.
     versine = 2.0 * np.sin(0.5 * q) ** 2
     E: FloatArray = np.sin(q) * chain.generators + versine * chain.generators_squared
-    E[:, range(4), range(4)] += 1.0
+    E += _IDENTITY
     return E
 
 

@@ -7,6 +7,8 @@ subproblem and number of solutions, stand in app/kinematics/closed_form.py.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +21,7 @@ from app.kinematics.arm import Five
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
-from app.kinematics.solver import Solver
+from app.kinematics.solver import FourBranches, Solver
 from app.kinematics.turns import nearest_turn
 
 
@@ -86,9 +88,47 @@ class Solution:
         return f"Solution(angles={self.angles}, branch={self.branch})"
 
 
+class FourSolutions(Sequence[Solution]):
+    """The answers of `inverse` in the order of BRANCHES; each is made when first asked for."""
+
+    __slots__ = ("_angles", "_chain", "_made", "_rows")
+
+    def __init__(self, chain: Chain, rows: Rows, angles: FourBranches) -> None:
+        self._chain = chain
+        self._rows = rows
+        self._angles = angles
+        self._made: tuple[Solution, ...] | None = None
+
+    def _all(self) -> tuple[Solution, ...]:
+        if self._made is None:
+            self._made = tuple(
+                Solution(self._chain, self._rows, angles, branch)
+                for angles, branch in zip(self._angles, BRANCHES, strict=True)
+            )
+        return self._made
+
+    def __len__(self) -> int:
+        return len(BRANCHES)
+
+    @overload
+    def __getitem__(self, index: int) -> Solution: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Solution, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Solution | tuple[Solution, ...]:
+        return self._all()[index]
+
+    def __iter__(self) -> Iterator[Solution]:
+        return iter(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+
 def inverse(
     chain: Chain, T: npt.ArrayLike, *, q_hint: npt.ArrayLike | None = None
-) -> tuple[Solution, ...]:
+) -> FourSolutions:
     """The four solutions for the pose `T` (4, 4) = T_S_tool [m], in the order of BRANCHES.
 
     Two coincide where their branches meet (arm stretched or folded, tool point on axis 1). `T`
@@ -106,15 +146,13 @@ def inverse(
     solver = Solver.of(chain)
     rows = se3.validated_rows(T)
     if q_hint is None:
-        one, two, three, four = solver.solve(rows)
-    else:
-        hint = chain.check_q(q_hint)
-        found = solver.solve(rows, float(hint[0]))
-        one, two, three, four = (nearest_turn(chain, np.array(q), hint).tolist() for q in found)
-    front_up, front_down, back_up, back_down = BRANCHES
-    return (
-        Solution(chain, rows, one, front_up),
-        Solution(chain, rows, two, front_down),
-        Solution(chain, rows, three, back_up),
-        Solution(chain, rows, four, back_down),
-    )
+        return FourSolutions(chain, rows, solver.solve(rows))
+    hint = chain.check_q(q_hint)
+    one, two, three, four = solver.solve(rows, float(hint[0]))
+    found = _near(chain, one, hint), _near(chain, two, hint)
+    return FourSolutions(chain, rows, (*found, _near(chain, three, hint), _near(chain, four, hint)))
+
+
+def _near(chain: Chain, q: Five, hint: FloatArray) -> Five:
+    one, two, three, four, five = nearest_turn(chain, np.array(q), hint).tolist()
+    return one, two, three, four, five

@@ -20,8 +20,7 @@ def nearest_at_pitch(planar: PlanarArm, u: float, v: float, phi: float) -> Postu
     so the nearest point is reached exactly, or lies on an edge straight towards (u, v), or in a
     corner; with the tool point behind axis 1, on the axis instead.
     """
-    behind = u * planar.side < 0.0
-    reached = planar.at(0.0 if behind else u, v, phi)
+    reached = planar.at(planar.axis if planar.behind(u) > 0.0 else u, v, phi)
     if reached is not None:
         return reached
     wrist = u - planar.l3 * math.cos(phi), v - planar.l3 * math.sin(phi)
@@ -32,7 +31,7 @@ def nearest_at_pitch(planar: PlanarArm, u: float, v: float, phi: float) -> Postu
             continue
         pu, pv = planar.tool(posture)
         gap = math.hypot(pu - u, pv - v)
-        if gap < least and pu * planar.side >= -tolerances.PLANAR_LIMIT_SLACK:
+        if gap < least and planar.behind(pu) <= tolerances.PLANAR_LIMIT_SLACK:
             best, least = posture, gap
     return best
 
@@ -40,7 +39,7 @@ def nearest_at_pitch(planar: PlanarArm, u: float, v: float, phi: float) -> Postu
 def _straight(planar: PlanarArm, phi: float, wrist: tuple[float, float]) -> Iterator[_Angles]:
     """With a joint at an end the wrist keeps to a circle: the points of it that may be nearest."""
     l1, l2 = planar.l1, planar.l2
-    on_axis = -planar.l3 * math.cos(phi)
+    on_axis = planar.axis - planar.l3 * math.cos(phi)
     for theta3 in planar.theta3.ends:
         x, y = l1 + l2 * math.cos(theta3), l2 * math.sin(theta3)
         for direction in _directions((0.0, 0.0), math.hypot(x, y), wrist, on_axis):
@@ -82,4 +81,6 @@ def _corners(planar: PlanarArm, phi: float) -> Iterator[_Angles]:
 
 def _fitted(planar: PlanarArm, theta2: float, theta3: float, theta4: float) -> Posture | None:
     a, b, c = planar.theta2.fit(theta2), planar.theta3.fit(theta3), planar.theta4.fit(theta4)
-    return None if a is None or b is None or c is None else Posture(a, b, c)
+    if a is None or b is None or c is None:
+        return None
+    return Posture(a, b, c, stretched=abs(math.sin(b)) <= tolerances.LIMIT_SLACK)

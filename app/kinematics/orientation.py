@@ -32,6 +32,13 @@ class PlaneOrientation(NamedTuple):
         w, x, y, z = so3.to_quaternion(R).tolist()
         return PlaneOrientation(w, x, y, z)
 
+    @staticmethod
+    def turned(phi: float, psi: float) -> PlaneOrientation:
+        """Ry(phi) Rx(psi), which the arm can take."""
+        cf, sf = math.cos(0.5 * phi), math.sin(0.5 * phi)
+        cp, sp = math.cos(0.5 * psi), math.sin(0.5 * psi)
+        return PlaneOrientation(cf * cp, cf * sp, sf * cp, -sf * sp)
+
     def seen_from(self, theta1: float) -> PlaneOrientation:
         """The same orientation with the arm's plane at `theta1`: Rz(theta1)^T A."""
         w, x, y, z = self
@@ -62,9 +69,7 @@ class PlaneOrientation(NamedTuple):
 
     def angle(self, phi: float, psi: float) -> float:
         """Angle [rad] between the asked orientation and Ry(phi) Rx(psi)."""
-        cf, sf = math.cos(0.5 * phi), math.sin(0.5 * phi)
-        cp, sp = math.cos(0.5 * psi), math.sin(0.5 * psi)
-        a, b, c, d = cf * cp, cf * sp, sf * cp, -sf * sp
+        a, b, c, d = PlaneOrientation.turned(phi, psi)
         w, x, y, z = self
         cosine = a * w + b * x + c * y + d * z
         sine = math.hypot(

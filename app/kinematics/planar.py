@@ -25,15 +25,13 @@ class Interval(NamedTuple):
     def fit(self, theta: float) -> float | None:
         """`theta` in the turn inside the interval, set onto an end it misses by rounding."""
         lower, upper = self
-        if lower == -math.inf:
-            return wrapped(theta)
         if lower <= theta <= upper:
-            return theta
-        theta = wrapped(theta)
+            return theta if lower > -math.inf else wrapped(theta)
+        middle = 0.5 * (lower + upper)
+        theta = middle + math.remainder(theta - middle, math.tau)
         slack = tolerances.PLANAR_LIMIT_SLACK
-        for turned in (theta, theta - math.tau, theta + math.tau):
-            if lower - slack <= turned <= upper + slack:
-                return min(max(turned, lower), upper)
+        if lower - slack <= theta <= upper + slack:
+            return min(max(theta, lower), upper)
         return None
 
     @property
@@ -188,6 +186,8 @@ class PlanarArm:
 
     def _stationary(self, u: float, v: float, *, on_axis: bool) -> Iterator[Posture]:
         for theta3, theta4, stretched in self._shapes_beyond_shoulder():
+            if self.theta3.fit(theta3) is None or self.theta4.fit(theta4) is None:
+                continue
             forearm = _joined(self.l2, self.l3, theta4)
             arm = _joined(self.l1, forearm.length, theta3 + forearm.bearing)
             for direction in self._directions((0.0, 0.0), arm.length, u, v, on_axis):
@@ -195,6 +195,8 @@ class PlanarArm:
         for theta2 in self.theta2.ends:
             elbow = self.l1 * math.cos(theta2), self.l1 * math.sin(theta2)
             for theta4, stretched in self._shapes_beyond_elbow():
+                if self.theta4.fit(theta4) is None:
+                    continue
                 shape = _joined(self.l2, self.l3, theta4)
                 for direction in self._directions(elbow, shape.length, u, v, on_axis):
                     theta3 = direction - shape.bearing - theta2

@@ -19,12 +19,16 @@ from app.kinematics.turns import in_turn
 FourBranches = tuple[Five, Five, Five, Five]
 
 
-def _distance(u: float, v: float, near: float, far: float) -> float:
-    rho = math.sqrt(u * u + v * v)
-    return near if rho < near else far if rho > far else rho
+def _root(x: float) -> float:
+    return math.sqrt(x) if x > 0.0 else 0.0
 
 
-_FLOATS: Final = Functions(math.atan2, math.sqrt, math.sin, math.cos, _distance)
+def _direction(y: float, x: float) -> tuple[float, float, float]:
+    angle = math.atan2(y, x)
+    return angle, math.cos(angle), math.sin(angle)
+
+
+_FLOATS: Final = Functions(math.atan2, math.sqrt, _root, _direction)
 
 
 class Solver(NamedTuple):
@@ -41,15 +45,11 @@ class Solver(NamedTuple):
     inside: Callable[[Five], bool]
 
     @staticmethod
+    @lru_cache(maxsize=64)
     def of(chain: Chain) -> Solver:
         """That of `chain`, made once a chain; RobotDescriptionError as `arm_of`."""
-        return _solver(chain)
-
-
-@lru_cache(maxsize=64)
-def _solver(chain: Chain) -> Solver:
-    arm = arm_of(chain)
-    return Solver(arm, _solve(chain, arm), _inside(chain))
+        arm = arm_of(chain)
+        return Solver(arm, _solve(chain, arm), _inside(chain))
 
 
 Facing = tuple[float, float, float, float, float, float, float, float]
@@ -62,23 +62,23 @@ def facing_near_axis_1(
 
     Sound everywhere, but meant for a tool point near axis 1 (or near the cylinder of radius d about
     it, which no tool point enters), where its place tells little of alpha1: the direction of the
-    tool's x axis (r11, r21) tells more, where it agrees. Neither does with the tool upright on axis
-    1: alpha1 is then `free`.
+    tool's x axis (r11, r21) tells more, where it agrees or is the longer of the two. Neither tells
+    anything with the tool upright on axis 1: alpha1 is then `free`.
     """
     d, rounding = arm.d, 2.0 * tolerances.ROUNDING * arm.reach
     rho, flat = math.hypot(x, y), math.hypot(r11, r21)
-    on_axis = rho <= tolerances.ON_AXIS
-    if flat > tolerances.ON_AXIS:
+    if flat > tolerances.UPRIGHT:
         c, s = r11 / flat, r21 / flat
         if abs(c * y - s * x + d) < abs(c * y - s * x - d):
             c, s = -c, -s
-        if on_axis or abs(c * y - s * x - d) <= rounding:
+        trusted = rho <= min(tolerances.ON_AXIS, flat * arm.reach)
+        if trusted or abs(c * y - s * x - d) <= rounding:
             u = c * x + s * y
             front, back = (c, s, u), _opposite(d, x, y, rho, c, s, u)
             if u < -rounding:
                 front, back = back, front
             return _with_angle(*front) + _with_angle(*back)
-    elif on_axis:
+    elif rho <= 0.5 * rounding:
         c, s = math.cos(free), math.sin(free)
         return free, c, s, 0.0, free + math.pi, -c, -s, 0.0
     sine = min(max(d / rho, -1.0), 1.0)
@@ -105,45 +105,49 @@ def _with_angle(c: float, s: float, u: float) -> tuple[float, float, float, floa
 
 
 def _solve(chain: Chain, arm: FiveAxisArm) -> Callable[..., FourBranches]:
-    orient, reach = closed_form(arm, _FLOATS)
-    a = arm.a
+    posture = closed_form(arm, _FLOATS)
     in_line = arm.d == 0.0
     near = tolerances.NEAR_AXIS_1 * arm.reach
-    atan2, hypot, remainder, pi, tau = math.atan2, math.hypot, math.remainder, math.pi, math.tau
-    across = pi + 2.0 * arm.tilt
+    atan2, hypot, remainder = math.atan2, math.hypot, math.remainder
+    pi, start, tau = math.pi, -math.pi, math.tau
     turned = _turned(chain, arm)
-    is_canonical, pose = arm.is_canonical, arm.pose
+    is_canonical, is_mirrored, pose = arm.is_canonical, arm.is_mirrored, arm.pose
 
     def solve(rows: Rows, theta1: float = 0.0) -> FourBranches:
         if not is_canonical:
             rows = pose(np.array(rows)).tolist()
             theta1 *= arm.signs[0]
-        (r11, _, _, x), (r21, _, _, y), (_, _, _, z), _ = rows
+        x, y = rows[0][3], rows[1][3]
         u = hypot(x, y)
         if in_line and u > near:
             one, c, s = atan2(y, x), x / u, y / u
             other = one - pi if one > 0.0 else one + pi
         else:
+            r11, r21 = rows[0][0], rows[1][0]
             one, c, s, u, other, c2, s2, u2 = facing_near_axis_1(arm, x, y, r11, r21, theta1)
-        phi, five, lu, lv, lu2, lv2 = orient(c, s, rows)
-        if in_line:
-            # The plane is the same, seen from behind.
-            u2, phi2 = -u, across - phi
+        phi, up, down, bend, five = posture(c, s, u, rows)
+        if up < start:
+            up += tau
+        if down > pi:
+            down -= tau
+        a4, b4 = phi - up - bend, phi - down + bend
+        if not start <= a4 <= pi:
+            a4 = remainder(a4, tau)
+        if not start <= b4 <= pi:
+            b4 = remainder(b4, tau)
+        if is_mirrored:
+            up2 = pi - down if down > 0.0 else start - down
+            down2 = pi - up if up > 0.0 else start - up
+            bend2, c4, d4 = bend, -b4, -a4
             five2 = five - pi if five > 0.0 else five + pi
         else:
-            phi2, five2, lu2, lv2, _, _ = orient(c2, s2, rows)
-        up, down, bend = reach(u - a - lu, -z - lv)
-        up2, down2, bend2 = reach(u2 - a - lu2, -z - lv2)
-        up = up if -pi <= up <= pi else remainder(up, tau)
-        down = down if -pi <= down <= pi else remainder(down, tau)
-        up2 = up2 if -pi <= up2 <= pi else remainder(up2, tau)
-        down2 = down2 if -pi <= down2 <= pi else remainder(down2, tau)
-        a4, b4 = phi - up - bend, phi - down + bend
-        c4, d4 = phi2 - up2 - bend2, phi2 - down2 + bend2
-        front_up = (one, up, bend, a4 if -pi <= a4 <= pi else remainder(a4, tau), five)
-        front_down = (one, down, -bend, b4 if -pi <= b4 <= pi else remainder(b4, tau), five)
-        back_up = (other, up2, bend2, c4 if -pi <= c4 <= pi else remainder(c4, tau), five2)
-        back_down = (other, down2, -bend2, d4 if -pi <= d4 <= pi else remainder(d4, tau), five2)
+            if in_line:
+                c2, s2, u2 = -c, -s, -u
+            phi2, up2, down2, bend2, five2 = posture(c2, s2, u2, rows)
+            up2, down2 = remainder(up2, tau), remainder(down2, tau)
+            c4, d4 = remainder(phi2 - up2 - bend2, tau), remainder(phi2 - down2 + bend2, tau)
+        front_up, front_down = (one, up, bend, a4, five), (one, down, -bend, b4, five)
+        back_up, back_down = (other, up2, bend2, c4, five2), (other, down2, -bend2, d4, five2)
         if turned is None:
             return front_up, front_down, back_up, back_down
         return turned(front_up), turned(front_down), turned(back_up), turned(back_down)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from app import tolerances
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.arm import FiveAxisArm, arm_of
+from app.kinematics.asked import Asked
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitch_and_roll
+from app.kinematics.reading import Reading
 from app.kinematics.turns import wrapped
 
 
@@ -19,8 +21,9 @@ from app.kinematics.turns import wrapped
 class ToolTarget:
     """The five freedoms of the arm's tool: ``position`` (3,) [m] in {S}, pitch and roll [rad].
 
-    Pitch is theta2 + theta3 + theta4, the angle below the horizontal; roll is theta5. Which way the
-    tool points sideways is the arm's to give: it lies in the vertical plane through axis 1.
+    Pitch is the angle of the roll axis below the horizontal and roll the turn about it: of the
+    Katana theta2 + theta3 + theta4 and theta5. Which way the tool points sideways is the arm's to
+    give: the roll axis lies in the plane that turns with axis 1.
     """
 
     position: FloatArray
@@ -32,26 +35,33 @@ class ToolTarget:
         """Where the tool is with the joints at `q` (5,) [rad]."""
         return ToolTarget(frozen(forward(chain, q)[:3, 3]), *pitch_and_roll(chain, q))
 
-    def facing(self, branch: Branch, theta1: float) -> float:
-        """The theta1 [rad] in (-pi, pi] of a straight arm whose plane has the position on `branch`.
+    def asked(self, arm: FiveAxisArm, reading: Reading) -> Asked:
+        """The same of the canonical arm."""
+        x, y, z = (arm.T_C_S[:3, :3] @ self.position + arm.T_C_S[:3, 3]).tolist()
+        return Asked.five(arm, (x, y, z), self.pitch, self.roll, reading)
 
-        Over axis 1 every plane has it: then the one the arm stands in, `theta1`.
+    def facing(self, chain: Chain, branch: Branch, theta1: float) -> float:
+        """The theta1 [rad] in (-pi, pi] at which the arm's plane has the position on `branch`.
+
+        Over axis 1, where any has, that where the arm stands, `theta1`.
         """
-        x, y = float(self.position[0]), float(self.position[1])
-        if math.hypot(x, y) <= tolerances.ON_AXIS:
-            return theta1
-        azimuth = math.atan2(y, x)
-        if branch.shoulder == "front":
-            return azimuth
-        return azimuth - math.copysign(math.pi, azimuth)
+        arm = arm_of(chain)
+        alpha1 = self.asked(arm, Reading.POSE).facing(arm, branch.shoulder)
+        return theta1 if alpha1 is None else wrapped(arm.signs[0] * alpha1)
 
     def pose(self, chain: Chain, theta1: float) -> FloatArray:
-        """T_S_tool (4, 4) of a straight arm that stands in the plane at `theta1` [rad]."""
-        R = so3.rotation_z(theta1) @ so3.rotation_y(self.pitch) @ so3.rotation_x(self.roll)
-        return se3.from_rotation_translation(R @ chain.M[:3, :3], self.position)
+        """T_S_tool (4, 4) with the arm's plane at `theta1` [rad]."""
+        arm = arm_of(chain)
+        alpha1 = arm.signs[0] * theta1
+        R_C_K = so3.rotation_z(alpha1) @ so3.rotation_y(self.pitch) @ so3.rotation_x(self.roll)
+        R = arm.T_C_S[:3, :3].T @ R_C_K @ arm.T_K_tool[:3, :3]
+        return se3.from_rotation_translation(R, self.position)
 
     def turned_round(self) -> ToolTarget:
-        """The same pose in space as the other shoulder counts it, with axis 1 half a turn on."""
+        """The same pose in space as the other shoulder counts it, with axis 1 half a turn on.
+
+        Of an arm whose plane passes beside axis 1, the same but for its yaw.
+        """
         return ToolTarget(
             self.position, wrapped(math.pi - self.pitch), wrapped(self.roll + math.pi)
         )

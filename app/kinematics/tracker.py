@@ -9,7 +9,6 @@ along what is in the way, and stops where only a leap would bring the tool neare
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,12 +20,16 @@ import numpy.typing as npt
 
 from app import tolerances
 from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
+from app.kinematics.arm import Five, FiveAxisArm
+from app.kinematics.asked import Asked
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
-from app.kinematics.freedoms import pitch_and_roll, tool_pose
-from app.kinematics.projection import Projection, project
-from app.kinematics.reading import Reading, nearest
+from app.kinematics.in_plane import InPlane
+from app.kinematics.limited import LimitedArm
+from app.kinematics.planar import Interval, Posture
+from app.kinematics.projection import Projection, measured
+from app.kinematics.reading import Reading
+from app.kinematics.stance import Stance, nearest_stance
 from app.kinematics.tool import ToolTarget
 from app.kinematics.turns import wrapped
 
@@ -37,11 +40,18 @@ person sees motion and no leap."""
 STRIDE: Final = 0.02
 """[m] A faster drag is followed along its way in strides: about a hop of the joints."""
 
-LONGEST_WAY: Final = 16
+LONGEST_WAY: Final = 32
 """Strides along one drag; a longer one takes longer strides."""
 
-MOST_HOPS: Final = 24
-"""Hops to one target. What is farther is reached with the next move of the hand."""
+EFFORT: Final = 18
+"""Nearest poses sought in one call. What is farther is reached in the next: the joints need several
+ticks for a hop, so the goal stays ahead of them."""
+
+OUT_OF_REACH_EFFORT: Final = 3
+"""Looking for the nearest to what cannot be reached takes that many times as long."""
+
+EFFORT_A_STRIDE: Final = 2 * OUT_OF_REACH_EFFORT
+"""For the hops of one stride: two are enough unless something is in the way."""
 
 WORTH_A_HOP: Final = 1e-6
 """[m], [rad] Coming nearer by less is rounding."""
@@ -49,10 +59,6 @@ WORTH_A_HOP: Final = 1e-6
 WORTH_A_LEAP: Final = 5e-5
 """[m], [rad] A leap that brings the tool nearer by less than half of the arm's precision is not
 missed."""
-
-ELBOW: Final = 2
-"""The axis that needs no bound: with the others in bounds it follows from where the tool point is,
-and its range has to hold the stretched arm."""
 
 
 class Tracking(Enum):
@@ -67,12 +73,14 @@ class Tracking(Enum):
 class Tracked:
     """Where the goal goes, and what it would take a leap to get.
 
-    best: the pose to go to. ahead: the better pose beyond a gap, or None when `best` is as near as
-    the arm comes on its branch.
+    best: the pose to go to. since: how far along its way the target has been followed, when `best`
+    is not yet as near as hops lead; the next call goes on from there. ahead: the better pose beyond
+    a gap, or None when `best` is as near as the arm comes on its branch, or under way.
     """
 
     best: Projection
-    ahead: Projection | None
+    ahead: Projection | None = None
+    since: ToolTarget | None = None
 
     @property
     def status(self) -> Tracking:
@@ -104,19 +112,34 @@ def track(
     since: where the target was when the goal became `q`; a drag from there that is longer than a
     stride is followed along its straight way. The goal never changes branch, and a stride of the
     target moves the goal by more than a hop an axis only along a way on which each hop brings it
-    nearer. An arm with offsets goes to the nearest pose at once: hops are for straight arms.
+    nearer. One call takes bounded time: see `Tracked.since`.
     """
-    q = chain.clamp(q)
-    ahead = leap(chain, q, target, branch, reading)
-    if _within_hop(q, ahead) or not arm_of(chain).is_straight:
-        return Tracked(ahead, None)
+    limited = LimitedArm.of(chain)
+    alpha = limited.arm.angles(chain.clamp(q))
+    asked = target.asked(limited.arm, reading)
+    ahead = nearest_stance(limited, asked, branch, alpha)
+    if _within_hop(alpha, ahead.alpha):
+        return Tracked(
+            _projection(chain, target, asked, _not_away(limited.arm, alpha, asked, ahead))
+        )
+    # One hop at least, so that there is an end.
+    effort = max(EFFORT - _effort(ahead), 1)
     for stop in () if since is None else _way(since, target):
-        best = leap(chain, q, stop, branch, reading)
-        q = _pursue(chain, q, stop, best, reading, hops=2).q
-    found = _pursue(chain, q, target, ahead, reading, hops=MOST_HOPS)
-    return Tracked(
-        found, ahead if _nearer(chain, ahead, found, target, reading, WORTH_A_LEAP) else None
-    )
+        wish = stop.asked(limited.arm, reading)
+        pursuit = _Pursuit(limited, wish, nearest_stance(limited, wish, branch, alpha))
+        found = pursuit.follow(alpha, EFFORT_A_STRIDE)
+        alpha, effort = found.alpha, effort - _effort(pursuit.best) - pursuit.effort
+        if effort <= 0:
+            return Tracked(_projection(chain, target, asked, found), since=stop)
+    pursuit = _Pursuit(limited, asked, ahead)
+    found = pursuit.follow(alpha, effort)
+    best = _projection(chain, target, asked, found)
+    if not pursuit.ended:
+        return Tracked(best, since=target)
+    miss, miss_ahead = (_misses(limited.arm, asked, s.alpha) for s in (found, ahead))
+    if not _nearer(miss_ahead, miss, WORTH_A_LEAP):
+        return Tracked(best)
+    return Tracked(best, ahead=_projection(chain, target, asked, ahead))
 
 
 def leap(
@@ -126,12 +149,15 @@ def leap(
 
     Pitch and roll are taken in the plane the arm comes to stand in. Errors as of `project`.
     """
-    if not arm_of(chain).is_straight:
-        place, pitch, roll = target.position, target.pitch, target.roll
-        T = tool_pose(chain, place, pitch, roll, branch.shoulder, q)
-        return project(chain, T, branch=branch, q_hint=q)
-    theta1 = _in_limits(chain, target.facing(branch, float(q[0])), float(q[0]))
-    return nearest(chain, target.pose(chain, theta1), reading, branch=branch, q_hint=q)
+    limited = LimitedArm.of(chain)
+    asked = target.asked(limited.arm, reading)
+    stance = nearest_stance(limited, asked, branch, limited.arm.angles(chain.check_q(q)))
+    return _projection(chain, target, asked, stance)
+
+
+def _projection(chain: Chain, target: ToolTarget, asked: Asked, stance: Stance) -> Projection:
+    sign = LimitedArm.of(chain).arm.signs[0]
+    return measured(chain, target.pose(chain, sign * stance.alpha[0]), asked, stance)
 
 
 def _way(since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
@@ -145,82 +171,116 @@ def _way(since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
     return (since.towards(target, i / count) for i in range(1, count))
 
 
-def _pursue(
-    chain: Chain, q: FloatArray, target: ToolTarget, best: Projection, reading: Reading, hops: int
-) -> Projection:
-    """The nearest pose, `best`, if it is a hop away, else where at most `hops` hops lead."""
-    found: Projection | None = None
-    for _ in range(hops):
-        if _within_hop(q, best):
-            return best
-        hop = _hop(chain, q, target, best.branch, reading)
-        if found is not None and not _nearer(chain, hop, found, target, reading, WORTH_A_HOP):
-            return found
-        way = np.abs(hop.q - q)
-        way[ELBOW] = 0.0
-        found, q = hop, hop.q
-        if way.max() < HOP * (1.0 - WORTH_A_HOP):
-            # Not the bounds of the hop hold it there: another one would lead nowhere.
-            return found
-    return best if found is None else found
+class _Pursuit:
+    """The way in hops to `asked`, of which `best` is the nearest pose.
+
+    effort: what looking for them took. ended: whether no further one would lead nearer.
+    """
+
+    def __init__(self, limited: LimitedArm, asked: Asked, best: Stance) -> None:
+        self.limited = limited
+        self.asked = asked
+        self.best = best
+        self.effort = 0
+        self.ended = False
+
+    def follow(self, alpha: Five, most: int) -> Stance:
+        """`best` if it is a hop away, else where hops from `alpha` of so much effort lead."""
+        arm = self.limited.arm
+        found, miss = None, _misses(arm, self.asked, alpha)
+        while not self.ended and self.effort < most:
+            if _within_hop(alpha, self.best.alpha):
+                found, self.ended = _not_away(arm, alpha, self.asked, self.best), True
+                break
+            hop = _hop(self.limited, alpha, self.asked, self.best.branch)
+            self.effort += _effort(hop)
+            hop_miss = _misses(arm, self.asked, hop.alpha)
+            worthwhile = _nearer(hop_miss, miss, WORTH_A_HOP)
+            # Where not the bounds of the hop hold it, another one would lead nowhere.
+            self.ended = not worthwhile or _within(HOP * (1.0 - WORTH_A_HOP), alpha, hop.alpha)
+            if worthwhile or (found is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
+                found, alpha, miss = hop, hop.alpha, hop_miss
+        return _standing(alpha, self.best.branch) if found is None else found
 
 
-def _hop(
-    chain: Chain, q: FloatArray, target: ToolTarget, branch: Branch, reading: Reading
-) -> Projection:
-    """The nearest pose with every axis within a hop of `q`."""
-    turn = wrapped(target.facing(branch, float(q[0])) - float(q[0]))
-    if abs(turn) > 0.5 * math.pi:
-        # The target is behind the tool point's side of axis 1, and no small turn brings it nearer.
-        turn = 0.0
-    theta1 = float(np.clip(q[0] + np.clip(turn, -HOP, HOP), chain.lower[0], chain.upper[0]))
-    lower, upper = np.maximum(chain.lower, q - HOP), np.minimum(chain.upper, q + HOP)
-    lower[ELBOW], upper[ELBOW] = chain.lower[ELBOW], chain.upper[ELBOW]
-    lower[0], upper[0] = theta1, math.nextafter(theta1, math.inf)
-    near = dataclasses.replace(chain, lower=lower, upper=upper)
-    if reading is Reading.PITCH:
+def _effort(stance: Stance) -> int:
+    reached = stance.position_error <= tolerances.SAME_POSITION
+    return stance.searches * (1 if reached else OUT_OF_REACH_EFFORT)
+
+
+def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: Stance) -> Stance:
+    """`best`, but not where it only ends near the nearest place, farther from it than `alpha`."""
+    if arm.off_axis == 0.0:
+        return best
+    miss, miss_best = (_misses(arm, asked, angles) for angles in (alpha, best.alpha))
+    away = _nearer(miss, miss_best, tolerances.SAME_POSITION)
+    return _standing(alpha, best.branch) if away else best
+
+
+def _standing(alpha: Five, branch: Branch) -> Stance:
+    """Where no hop leads nearer: any axis at its limit may be what holds it."""
+    in_plane = InPlane(Posture(*alpha[1:4]), alpha[4], 0.0, True, True)
+    return Stance(alpha, branch, 0.0, 0.0, True, in_plane)
+
+
+def _hop(limited: LimitedArm, alpha: Five, asked: Asked, branch: Branch) -> Stance:
+    """The nearest pose with every axis within a hop of `alpha`."""
+    arm = limited.arm
+    theta1 = _theta1(limited, alpha[0], asked, branch)
+    if asked.reading is Reading.PITCH:
         # The pitch comes first, and no posture within a hop has one that is farther away.
-        pitch, _ = pitch_and_roll(chain, q)
-        turn = min(max(wrapped(target.pitch - pitch), -HOP), HOP)
-        target = dataclasses.replace(target, pitch=pitch + turn)
-    found = nearest(near, target.pose(chain, theta1), reading, branch=branch, q_hint=q)
-    # The bounds of the hop are no limits of the arm.
-    gap = np.minimum(np.abs(found.q - chain.lower), np.abs(found.q - chain.upper))
-    at_limit = tuple(i for i in found.limits if gap[i] <= tolerances.LIMIT_SLACK)
-    return dataclasses.replace(found, limits=at_limit)
+        pitch = arm.pitch(alpha)
+        turn = wrapped(asked.pitch(alpha[0]) - pitch)
+        asked = asked.pitched(arm, pitch + min(max(turn, -HOP), HOP))
+    return nearest_stance(limited.near(alpha, HOP, theta1), asked, branch, alpha)
 
 
-def _in_limits(chain: Chain, theta1: float, now: float) -> float:
-    """`theta1` in the turn inside the limits of axis 1, else the limit nearest to `now` [rad]."""
-    lower, upper = float(chain.lower[0]), float(chain.upper[0])
-    for turned in (theta1, theta1 - math.tau, theta1 + math.tau):
-        if lower <= turned <= upper:
-            return turned
-    return min((lower, upper), key=lambda end: abs(end - now))
+def _theta1(limited: LimitedArm, theta1: float, asked: Asked, branch: Branch) -> Interval:
+    """Where axis 1 may go from `theta1` in a hop, which is the way that leads nearer."""
+    facing = asked.facing(limited.arm, branch.shoulder)
+    if facing is None:
+        return Interval(theta1, theta1)
+    turn = wrapped(facing - theta1)
+    aside = asked.aside(limited.arm)
+    if aside != 0.0:
+        # A plane beside axis 1 comes nearer on one way round, though it may be the longer one.
+        square = math.copysign(0.5 * math.pi, aside) - (math.atan2(asked.y, asked.x) - facing)
+        turn = square + wrapped(turn - square)
+    elif abs(turn) > 0.5 * math.pi:
+        # The target is behind the tool point's side of axis 1: no small turn brings it nearer.
+        return Interval(theta1, theta1)
+    limits = limited.limits[0]
+    lower, upper = max(limits.lower, theta1 - HOP), min(limits.upper, theta1 + HOP)
+    if abs(turn) <= HOP:
+        return Interval(lower, upper)
+    end = lower if turn < 0.0 else upper
+    return Interval(end, end)
 
 
-def _within_hop(q: FloatArray, found: Projection) -> bool:
-    return bool(np.abs(found.q - q).max() <= HOP)
+def _within(reach: float, a: Five, b: Five) -> bool:
+    return all(abs(x - y) <= reach for x, y in zip(a, b, strict=True))
 
 
-def _nearer(
-    chain: Chain, a: Projection, b: Projection, target: ToolTarget, reading: Reading, by: float
-) -> bool:
-    """Whether `a` misses less of `target` than `b`, what counts most first."""
-    misses_a, misses_b = (_misses(chain, found, target, reading) for found in (a, b))
-    for miss_a, miss_b in zip(misses_a, misses_b, strict=True):
+def _within_hop(a: Five, b: Five) -> bool:
+    return _within(HOP, a, b)
+
+
+def _misses(arm: FiveAxisArm, asked: Asked, alpha: Five) -> tuple[float, ...]:
+    """What `alpha` misses of `asked` [m], [rad], what counts most first."""
+    position = math.dist(arm.tool_point(alpha), asked.tool)
+    pitch, roll = arm.pitch(alpha), alpha[4]
+    if asked.reading is Reading.POSE:
+        return position, asked.orientation.angle(pitch, roll)
+    wished_pitch, wished_roll = asked.orientation.best()
+    pitch, roll = abs(wrapped(pitch - wished_pitch)), abs(wrapped(roll - wished_roll))
+    if asked.reading is Reading.PITCH:
+        return pitch, position, roll
+    return position, pitch, roll
+
+
+def _nearer(a: tuple[float, ...], b: tuple[float, ...], by: float) -> bool:
+    """Whether the misses `a` are less than `b`, by more than `by`."""
+    for miss_a, miss_b in zip(a, b, strict=True):
         if abs(miss_a - miss_b) > by:
             return miss_a < miss_b
     return False
-
-
-def _misses(
-    chain: Chain, found: Projection, target: ToolTarget, reading: Reading
-) -> tuple[float, ...]:
-    if reading is Reading.POSE:
-        return found.position_error, found.rotation_error
-    pitch, roll = pitch_and_roll(chain, found.q)
-    pitch, roll = abs(wrapped(pitch - target.pitch)), abs(wrapped(roll - target.roll))
-    if reading is Reading.PITCH:
-        return pitch, found.position_error, roll
-    return found.position_error, pitch, roll

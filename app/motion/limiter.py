@@ -8,7 +8,7 @@ any state there is a way to stop. Angles in rad, times in s, arrays of one value
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +24,6 @@ from ruckig import (
 
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, finite_array, frozen
-
-AT_REST = 1e-9
-"""[rad/s], [rad/s^2] Slower than this is rounding."""
 
 STRAIGHT = 1e-6
 """Of the limits: a motion this little beside the line to its goal is on it."""
@@ -125,13 +122,14 @@ class Limiter:
     def at_rate(self, now: Motion, qd: FloatArray, dt: float, share: float = 1.0) -> Motion:
         """The motion ``dt`` [s] on, on its way to the joint rates ``qd`` (n,) [rad/s].
 
-        A joint that could then not stop before its limit brakes instead.
+        From rest the joints get up to them in step, so the direction is that of ``qd`` at once. A
+        joint that could then not stop before its limit brakes instead.
         """
         if dt <= 0.0:
             return now
         wanted = np.clip(qd, -share * self.limits.speed, share * self.limits.speed)
         for _ in range(len(wanted) + 1):
-            ahead = self._rates(now, wanted, dt, share)
+            ahead = self._rates(now, wanted, dt, share, Synchronization.Phase)
             halt = self.halt(ahead)
             beyond = (halt < self.limits.lower) | (halt > self.limits.upper)
             if not (beyond & (wanted != 0.0)).any():
@@ -139,11 +137,22 @@ class Limiter:
             wanted = np.where(beyond, 0.0, wanted)
         return ahead
 
+    def pause(self, now: Motion, goal: FloatArray, dt: float) -> Motion:
+        """The motion ``dt`` [s] on when it brakes on its way to ``goal``, so that it can go on."""
+        if dt <= 0.0 or now.at_rest:
+            return now
+        line = self._line_to(now, goal, 1.0)
+        if line is not None:
+            self._line.control_interface = ControlInterface.Velocity
+            if _planned(self._line_ruckig, self._line, self._line_trajectory):
+                return self._on_line(now, line, dt)
+        return self.stop(now, dt)
+
     def stop(self, now: Motion, dt: float) -> Motion:
         """The motion ``dt`` [s] on when every joint brakes as hard as it may."""
         if dt <= 0.0 or now.at_rest:
             return now
-        return self._rates(now, np.zeros(len(now.q)), dt, 1.0)
+        return self._rates(now, np.zeros(len(now.q)), dt, 1.0, Synchronization.No)
 
     def halt(self, now: Motion) -> FloatArray:
         """(n,) where the joints come to rest when they brake now [rad]."""
@@ -152,6 +161,21 @@ class Limiter:
         self._brake(now)
         q, _, _ = self._trajectory.at_time(self._trajectory.duration)
         return np.array(q)
+
+    def way_to_halt(self, now: Motion, longest: float) -> list[FloatArray]:
+        """Where the joints pass when they brake now, (n,) each, the present place first.
+
+        longest: [rad] all joints together move no farther from one to the next.
+        """
+        if now.at_rest:
+            return [now.q]
+        self._brake(now)
+        trajectory = self._trajectory
+        end, _, _ = trajectory.at_time(trajectory.duration)
+        # Each joint only goes on as it goes, or back from where it was about to: twice is enough.
+        pieces = max(1, math.ceil(2.0 * float(np.abs(np.array(end) - now.q).sum()) / longest))
+        times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
+        return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
 
     def time_to_halt(self, now: Motion) -> float:
         """[s] until then."""
@@ -162,6 +186,21 @@ class Limiter:
 
     def _along(self, now: Motion, goal: FloatArray, dt: float, share: float) -> Motion | None:
         """The step on the straight line to ``goal``, or None when the motion is not on it."""
+        line = self._line_to(now, goal, share)
+        if line is None:
+            return None
+        self._line.control_interface = ControlInterface.Position
+        if not _planned(self._line_ruckig, self._line, self._line_trajectory):
+            return None
+        (extrema,) = self._line_trajectory.position_extrema
+        if not all(self._holds(now.q + end * line) for end in (extrema.min, extrema.max)):
+            return None
+        if self._line_trajectory.duration <= dt:
+            return Motion.rest(goal)
+        return self._on_line(now, line, dt)
+
+    def _line_to(self, now: Motion, goal: FloatArray, share: float) -> FloatArray | None:
+        """The direction (n,) to ``goal``, the plan along it prepared; None when not on the way."""
         way = goal - now.q
         length = float(np.linalg.norm(way))
         if length == 0.0:
@@ -182,32 +221,43 @@ class Limiter:
         line.max_velocity = [max(share, LEAST_SHARE) * float(np.min(limits.speed * of_axis))]
         line.max_acceleration = [float(np.min(limits.acceleration * of_axis))]
         line.max_jerk = [float(np.min(limits.jerk * of_axis))]
-        if not _planned(self._line_ruckig, line, self._line_trajectory):
-            return None
-        (extrema,) = self._line_trajectory.position_extrema
-        for end in (extrema.min, extrema.max):
-            q = now.q + end * d
-            if (q < limits.lower - SLACK).any() or (q > limits.upper + SLACK).any():
-                return None
-        if self._line_trajectory.duration <= dt:
-            return Motion.rest(goal)
+        return np.asarray(d)
+
+    def _on_line(self, now: Motion, line: FloatArray, dt: float) -> Motion:
         (s,), (v,), (a,) = self._line_trajectory.at_time(dt)
-        q = np.clip(now.q + s * d, limits.lower, limits.upper)
-        return Motion(frozen(q), frozen(v * d), frozen(a * d))
+        q = np.clip(now.q + s * line, self.limits.lower, self.limits.upper)
+        if self._line_trajectory.duration <= dt:
+            return Motion.rest(q)
+        return Motion(frozen(q), frozen(v * line), frozen(a * line))
+
+    def _holds(self, q: FloatArray) -> bool:
+        limits = self.limits
+        return bool((q >= limits.lower - SLACK).all() and (q <= limits.upper + SLACK).all())
 
     def _brake(self, now: Motion) -> None:
-        self._aim_at_rates(now, [0.0] * len(now.q), 1.0)
+        self._aim_at_rates(now, [0.0] * len(now.q), 1.0, Synchronization.No)
 
-    def _rates(self, now: Motion, qd: FloatArray, dt: float, share: float) -> Motion:
-        self._aim_at_rates(now, qd.tolist(), share)
-        return self._at(dt, None)
+    def _rates(
+        self,
+        now: Motion,
+        qd: FloatArray,
+        dt: float,
+        share: float,
+        synchronization: Synchronization,
+    ) -> Motion:
+        self._aim_at_rates(now, qd.tolist(), share, synchronization)
+        return self._at(dt, None, to_rest=not qd.any())
 
-    def _aim_at_rates(self, now: Motion, qd: list[float], share: float) -> None:
+    def _aim_at_rates(
+        self, now: Motion, qd: list[float], share: float, synchronization: Synchronization
+    ) -> None:
         self._start(now, ControlInterface.Velocity, share)
-        self._input.synchronization = Synchronization.No
         self._input.target_velocity = qd
-        if not self._planned():
-            raise ArithmeticError("No way to brake was found, which is a fault of the limiter.")
+        for way in (synchronization, Synchronization.No):
+            self._input.synchronization = way
+            if self._planned():
+                return
+        raise ArithmeticError("No way to brake was found, which is a fault of the limiter.")
 
     def _start(self, now: Motion, interface: ControlInterface, share: float) -> None:
         self._input.control_interface = interface
@@ -228,16 +278,16 @@ class Limiter:
             )
         )
 
-    def _at(self, dt: float, goal: FloatArray | None) -> Motion:
+    def _at(self, dt: float, goal: FloatArray | None, *, to_rest: bool = False) -> Motion:
         ends = self._trajectory.duration <= dt
         q, qd, qdd = (np.array(each) for each in self._trajectory.at_time(dt))
         if goal is not None and ends:
             return Motion.rest(goal)
         np.clip(q, self.limits.lower, self.limits.upper, out=q)
+        if ends and to_rest:
+            return Motion.rest(q)
         if ends:
             qdd[:] = 0.0
-        qd[(np.abs(qd) < AT_REST) & (np.abs(qdd) < AT_REST)] = 0.0
-        qdd[np.abs(qdd) < AT_REST] = 0.0
         return Motion(frozen(q), frozen(qd), frozen(qdd))
 
 
@@ -247,12 +297,3 @@ def _planned(ruckig: Ruckig, wanted: InputParameter, trajectory: Trajectory) -> 
         return ruckig.calculate(wanted, trajectory) in DONE
     except RuckigError:
         return False
-
-
-def slowed(share: float, measure: Callable[[float], float], most: float) -> float:
-    """The greatest share up to ``share`` at which ``measure(share)`` is not above ``most``.
-
-    ``measure`` is proportional to its argument, as a speed is.
-    """
-    full = measure(share)
-    return share if full <= most else share * most / full

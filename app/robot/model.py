@@ -51,6 +51,7 @@ class Body:
         joint: the movable joint it hangs on, or None when it is fixed.
         axis: (3,) unit direction of that joint in the body's own frame.
         visuals: its shapes.
+        collisions: the shapes that stand for it where contacts are looked for.
         moves: whether it hangs, directly or not, on a movable joint.
     """
 
@@ -60,6 +61,7 @@ class Body:
     joint: str | None
     axis: FloatArray
     visuals: tuple[Visual, ...]
+    collisions: tuple[Visual, ...]
     moves: bool
 
 
@@ -83,6 +85,11 @@ class RobotModel:
     fingers: Mapping[str, tuple[float, float]]
     stretches: tuple[Stretch, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def collides(self) -> bool:
+        """Whether any link has a shape to look for contacts with."""
+        return any(body.collisions for body in self.bodies)
 
     def ready(self, posture: Sequence[float]) -> FloatArray:
         """The joint angles (5,) [rad] nearest inside the limits to a posture of the canonical arm.
@@ -302,13 +309,16 @@ def _bodies(
             T = se3.inverse(frames[parent]) @ frames[link]
             name = joint.name if joint.type in TURNING else None
             axis = np.asarray(joint.axis, dtype=float)
-        visuals, absent = visuals_of(urdf.link_map[link], urdf.robot.materials, path.parent)
+        shapes = urdf.link_map[link]
+        visuals, absent = visuals_of(shapes.visuals, urdf.robot.materials, path.parent)
+        missing.extend(absent)
+        collisions, absent = visuals_of(shapes.collisions, (), path.parent)
         missing.extend(absent)
         if not visuals:
             ends = [j.origin for j in urdf.joint_map.values() if j.parent == link]
             visuals = rods([origin[:3, 3] for origin in ends if origin is not None])
         moves = name is not None or (parent is not None and bodies[parent].moves)
-        bodies[link] = Body(link, parent, frozen(T), name, frozen(axis), visuals, moves)
+        bodies[link] = Body(link, parent, frozen(T), name, frozen(axis), visuals, collisions, moves)
 
     for link in urdf.link_map:
         add(link)

@@ -63,9 +63,9 @@ class Visual:
 
 
 def visuals_of(
-    link: Any, materials: Sequence[Any], folder: Path
+    elements: Sequence[Any], materials: Sequence[Any], folder: Path
 ) -> tuple[tuple[Visual, ...], list[Path]]:
-    """The shapes of a yourdfpy link, and the mesh files that are not there.
+    """The shapes of yourdfpy visuals or collisions, and the mesh files that are not there.
 
     ``materials``: those of the whole robot, which a shape may name. ``folder``: that mesh files are
     named from.
@@ -73,9 +73,9 @@ def visuals_of(
     named = {material.name: material for material in materials}
     found: list[Visual] = []
     missing: list[Path] = []
-    for visual in link.visuals:
+    for visual in elements:
         T = frozen(np.eye(4) if visual.origin is None else visual.origin)
-        geometry, colour = visual.geometry, _colour(visual.material, named)
+        geometry, colour = visual.geometry, _colour(getattr(visual, "material", None), named)
         if geometry.mesh is None:
             source: Any = _primitive(geometry)
             scale = np.ones(3)

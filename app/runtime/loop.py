@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections import deque
 from dataclasses import dataclass
 
+from app.control.ledger import Entry, news
 from app.control.session import Session
 from app.control.state import State
 from app.drivers.driver import Driver
 from app.runtime.clock import Clock
 from app.runtime.mailbox import Mailbox
+
+KEPT = 500
+"""Entries of the ledger that are kept."""
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +47,7 @@ class ControlLoop:
         self._published = threading.Condition()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
+        self._ledger: deque[Entry] = deque(maxlen=KEPT)
         self.late_ticks = 0
         """Ticks that came more than a whole period late, since the start."""
 
@@ -49,6 +55,11 @@ class ControlLoop:
     def snapshot(self) -> Snapshot:
         """The newest one."""
         return self._snapshot
+
+    @property
+    def ledger(self) -> tuple[Entry, ...]:
+        """The last reasons why the arm did not do what was wished, oldest first."""
+        return tuple(self._ledger)
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
         """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""
@@ -75,6 +86,7 @@ class ControlLoop:
             log.exception("The control loop met an error; the arm holds.")
             state = self._session.fail(before)
         self._state = state
+        self._ledger.extend(news(before, state))
         # An arm at rest wakes nobody: time alone is no news.
         if commands or _differs(before, state):
             with self._published:
@@ -112,5 +124,7 @@ def _differs(a: State, b: State) -> bool:
         or a.gripper != b.gripper
         or a.setpoint is not b.setpoint
         or a.gripper_setpoint != b.gripper_setpoint
+        or a.goal is not b.goal
+        or a.target is not b.target
         or a.findings != b.findings
     )

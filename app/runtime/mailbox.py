@@ -34,7 +34,10 @@ class Mailbox:
         """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
         self._check(command)
         with self._lock:
-            if self._waiting and _supersedes(command, self._waiting[-1]):
+            if isinstance(command, cmd.Stop):
+                # Never refused, and what waits before it is dead the moment it comes.
+                self._waiting = [command]
+            elif self._waiting and _supersedes(command, self._waiting[-1]):
                 self._waiting[-1] = command
             elif len(self._waiting) >= CAPACITY:
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")

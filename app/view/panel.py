@@ -10,6 +10,7 @@ import numpy as np
 import viser
 
 from app.control import commands as cmd
+from app.control.ledger import Entry
 from app.control.state import State
 from app.errors import InputError
 from app.geometry import se3, so3
@@ -19,8 +20,9 @@ from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList
+from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
-from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, degrees
+from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees
 
 ANGLE_WORTH_SENDING = 2e-6
 """[deg] Rounding on the way to radians and back is less."""
@@ -46,6 +48,11 @@ GESTURES: dict[str, cmd.Command] = {
     "Reset": cmd.Reset(),
 }
 
+ORDERS: dict[str, cmd.Command] = {
+    "Pause": cmd.Pause(),
+    "Resume": cmd.Resume(),
+}
+
 
 class Panel:
     """Sliders show the goal, as the gizmo does; the read-out shows the arm itself."""
@@ -66,6 +73,8 @@ class Panel:
         self._told = ""
         self._readout = self._gui.add_html(readout.page(model, state))
         add_views(self._gui, shows)
+        if not model.collides:
+            self._gui.add_markdown(UNCHECKED)
         with self._gui.add_folder("Joints"):
             self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
             self._gripper = self._finger(state) if model.arm.gripper.moves else None
@@ -76,15 +85,34 @@ class Panel:
             "Reset: stop here and forget the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
+        self._orders = self._gui.add_button_group(
+            "Motion",
+            tuple(ORDERS),
+            hint="Pause: rest on the way, until Resume. STOP is above, and on Space and Esc",
+        )
+        self._on_person(self._orders, lambda: ORDERS[self._orders.value])
+        self._speed = self._gui.add_slider(
+            "Speed",
+            min=1.0,
+            max=100.0,
+            step=1.0,
+            initial_value=round(100.0 * state.speed),
+            hint="Percent of the greatest speed, also of a motion under way",
+        )
+        self._on_person(self._speed, lambda: cmd.SpeedScale(self._speed.value / 100.0))
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
         with self._gui.add_folder("Branches", expand_by_default=False):
             self._branches = BranchList(server, model, self._on_person, state)
         with self._gui.add_folder("Show", expand_by_default=False):
             add_shows(self._gui, shows)
+        with self._gui.add_folder("Why", expand_by_default=False):
+            self._why = LedgerList(self._gui)
 
-    def follow(self, state: State, now: float, *, caught_up: bool) -> None:
-        """Show ``state`` at time ``now`` [s].
+    def follow(
+        self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool
+    ) -> None:
+        """Show ``state`` at time ``now`` [s], and ``ledger``, what held the arm back so far.
 
         ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
         that an older state never takes a slider out of the hand that moves it.
@@ -94,6 +122,7 @@ class Panel:
                 _set(slider, math.degrees(angle))
             if self._gripper is not None:
                 _set(self._gripper, self._opening(state.gripper_goal))
+            _set(self._speed, 100.0 * state.speed)
             if self._tool.value != state.tool:
                 self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
             if self._reading.value != READINGS[state.reading]:
@@ -104,6 +133,7 @@ class Panel:
             if page != self._told:
                 self._told = self._readout.content = page
             self._branches.follow(state)
+            self._why.follow(ledger)
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
         chain = self._model.arm.chain

@@ -28,6 +28,9 @@ class Theme:
 LIGHT = Theme((226, 231, 236), (207, 213, 220), (178, 187, 197), (247, 249, 251), 0.35, dark=False)
 DARK = Theme((38, 42, 48), (50, 55, 62), (70, 77, 87), (22, 24, 28), 0.6, dark=True)
 
+FLOOR_AT = -0.0255
+"""[m] The table lies on the floor, a hair above it so that nothing flickers."""
+
 THEMES = {"Light": LIGHT, "Dark": DARK}
 
 
@@ -72,8 +75,7 @@ def _paint(scene: viser.SceneApi, theme: Theme) -> None:
         plane_opacity=1.0,
         fade_distance=5.0,
         shadow_opacity=theme.shadow,
-        # A hair below the table top, so that the foot of the arm does not flicker in it.
-        position=(0.0, 0.0, -5e-4),
+        position=(0.0, 0.0, FLOOR_AT),
     )
     scene.set_background_image(_gradient(theme.sky, theme.floor), format="png")
 

@@ -20,6 +20,9 @@ Colour = tuple[int, int, int]
 ANGLE_WORTH_SENDING = 1e-7
 """[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
 
+SMALL_FOR_VISER = 1e-4
+"""Of a quaternion: above all that viser leaves unsent, which is 1e-5 of each of its numbers."""
+
 GAP_WORTH_SEEING = 1e-3
 """[m]"""
 
@@ -53,7 +56,10 @@ class FrameTree:
             if abs(angle - self._angles.get(joint, np.inf)) > ANGLE_WORTH_SENDING:
                 self._angles[joint] = angle
                 R = body.T_parent_body[:3, :3] @ so3.exp(body.axis * angle)
-                frame.wxyz = so3.to_quaternion(R)
+                wxyz = so3.to_quaternion(R)
+                # viser takes a small turn for none; -q is the same turn as q, and no small change.
+                small = np.abs(wxyz - frame.wxyz).max() < SMALL_FOR_VISER
+                frame.wxyz = -wxyz if small else wxyz
 
 
 class ArmNodes(FrameTree):
@@ -101,7 +107,7 @@ class GhostNodes(FrameTree):
         self.shapes = [
             server.scene.add_mesh_simple(
                 f"{self.path[body.name]}/shape{number}",
-                *_surface(visual),
+                *surface(visual),
                 color=colour,
                 opacity=opacity,
                 cast_shadow=False,
@@ -143,7 +149,7 @@ class Gap:
                 self._line.points = ends
 
 
-def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Vertices (n, 3) [m] and faces (m, 3) of a shape, its materials forgotten."""
     mesh = visual.mesh.copy()
     # One vertex a corner: half of what goes over the wire.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from app.collision.clearance import STOP
 from app.control.findings import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from app.control.state import Finding, Reason, State, Status
 from app.kinematics.badge import Badge
@@ -34,7 +35,38 @@ def axis(number: int | None) -> str:
     return "an axis" if number is None else f"axis {number + 1}"
 
 
+PARTS = {
+    "base_link": "control box",
+    "arm_base_link": "base",
+    "pan_link": "shoulder",
+    "finger_left_link": "left finger",
+    "finger_right_link": "right finger",
+}
+"""Links whose names in the robot description are not what people call them."""
+
+UNCHECKED = "No collision checking: the robot description gives the links no collision shapes."
+
+
+def part(name: str) -> str:
+    """A link or a thing, as people call it."""
+    return PARTS.get(name, name.removesuffix("_link").replace("_", " "))
+
+
+def _contact(finding: Finding) -> str:
+    one, other = finding.parts or ("a link", "another")
+    return (
+        f"{part(one)} and {part(other)} are {_short(1e3 * finding.amount)} mm apart: "
+        f"the arm stops at {_short(1e3 * STOP)} mm"
+    )
+
+
 REASONS: dict[Reason, Callable[[Finding], str]] = {
+    Reason.HALTED: lambda f: (
+        f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
+        "Release, then say afresh where to go"
+    ),
+    Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
+    Reason.CONTACT: _contact,
     Reason.ACROSS_GAP: lambda f: (
         f"{axis(f.axis)} would have to leap {_short(math.degrees(f.amount))}° to follow: "
         "drag another way round, or choose the pose under Branches"
@@ -57,6 +89,9 @@ STATUS: dict[Status, str] = {
     Status.OK: "On target",
     Status.LIMITED: "As near as it can",
     Status.HELD: "Held at the edge",
+    Status.BLOCKED: "Contact ahead",
+    Status.PAUSED: "Paused",
+    Status.HALTED: "Stopped",
     Status.FAULT: "Fault",
 }
 

@@ -17,6 +17,7 @@ from app.exchange.reachability_file import StoredMap
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
+from app.robot.props import load_props
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
 from app.view.cameras import Cameras, Preset
@@ -28,11 +29,16 @@ from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
+from app.view.tint import Tint
+from app.view.workcell import Workcell
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
     Status.HELD: (234, 88, 12),
+    Status.BLOCKED: (255, 153, 0),
+    Status.PAUSED: (120, 130, 145),
+    Status.HALTED: (230, 45, 45),
     Status.FAULT: (230, 45, 45),
 }
 
@@ -66,9 +72,11 @@ class View:
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
         furnish(server)
+        Workcell(server, load_props())
         state = loop.snapshot.state
         self._arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self._arm)
+        self._tint = Tint(server, model, self._arm.path)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
@@ -128,12 +136,14 @@ class View:
             angles = self._model.joint_angles(state.q, state.gripper)
             self._arm.move(angles)
             self._conduits.move(angles)
+            self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
             self._cameras.follow(state)
             self._panel.follow(
                 state,
                 time.perf_counter(),
+                self._loop.ledger,
                 caught_up=snapshot.ticket == self._mailbox.last_ticket,
             )
         self._server.flush()

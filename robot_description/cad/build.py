@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +12,13 @@ import numpy as np
 from robot_description.cad.column import arm_base_link
 from robot_description.cad.conduit import conduits_json
 from robot_description.cad.control_box import base_link
+from robot_description.cad.fingers import finger_left_link, finger_right_link
 from robot_description.cad.forearm import forearm_link
 from robot_description.cad.glb import Primitive, glb_bytes
-from robot_description.cad.gripper import (
-    finger_left_link,
-    finger_right_link,
-    gripper_link,
-    roll_link,
-)
+from robot_description.cad.gripper import gripper_link
 from robot_description.cad.part import Part
-from robot_description.cad.shading import shade, weld
+from robot_description.cad.roll import roll_link
+from robot_description.cad.shading import CREASE, PAINT_CREASE, shade, weld
 from robot_description.cad.shoulder import pan_link
 from robot_description.cad.upper_arm import upper_arm_link
 from robot_description.cad.wrist import wrist_link
@@ -61,21 +59,32 @@ def primitives_of(part: Part) -> list[Primitive]:
         mesh = solid.to_mesh64()
         positions = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] * MILLIMETRE
         triangles = np.asarray(mesh.tri_verts, dtype=np.int64)
-        primitives.append(Primitive(material, *shade(*weld(positions, triangles))))
+        crease = PAINT_CREASE if material.paint else CREASE
+        primitives.append(Primitive(material, *shade(*weld(positions, triangles), crease)))
     return primitives
+
+
+@functools.cache
+def parts() -> tuple[Part, ...]:
+    """Return every link's part, made once; read them only."""
+    return tuple(make() for make in PARTS)
+
+
+def write_glb(part: Part, folder: Path) -> Built:
+    """Write the GLB of ``part`` into ``folder``."""
+    primitives = primitives_of(part)
+    data = glb_bytes(part.link, primitives)
+    path = folder / f"{part.link}.glb"
+    path.write_bytes(data)
+    triangles = sum(len(primitive.triangles) for primitive in primitives)
+    return Built(path, len(primitives), triangles, len(data))
 
 
 def build(folder: Path = MESHES) -> Iterator[Built]:
     """Write every link's GLB into ``folder``, yielding each as it is done."""
     folder.mkdir(parents=True, exist_ok=True)
-    for make in PARTS:
-        part = make()
-        primitives = primitives_of(part)
-        data = glb_bytes(part.link, primitives)
-        path = folder / f"{part.link}.glb"
-        path.write_bytes(data)
-        triangles = sum(len(primitive.triangles) for primitive in primitives)
-        yield Built(path, len(primitives), triangles, len(data))
+    for part in parts():
+        yield write_glb(part, folder)
 
 
 def write_conduits(path: Path = CONDUITS) -> None:

@@ -59,15 +59,15 @@ def arm_base_link() -> Part:
     )
     part.add(
         STEEL,
-        seam(COLUMN_DIAMETER / 2, COLUMN_TOP - 9.0),
-        seam(COLLAR_DIAMETER / 2, COLLAR_FOOT + 8.0),
+        seam(COLUMN_DIAMETER / 2, COLUMN_TOP - 9.0, FLANGE_DIAMETER / 2),
+        seam(COLLAR_DIAMETER / 2, COLLAR_FOOT + 7.0, FLANGE_DIAMETER / 2),
     )
     part.cut(rod(BORE_DIAMETER, BORE_FLOOR, 150.0))
     face = CABLE_BOX_Y[1] + PLATE_STANDS
     part.add(BRIGHT, block(PLATE_X, (CABLE_BOX_Y[1] - 1.0, face), PLATE_Z, 0.6))
     gland(part, conduit.BASE)
-    screws(part, [(x, face, z) for x in (-27.0, 2.0) for z in (24.0, 37.0)], "+y", 3.6)
-    plug(part, (-15.0, face, 30.5), "+y", PLUG_DIAMETER)
+    screws(part, [(x, face, z) for x in (-27.5, 27.5) for z in (24.0, 37.0)], "+y", 3.6)
+    plug(part, (-16.0, face, 30.5), "+y", PLUG_DIAMETER)
     for y in (-8.5, 8.5):
         plug(part, (CONNECTOR_X[0], y, sum(CONNECTOR_Z) / 2), "-x", PLUG_DIAMETER)
     phase = math.pi / FLANGE_SCREWS

@@ -62,13 +62,13 @@ class Eye:
     at: Vector
 
 
-BASE = Gland("arm_base_link", (18.0, 58.2, 30.5), 35.0, "z")
-SHOULDER = Eye("pan_link", (18.0, 76.0, -47.0))
-UPPER_IN = Gland("upper_arm_link", (86.0, 50.5, 0.0), -38.0)
-UPPER_OUT = Gland("upper_arm_link", (106.0, 50.5, 0.0), 38.0)
-ELBOW_IN = Gland("forearm_link", (39.5, 77.0, 0.0), -38.0)
-ELBOW_OUT = Gland("forearm_link", (59.0, 77.0, 0.0), 38.0)
-WRIST = Gland("wrist_link", (43.0, 71.5, 0.0), -38.0)
+BASE = Gland("arm_base_link", (7.0, 58.2, 30.5), 42.0, "z")
+SHOULDER = Eye("pan_link", (4.0, 76.0, -47.0))
+UPPER_IN = Gland("upper_arm_link", (86.0, 50.5, 0.0), -28.0)
+UPPER_OUT = Gland("upper_arm_link", (106.0, 50.5, 0.0), 12.0)
+ELBOW_IN = Gland("forearm_link", (39.0, 77.0, 0.0), -12.0)
+ELBOW_OUT = Gland("forearm_link", (59.5, 77.0, 0.0), 14.0)
+WRIST = Gland("wrist_link", (43.0, 71.5, 0.0), -14.0)
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class Stretch:
 
 
 STRETCHES = (
-    Stretch("base to shoulder", BASE, SHOULDER, 140.0, winds="axis_1"),
-    Stretch("shoulder to upper arm", SHOULDER, UPPER_IN, 160.0),
+    Stretch("base to shoulder", BASE, SHOULDER, 122.0, winds="axis_1"),
+    Stretch("shoulder to upper arm", SHOULDER, UPPER_IN, 152.0),
     Stretch("upper arm to elbow", UPPER_OUT, ELBOW_IN, 150.0),
     Stretch("elbow to wrist", ELBOW_OUT, WRIST, 150.0),
 )

@@ -68,14 +68,12 @@ def base_link() -> Part:
     """Return the control box in its frame: z 0 on the table."""
     part = Part("base_link")
     rim = FLANGE_DIAMETER / 2
-    part.add(ALUMINIUM, _drum())
+    recess = block((-99.0, 99.0), (-99.0, PANEL_Y), (0.0, LIP_UNDERSIDE))
+    part.add(ALUMINIUM, _drum() - recess)
     part.add(
         GREY, lathe([(0.0, rim - 0.8, 0.0), (0.8, rim, 0.0), (FLANGE_HEIGHT, rim, FLANGE_EDGE)])
     )
-    part.cut(
-        block((-99.0, 99.0), (-99.0, PANEL_Y), (FLANGE_HEIGHT, LIP_UNDERSIDE)),
-        rod(SEAT_DIAMETER, TOP_CENTRE, 90.0),
-    )
+    part.cut(rod(SEAT_DIAMETER, TOP_CENTRE, 90.0))
     bolts = around(BOLTS, BOLT_CIRCLE)
     floor = FLANGE_HEIGHT - BOLT_DEPTH
     part.cut(*(rod(COUNTERBORE, floor, 20.0, at=(x, y, 0.0)) for x, y in bolts), of=GREY)

@@ -13,7 +13,7 @@ from robot_description.cad import conduit
 from robot_description.cad.conduit import Eye, Gland
 from robot_description.cad.lettering import lettering, wrapped
 from robot_description.cad.material import ALUMINIUM, BLUE, BRIGHT, PLASTIC, STEEL
-from robot_description.cad.outline import circle
+from robot_description.cad.outline import circle, segments_of
 from robot_description.cad.part import Part
 from robot_description.cad.solid import (
     Direction,
@@ -167,9 +167,13 @@ def bored(part: Part, diameter: float, half_length: float, x: float = 0.0) -> No
     )
 
 
-def seam(radius: float, at: float, toward: Direction = "+z") -> Manifold:
-    """Return the dark line of a joint round a cylinder at height ``at`` along ``toward``."""
-    return rod(2 * (radius + SEAM_STANDS), at - SEAM_WIDTH / 2, at + SEAM_WIDTH / 2, toward)
+def seam(radius: float, at: float, widest: float, toward: Direction = "+z") -> Manifold:
+    """Return the dark line of a joint round a turned part at height ``at`` along ``toward``.
+
+    ``widest`` is the part's largest radius: with as many chords as the part the two never cross.
+    """
+    low, high = at - SEAM_WIDTH / 2, at + SEAM_WIDTH / 2
+    return rod(2 * (radius + SEAM_STANDS), low, high, toward, segments=segments_of(widest))
 
 
 def terminal_box(part: Part, x: Range, y: Range, z: Range, glands: Iterable[Gland]) -> None:

@@ -1,204 +1,190 @@
-"""roll_link, gripper_link and the two fingers, each pointing along +x; mm."""
+"""gripper_link: the gripper's body, a turned cone milled to a fork about the finger drive; mm.
+
+The origin lies on the back of its plate, x forward. The fingers share a pivot along z; a pinion on
+x drives a crown sector on each, from both sides, so that they turn against each other.
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from manifold3d import Manifold
+from manifold3d import JoinType, Manifold, OpType
 
-from robot_description.cad.fittings import Sideways, name, screws
-from robot_description.cad.material import ALUMINIUM, BRIGHT, PANEL, RUBBER, STEEL
-from robot_description.cad.outline import Outline, circle, hull, on_grid, rectangle, rounded
+from robot_description.cad import roll
+from robot_description.cad.fittings import screws
+from robot_description.cad.material import ALUMINIUM, BRASS, BRIGHT, LENS, PLASTIC, STEEL
+from robot_description.cad.outline import Outline, on_grid, rectangle, rounded
 from robot_description.cad.part import Part
-from robot_description.cad.solid import block, lathe, prism, rod
+from robot_description.cad.solid import Direction, block, lathe, prism, rod
 
-# roll_link: the origin in the middle of the cylinder, the side dome on +z.
-ROLL_DIAMETER, ROLL_X = 50.0, (-30.0, 30.0)
-RING_X, RING_FLATS = (30.0, 32.5), 22.0
-FLANGE_DIAMETER, FLANGE_X = 40.0, (33.0, 36.0)
-DOME_DIAMETER, DOME_TOP, DOME_X = 46.0, 32.0, -4.0
-PLATE_HALF_WIDTH, PLATE_X, PLATE_STANDS = 9.5, (-24.0, 24.0), 0.9
+PLATE_RADIUS, PLATE_THICK, PLATE_EDGE = 25.0, 2.0, 0.5
+BOLTS, BOLT_HEAD, BOLT_POCKET = 15.8, 4.4, 5.4  # (+-15.8, +-15.8) from the axis
+COLLAR_RADIUS, COLLAR_END = 21.6, 4.5
+GROOVE_RADIUS = 18.4
+SOCKET_CLEARANCE = 0.1  # about the roll link's flange, which the plate takes in
 
-# gripper_link: the origin on the back of its plate.
-PLATE_DIAMETER, PLATE_THICK, PLATE_HOLE = 50.0, 2.0, 16.0
-NECK_DIAMETER = 35.0
-CONE_DIAMETER, CONE_START, CONE_END = 40.0, 5.0, 48.5
-TIP_Y, TIP_Z = 14.0, 31.0
-WINDOW_X, WINDOW_HALF_Z = 22.0, 13.0
-PIVOT_X, PIN_DIAMETER = 34.0, 7.0
+SEGMENTS = 60  # of the turned surfaces
 
-# Fingers: the origin on the pivot; the right one lies on +y.
-LUG_Z, LUG_RADIUS, LUG_END = (6.2, 12.6), 9.4, 14.0
-LUG_BORE = 4.0
-STRIP = ((4.2, 11.8), (11.5, 17.0), (48.0, 43.0), (63.0, 33.4), (84.6, 43.4))
-STRIP_HALF_HEIGHT, ROOT_HALF_HEIGHT = 10.0, 12.5
-ROOT_REACH = 16.5  # how far the root stands out from the first point of the strip
-STRIP_THICK, PAD_THICK = 2.2, 2.0
-PAD_START, PAD_HALF_HEIGHT = 16.8, 10.8
-BEND_RADIUS = 4.0
+CONE_RADIUS, CONE_X, CONE_TAPER = 20.0, (5.3, 48.5), 3.6
+CONE_RINGS = 6  # so many facets a degree steeper each keep the flats' edges crisp
+FLAT_X, FLAT_SINKS, FLAT_RIM = 10.5, 0.04, 0.5  # where the flats begin, and their rims
+TIP_HALF_Y, TIP_HALF_Z = 7.0, 15.5
+TIP_CORNER = 4.0
+
+WINDOW_X, WINDOW_HALF_Z, WINDOW_CORNER, WINDOW_RIM = (22.0, 46.6), 13.0, 2.0, 0.6
+LINING_THICK, LINING_HALF_Z, LINING_HALF_Y = 0.8, 12.4, 9.0
+BEARING_RADIUS, BEARING_END = 4.6, 23.1
+
+PIVOT_X, PIN_DIAMETER = 34.0, 3.7
+PIN_HEAD, PIN_HEAD_Z = 7.4, (15.0, 18.0)
+
+# A 14-tooth pinion and 43 on a full crown: the manufacturer's 0.3254 turns a turn of the motor.
+PINION_TEETH, PINION_X = 14, (23.0, 27.4)
+PINION_TIP, PINION_ROOT = 3.25, 2.35
+EYE_DIAMETER = 5.0
+EYE_BEZEL = 7.4
 
 
-def roll_link() -> Part:
-    """Return the roll cylinder in its frame: x the roll axis."""
-    part = Part("roll_link")
-    radius = ROLL_DIAMETER / 2
-    low, high = ROLL_X
-    ring = rod(ROLL_DIAMETER, high - 1.0, RING_X[1], "+x", edge=0.5)
-    ring = ring - block((0.0, 40.0), (RING_FLATS, 30.0), (-30.0, 30.0))
-    ring = ring - block((0.0, 40.0), (-30.0, -RING_FLATS), (-30.0, 30.0))
-    dome = DOME_DIAMETER / 2
-    part.add(
-        ALUMINIUM,
-        lathe(
-            [
-                (low, radius - 4.0, 0.0),
-                (low + 1.5, radius - 4.0, 0.0),
-                (low + 1.5, radius, 1.0),
-                (low + 5.0, radius, 0.0),
-                (low + 5.0, radius - 0.7, 0.0),
-                (low + 6.2, radius - 0.7, 0.0),
-                (low + 6.2, radius, 0.0),
-                (high - 0.6, radius, 1.0),
-            ],
-            "+x",
-        ),
-        ring,
-        lathe(
-            [
-                (0.0, dome - 4.0, 0.0),
-                (DOME_TOP - 12.0, dome - 4.0, 1.0),
-                (DOME_TOP - 8.5, dome, 1.2),
-                (DOME_TOP, dome, 7.5),
-            ],
-            "+z",
-            (DOME_X, 0.0, 0.0),
-        ),
+def _wedge(half: float) -> Outline:
+    """Return a view of the body: the cone's full width down to ``half`` at the tip."""
+    low, high = CONE_X
+    start = low - 5.0
+    root = half + (CONE_RADIUS - half) * (high - start) / (high - FLAT_X)
+    return rounded(
+        [
+            (start, -root, 0.0),
+            (high, -half, TIP_CORNER),
+            (high, half, TIP_CORNER),
+            (start, root, 0.0),
+        ]
     )
-    part.add(
-        BRIGHT,
-        rod(FLANGE_DIAMETER, high, FLANGE_X[1], "+x", edge=0.4),
-        block((high, FLANGE_X[1]), (-4.0, 4.0), (-25.0, -15.0), 0.4),
+
+
+def _milled(blank: Manifold, half: float, roll: float) -> Manifold:
+    """Return what to take off the flat of ``blank`` that ends ``half`` off the axis at the tip.
+
+    The flat sinks by a hair within a hair's breadth of its outline, so that it is shaded flat and
+    the rim catches the light. ``roll`` (degrees about x) tells which of the flats.
+    """
+    tilt = math.degrees(math.atan((CONE_RADIUS - half) / (CONE_X[1] - FLAT_X)))
+    level_with = blank.rotate((-roll, 0.0, 0.0)).rotate((0.0, -tilt, 0.0))
+    top = level_with.bounding_box()[5]
+    outline = level_with.slice(top - 2 * FLAT_SINKS).offset(-FLAT_RIM, JoinType.Miter)
+    tool = outline.extrude(1.0).translate((0.0, 0.0, top - FLAT_SINKS))
+    return tool.rotate((0.0, tilt, 0.0)).rotate((roll, 0.0, 0.0))
+
+
+def _cone() -> Manifold:
+    """Return the body's blank: turned to a slight barrel, with four flats towards the tip."""
+    low, high = CONE_X
+    profile = [
+        (low + share * (high - low), CONE_RADIUS - CONE_TAPER * share * (1.0 + share) / 2.0, 0.0)
+        for share in (k / CONE_RINGS for k in range(1, CONE_RINGS + 1))
+    ]
+    turned = lathe([(low, CONE_RADIUS, 0.8), *profile], "+x", segments=SEGMENTS)
+    sides = prism(_wedge(TIP_HALF_Y), -40.0, 40.0, 0.0, "z")
+    cheeks = prism(_wedge(TIP_HALF_Z), -40.0, 40.0, 0.0, "y")
+    blank = turned ^ sides ^ cheeks
+    flats = [(TIP_HALF_Z, 0.0), (TIP_HALF_Y, 90.0), (TIP_HALF_Z, 180.0), (TIP_HALF_Y, 270.0)]
+    tools = [_milled(blank, half, roll) for half, roll in flats]
+    return Manifold.batch_boolean([blank, *tools], OpType.Subtract)
+
+
+def _window() -> list[Manifold]:
+    """Return what to cut for the window: a slot through both flats, its rims chamfered."""
+    (low, high), half = WINDOW_X, WINDOW_HALF_Z
+    slot = prism(rectangle(WINDOW_X, (-half, half), WINDOW_CORNER), -30.0, 30.0, 0.0, "y")
+    slope = (CONE_RADIUS - TIP_HALF_Y) / (CONE_X[1] - FLAT_X)
+    middle = (low + high) / 2
+    reach = (high - low) / 2 * math.hypot(1.0, slope) + WINDOW_RIM
+    rim = prism(
+        rectangle((-reach, reach), (-half - WINDOW_RIM, half + WINDOW_RIM), WINDOW_CORNER + 0.6),
+        -WINDOW_RIM,
+        4.0,
+        (WINDOW_RIM, 0.0),
+        "y",
     )
-    half = PLATE_HALF_WIDTH
-    sheet = rectangle(PLATE_X, (-half, half), 2.0)
-    inside, outside = radius - 4.0, radius + PLATE_STANDS
-    part.add(
-        PANEL,
-        prism(sheet, inside, outside, (0.0, 0.5), "y"),
-        prism(sheet, -outside, -inside, (0.5, 0.0), "y"),
-    )
-    toward: Sideways
-    for toward, y in (("+y", outside), ("-y", -outside)):
-        screws(part, [(x, y, z) for x in (-21.0, 21.0) for z in (-6.5, 6.5)], toward, 3.0)
-        name(part, "KATANA", 5.5, (0.0, y, 0.0), toward)
-    corners = [(RING_X[1], u, v) for u in (-15.8, 15.8) for v in (-15.8, 15.8)]
-    screws(part, corners, "+x", 5.0)
-    return part
+    turned = rim.rotate((0.0, 0.0, -math.degrees(math.atan(slope))))
+    cut = turned.translate((middle, TIP_HALF_Y + slope * (CONE_X[1] - middle), 0.0))
+    return [slot, cut, cut.mirror((0.0, 1.0, 0.0))]
+
+
+def _pinion() -> Manifold:
+    step = 2.0 * math.pi / PINION_TEETH
+    points = [
+        (radius * math.cos((k + share) * step), radius * math.sin((k + share) * step))
+        for k in range(PINION_TEETH)
+        for share, radius in (
+            (-0.30, PINION_ROOT),
+            (-0.12, PINION_TIP),
+            (0.12, PINION_TIP),
+            (0.30, PINION_ROOT),
+        )
+    ]
+    # A tooth points to each crown, on +z and on -z.
+    turn = math.pi / 2.0
+    turned = [
+        (u * math.cos(turn) - v * math.sin(turn), u * math.sin(turn) + v * math.cos(turn))
+        for u, v in points
+    ]
+    return prism(on_grid(np.array(turned)), *PINION_X, 0.0, "x")
 
 
 def gripper_link() -> Part:
-    """Return the gripper's body, a fork that flattens towards the finger pivots."""
+    """Return the gripper's body in its frame."""
     part = Part("gripper_link")
-    tip = prism(
-        rectangle((-TIP_Y / 2, TIP_Y / 2), (-TIP_Z / 2, TIP_Z / 2), 2.0),
-        CONE_END - 1.5,
-        CONE_END,
-        (0.0, 0.6),
-        "x",
-    )
-    root = rod(CONE_DIAMETER, CONE_START, CONE_START + 5.0, "+x", edge=1.0)
-    body = Manifold.batch_hull([root, tip])
-    half = WINDOW_HALF_Z
-    body = body - prism(
-        rounded(
-            [(WINDOW_X, -half, 3.0), (60.0, -half, 0.0), (60.0, half, 0.0), (WINDOW_X, half, 3.0)]
-        ),
-        -30.0,
-        30.0,
-        0.0,
-        "y",
-    )
-    part.add(ALUMINIUM, body, rod(NECK_DIAMETER, 1.0, CONE_START + 1.0, "+x"))
-    part.add(ALUMINIUM, rod(PLATE_DIAMETER, 0.0, PLATE_THICK, "+x", edge=0.5))
-    corners = [
-        (PLATE_THICK, u, v) for u in (-PLATE_HOLE, PLATE_HOLE) for v in (-PLATE_HOLE, PLATE_HOLE)
-    ]
-    screws(part, corners, "+x", 4.6)
-    part.add(STEEL, rod(LUG_BORE - 0.3, -16.0, 16.0, "+z", (PIVOT_X, 0.0, 0.0), segments=16))
-    pivot = (PIVOT_X, 0.0, 0.0)
+    low = WINDOW_X[0]
     part.add(
-        BRIGHT,
-        rod(PIN_DIAMETER, 14.5, 17.0, "+z", pivot, edge=0.6),
-        rod(PIN_DIAMETER, 14.5, 17.0, "-z", pivot, edge=0.6),
+        ALUMINIUM,
+        Manifold.batch_boolean([_cone(), *_window()], OpType.Subtract),
+        lathe(
+            [
+                (0.0, PLATE_RADIUS, PLATE_EDGE),
+                (PLATE_THICK, PLATE_RADIUS, PLATE_EDGE),
+                (PLATE_THICK, COLLAR_RADIUS, 0.0),
+                (COLLAR_END, COLLAR_RADIUS, 0.6),
+                (COLLAR_END, GROOVE_RADIUS, 0.0),
+                (CONE_X[0] + 1.0, GROOVE_RADIUS, 0.0),
+            ],
+            "+x",
+            segments=SEGMENTS,
+        ),
+    )
+    bolts = [(u, v) for u in (-BOLTS, BOLTS) for v in (-BOLTS, BOLTS)]
+    part.cut(
+        *(rod(BOLT_POCKET, PLATE_THICK, 5.2, "+x", (0.0, u, v), segments=20) for u, v in bolts)
+    )
+    screws(part, [(PLATE_THICK, u, v) for u, v in bolts], "+x", BOLT_HEAD)
+
+    part.add(
+        PLASTIC,
+        block(
+            (low - 1.0, low + LINING_THICK),
+            (-LINING_HALF_Y, LINING_HALF_Y),
+            (-LINING_HALF_Z, LINING_HALF_Z),
+        ),
+    )
+    part.add(STEEL, rod(2 * BEARING_RADIUS, low, BEARING_END, "+x", edge=0.5))
+    part.add(BRASS, _pinion())
+    pivot = (PIVOT_X, 0.0, 0.0)
+    part.add(STEEL, rod(PIN_DIAMETER, -16.0, 16.0, "+z", pivot, segments=16))
+    toward: Direction
+    for toward in ("+z", "-z"):
+        part.add(BRIGHT, rod(PIN_HEAD, *PIN_HEAD_Z, toward, pivot, edge=0.6))
+        part.cut(rod(3.4, PIN_HEAD_Z[1] - 1.4, 25.0, toward, pivot, segments=6), of=BRIGHT)
+
+    front = CONE_X[1]
+    part.cut(rod(EYE_BEZEL - 0.4, front - 0.5, 60.0, "+x"), of=ALUMINIUM)
+    bezel = rod(EYE_BEZEL, front - 0.7, front + 0.4, "+x", edge=0.3)
+    part.add(BRIGHT, bezel - rod(EYE_DIAMETER, front - 2.0, 60.0, "+x"))
+    part.add(LENS, rod(EYE_DIAMETER + 0.4, front - 0.6, front, "+x", edge=0.2))
+
+    hollow = roll.FLANGE_X[1] - roll.RING_X[1] + SOCKET_CLEARANCE
+    key = roll.KEY_HALF_WIDTH + SOCKET_CLEARANCE
+    part.cut(
+        rod(2 * (roll.FLANGE_RADIUS + SOCKET_CLEARANCE), -1.0, hollow, "+x"),
+        block((-1.0, hollow), (-key, key), (-roll.KEY_REACH - 2.0, -15.0)),
+        of=ALUMINIUM,
     )
     return part
-
-
-def _ribbon(path: Outline, low: float, high: float) -> Outline:
-    """Return the band between two distances to the left of an open ``path``, bends mitred."""
-    side = np.diff(path, axis=0)
-    side /= np.sqrt((side * side).sum(axis=1))[:, None]
-    left = np.column_stack((-side[:, 1], side[:, 0]))
-    before, after = np.vstack((left[:1], left)), np.vstack((left, left[-1:]))
-    mitre = (before + after) / (1.0 + (before * after).sum(axis=1))[:, None]
-    return on_grid(np.vstack((path + low * mitre, (path + high * mitre)[::-1])))
-
-
-def _path(start: float) -> Outline:
-    """Return the strip's bent centre line from ``start`` mm past its first point."""
-    first, second = np.array(STRIP[0]), np.array(STRIP[2])
-    along = (second - first) / math.dist(STRIP[0], STRIP[2])
-    begin = first + start * along
-    corners = [(float(begin[0]), float(begin[1]), 0.0)]
-    corners += [(x, y, BEND_RADIUS) for x, y in STRIP[2:-1]]
-    corners.append((*STRIP[-1], 0.0))
-    closing = [(STRIP[-1][0], 200.0, 0.0), (float(begin[0]), 200.0, 0.0)]
-    return rounded([*corners, *closing])[: -len(closing)]
-
-
-def _finger(link: str, left: bool) -> Part:
-    part = Part(link)
-    root, end = _path(0.0), _path(PAD_START)
-    half = STRIP_THICK / 2
-    thick = half + PAD_THICK
-    lug = prism(
-        hull(circle(LUG_RADIUS), rectangle((-4.0, 11.5), (8.0, LUG_END + 1.5), 1.0)),
-        *LUG_Z,
-        0.8,
-        "z",
-    )
-    lug = lug - rod(LUG_BORE, 0.0, 20.0)
-    stub = prism(_ribbon(root, -thick, thick), -ROOT_HALF_HEIGHT, ROOT_HALF_HEIGHT)
-    reach = rod(2 * ROOT_REACH, -20.0, 20.0, at=(STRIP[0][0], STRIP[0][1], 0.0))
-    solids = [
-        (
-            ALUMINIUM,
-            [
-                lug,
-                stub ^ reach,
-                prism(_ribbon(root, -half, half), -STRIP_HALF_HEIGHT, STRIP_HALF_HEIGHT),
-            ],
-        ),
-        (
-            RUBBER,
-            [
-                prism(_ribbon(end, low, high), -PAD_HALF_HEIGHT, PAD_HALF_HEIGHT)
-                for low, high in ((-thick, -half), (half, thick))
-            ],
-        ),
-    ]
-    for material, bodies in solids:
-        for body in bodies:
-            part.add(material, body.rotate((180.0, 0.0, 0.0)) if left else body)
-    return part
-
-
-def finger_right_link() -> Part:
-    """Return the finger on +y."""
-    return _finger("finger_right_link", left=False)
-
-
-def finger_left_link() -> Part:
-    """Return the finger on -y: the right one turned half about x."""
-    return _finger("finger_left_link", left=True)

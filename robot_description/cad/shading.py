@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 CREASE = math.radians(47.0)
 """Faces that meet at a larger angle are shaded apart; a chamfer of 45 degrees reads as rounded."""
+PAINT_CREASE = math.radians(100.0)
+"""The same for paint: an edge of a fraction of a millimetre needs no shading of its own."""
 COPLANAR = math.radians(0.5)
 """Faces that meet at a smaller angle count as one plane."""
 NORMAL_DIGITS = 4
@@ -59,9 +61,11 @@ def _angles(corner: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def shade(
-    positions: NDArray[np.float32], triangles: NDArray[np.int64]
+    positions: NDArray[np.float32], triangles: NDArray[np.int64], crease: float = CREASE
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64]]:
     """Return vertices, unit normals, triangles with each vertex split where the surface creases.
+
+    ``crease`` is the angle [rad] from which it does.
 
     A corner's normal is the sum of the normals of the faces about its vertex that lie within the
     crease angle of its own face, each weighted by the corner's angle and by the area of the whole
@@ -86,7 +90,7 @@ def shade(
     mine = np.repeat(np.arange(len(vertex)), meets)
     offset = np.arange(len(mine)) - np.repeat(np.cumsum(meets) - meets, meets)
     other = order[first[vertex[mine]] + offset]
-    near = (flat[face[mine]] * flat[face[other]]).sum(axis=1) >= math.cos(CREASE)
+    near = (flat[face[mine]] * flat[face[other]]).sum(axis=1) >= math.cos(crease)
     sliver = size[face[mine]] < 1e-14
     kept = near | sliver
     normal = np.column_stack(

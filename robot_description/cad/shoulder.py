@@ -73,7 +73,7 @@ def pan_link() -> Part:
     part.add(RUBBER, _apron(*FRONT_APRON), _apron(*BACK_APRON))
     bored(part, SHAFT_DIAMETER, SHAFT_HALF_LENGTH)
     hub(part, (DISC_START, DISC_END), DISC_DIAMETER, CAP_DIAMETER, CAP_END, star=True)
-    screws(part, [(x, CHEEK_OUTSIDE, -37.0) for x in (-36.0, 38.0)], "+y", 5.0)
+    screws(part, [(x, CHEEK_OUTSIDE, -37.0) for x in (-36.0, 36.0)], "+y", 5.0)
     screws(part, [(x, -CHEEK_OUTSIDE, -37.0) for x in (-36.0, 36.0)], "-y", 5.0)
     part.add(STEEL, rod(NECK_DIAMETER + 6.0, SKIRT_FOOT - 1.0, SKIRT_FOOT + 0.5))
     x, y, z = conduit.SHOULDER.at

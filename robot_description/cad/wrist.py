@@ -62,7 +62,7 @@ def wrist_link() -> Part:
     )
     bored(part, WRIST_SHAFT, max(map(abs, WRIST_SHAFT_Y)) + 0.8)
     bumper = BUMPER_DIAMETER / 2
-    part.add(STEEL, *(seam(HOUSING_DIAMETER / 2, x, "+x") for x in SEAMS_X))
+    part.add(STEEL, *(seam(HOUSING_DIAMETER / 2, x, FOOT_DIAMETER / 2, "+x") for x in SEAMS_X))
     part.add(
         RUBBER,
         lathe(

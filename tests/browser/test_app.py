@@ -241,6 +241,24 @@ def ghost_is_shown(robot: Robot) -> bool:
     return bool(last.body["visible"])
 
 
+def test_before_the_table_the_arm_stops_says_why_and_is_tinted(
+    robot: Robot, artefacts: Path
+) -> None:
+    robot.page.drag_slider("Axis 2", 5.0)
+    robot.page.wait_until(lambda: "5.0 mm apart" in robot.said(), "the reason")
+    said = robot.said()
+    assert "finger and table" in said
+    finger = "left" if "Left" in said else "right"
+    coat = f"{robot.path[f'finger_{finger}_link']}/contact0"
+    robot.page.node_pose(coat)
+    robot.page.wait_drawn()
+    robot.page.screenshot(artefacts / "app-contact.png")
+    go_home(robot)
+    robot.page.wait_until(lambda: "On target" in robot.said(), "the reason to go")
+    (last,) = robot.page.messages("SetSceneNodeVisibilityMessage", node=coat, last=1)
+    assert not last.body["visible"]
+
+
 def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None:
     page = robot.page
     for label, values in (("x, y, z", (350.0, 0.0, 0.0)), ("r, p, y", (0.0, 30.0, 23.0))):
@@ -299,7 +317,7 @@ def test_killed_and_restarted_the_app_comes_back_whole(
         robot.settle()
         server.kill()
         come_back(robot, server)
-        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 1
+        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 2
         robot.page.drag_arrow(MOVE, "z", 0.05)
         robot.settle()
         robot.page.screenshot(artefacts / "app-restarted.png")

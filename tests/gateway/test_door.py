@@ -229,7 +229,12 @@ def test_each_may_do_what_their_role_says(guarded: tuple[AppServer, Path]) -> No
             assert "only watch" in (await watcher.notice("refused"))["why"]
             await driving.set("Axis 1", value=10.0)
             assert (await watcher.wait(holder="Operator"))["role"] == "viewer"
-            assert [m for m in await watching.listen() if m["type"] == "SetOrientationMessage"]
+            async with asyncio.timeout(5.0):
+                while not any(
+                    message["type"] == "SetOrientationMessage"
+                    for message in await watching.listen()
+                ):
+                    pass
             await boss.say("take")
             await watcher.wait(holder="Admin")
             await driver.say("take")

@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from app.control.lease import HOLD_AFTER, LOST_AFTER, Lease, Role
 from app.control.session import Session
-from app.control.state import State
+from app.control.state import Halt, State
 from app.errors import LeaseError
 from app.gateway.door import Visitor
-from app.gateway.hub import JOG_LASTS, TICK, Hub, Window, key_of
+from app.gateway.hub import TICK, Hub, Window, key_of
 from app.gateway.motion import Rates
 from app.kinematics.velocity import JogFrame
 
@@ -28,20 +27,35 @@ class FakeArm:
         self.rest = state
         self.moves = False
         self.holds = 0
-        self.jogs: list[tuple[Rates, JogFrame, float]] = []
+        self.stops = 0
+        self.halted = False
+        self.jogs: list[tuple[Rates, JogFrame]] = []
+        self.share = 1.0
 
     @property
     def state(self) -> State:
+        halted = Halt(0.0, 0.0) if self.halted else None
         if not self.moves:
-            return self.rest
-        return replace(self.rest, goal=self.rest.setpoint + 0.1)
+            return replace(self.rest, halted=halted)
+        return replace(self.rest, goal=self.rest.setpoint + 0.1, halted=halted)
+
+    def stop(self) -> None:
+        self.stops += 1
+        self.halted = True
+        self.moves = False
+
+    def release(self) -> None:
+        self.halted = False
 
     def hold(self) -> None:
         self.holds += 1
         self.moves = False
 
-    def jog(self, rates: Rates, frame: JogFrame, dt: float) -> None:
-        self.jogs.append((rates, frame, dt))
+    def jog(self, rates: Rates, frame: JogFrame) -> None:
+        self.jogs.append((rates, frame))
+
+    def limit(self, share: float) -> None:
+        self.share = share
 
 
 class Table:
@@ -65,6 +79,10 @@ class Table:
             for window in alive:
                 self.hub.beat(window)
             self.hub.tick()
+
+
+def stands_still(table: Table) -> bool:
+    return table.arm.halted
 
 
 def moves(table: Table) -> bool:
@@ -107,9 +125,9 @@ def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
     for act in acts:
         with pytest.raises(LeaseError):
             act()
-    assert table.arm.holds == 0
+    assert (table.arm.holds, table.arm.stops, table.arm.share) == (0, 0, 1.0)
     table.hub.stop("Vera")
-    assert table.arm.holds == 1
+    assert table.arm.stops == 1
     with pytest.raises(LeaseError):
         table.hub.reset(watcher)
     assert table.hub.stopped is not None
@@ -134,16 +152,19 @@ def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
     # Only who drives may end it.
     with pytest.raises(LeaseError, match="Window 1 holds"):
         table.hub.reset(other)
+    assert stands_still(table)
     table.hub.reset(driver)
+    assert not stands_still(table)
     assert not moves(table)
     table.hub.drive(driver.person.key)
 
 
-def test_what_was_on_its_way_when_the_stop_came_is_held_too(table: Table) -> None:
+def test_an_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.hub.stop("Window 1")
-    table.arm.moves = True
+    table.arm.halted, table.arm.moves = False, True
     table.wait(TICK, driver)
+    assert table.arm.halted
     assert not moves(table)
 
 
@@ -253,22 +274,19 @@ def test_a_jog_goes_on_while_it_is_held_and_is_over_by_itself(table: Table) -> N
     for _ in range(5):
         table.hub.jog(driver, forward, JogFrame.TOOL)
         table.wait(0.04, driver)
-    # The first only says when it began.
-    assert len(table.arm.jogs) == 4
-    rates, frame, dt = table.arm.jogs[-1]
-    assert rates == pytest.approx(np.array(forward) * table.hub.speed)
-    assert frame is JogFrame.TOOL
-    assert dt == pytest.approx(0.04)
-    table.wait(JOG_LASTS, driver)
-    table.hub.jog(driver, forward, JogFrame.TOOL)
-    assert len(table.arm.jogs) == 4
+    assert table.arm.jogs == [(forward, JogFrame.TOOL)] * 5
+    table.hub.set_speed(driver, 0.25)
+    assert table.arm.share == 0.25
 
 
-def test_a_jog_that_is_let_go_holds_the_arm(table: Table) -> None:
+def test_a_jog_that_is_let_go_says_so_to_the_arm(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.hub.jog(driver, (0.2, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE)
     table.hub.jog(driver, (0.0,) * 5, JogFrame.BASE)
-    assert table.arm.holds == 1
+    assert table.arm.jogs[-1] == ((0.0,) * 5, JogFrame.BASE)
+    # A driver who jogged no more and falls silent stops nothing.
+    table.wait(2 * HOLD_AFTER)
+    assert table.arm.stops == 0
 
 
 def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:

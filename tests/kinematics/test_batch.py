@@ -97,6 +97,14 @@ def test_poses_no_arm_can_take_are_missed_as_alone(chain: Chain, rng: np.random.
     assert_as_one_by_one(chain, T[:-5], 1e-6, 1e-9)
 
 
+def test_a_tool_square_to_the_plane_is_solved_as_alone(chain: Chain) -> None:
+    p = [0.4, 0.0, 0.1]
+    rolls = [so3.rotation_x(roll) for roll in (0.3, -2.0, 3.0)]
+    T = [se3.from_rotation_translation(so3.rotation_z(0.5 * math.pi) @ R, p) for R in rolls]
+    T[0][:3, 0] = 0.0, 1.0, 0.0
+    assert_as_one_by_one(chain, np.array(T), 1e-9, 1e-12)
+
+
 def test_limits_beyond_a_half_turn_decide_the_turn(chain: Chain) -> None:
     shifted = dataclasses.replace(
         chain,

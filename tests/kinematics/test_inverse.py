@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -13,24 +14,25 @@ from app.kinematics.branch import BRANCHES, branch_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.inverse import Solution, inverse
+from app.kinematics.orientation import PlaneOrientation
 
 POSES = 2000
 # [m] and [rad]: double precision over half a metre leaves about 1e-16.
 POSITION, ROTATION = 2e-15, 1e-12
 
 
+Solved = list[tuple[FloatArray, FloatArray, Sequence[Solution]]]
+
+
 @pytest.fixture(scope="module")
-def solved(chain: Chain) -> list[tuple[FloatArray, FloatArray, tuple[Solution, ...]]]:
+def solved(chain: Chain) -> Solved:
     """(q, T, inverse(T)) of joint vectors anywhere inside the limits."""
     rng = np.random.default_rng(2013)
-    result = []
+    result: Solved = []
     for q in rng.uniform(chain.lower, chain.upper, size=(POSES, 5)):
         T = forward(chain, q)
         result.append((q, T, inverse(chain, T)))
     return result
-
-
-Solved = list[tuple[FloatArray, FloatArray, tuple[Solution, ...]]]
 
 
 def errors(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[float, float]:
@@ -42,7 +44,7 @@ def errors(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[float, float]:
 
 
 def assert_all_exact(
-    chain: Chain, T: FloatArray, solutions: tuple[Solution, ...], rotation: float = ROTATION
+    chain: Chain, T: FloatArray, solutions: Sequence[Solution], rotation: float = ROTATION
 ) -> None:
     assert len(solutions) == 4
     for s in solutions:
@@ -51,7 +53,7 @@ def assert_all_exact(
         assert rotation_error <= rotation
 
 
-def contains(solutions: tuple[Solution, ...], q: FloatArray, within: float) -> bool:
+def contains(solutions: Sequence[Solution], q: FloatArray, within: float) -> bool:
     return any(np.abs(np.exp(1j * s.q) - np.exp(1j * q)).max() < within for s in solutions)
 
 
@@ -212,6 +214,48 @@ def test_an_orientation_five_axes_cannot_take_shows_as_its_error(chain: Chain) -
     for s in inverse(chain, T):
         assert (s.position_error, s.rotation_error) == pytest.approx(errors(chain, s.q, T))
         assert max(s.position_error, s.rotation_error) > 1e-3
+
+
+def sideways(theta1: float, pitch: float) -> FloatArray:
+    """A rotation that has x square to the arm's plane at `theta1`."""
+    return so3.rotation_z(theta1 + 0.5 * math.pi) @ so3.rotation_x(pitch)
+
+
+def test_the_roll_is_the_nearest_for_the_pitch(chain: Chain, rng: np.random.Generator) -> None:
+    p = np.array([0.3, 0.15, 0.1])
+    facing = math.atan2(p[1], p[0])
+    rotations = [so3.exp(2.0 * rng.normal(size=3)) for _ in range(50)]
+    rotations += [sideways(facing, pitch) for pitch in (0.0, 0.7, math.pi, -2.0)]
+    rotations += [
+        sideways(facing, 1.0) @ so3.exp(size * rng.normal(size=3)) for size in (1e-9, 1e-4)
+    ]
+    for R in rotations:
+        for s in inverse(chain, se3.from_rotation_translation(R, p)):
+            theta1, theta2, theta3, theta4, theta5 = s.angles
+            asked = PlaneOrientation.of(R).seen_from(theta1)
+            phi = theta2 + theta3 + theta4
+            nearest = asked.best_roll(phi)
+            assert s.rotation_error == pytest.approx(asked.angle(phi, nearest), abs=1e-7)
+            assert math.cos(theta5 - nearest) > 1.0 - 1e-9
+
+
+def test_the_solutions_are_a_sequence_made_once(chain: Chain) -> None:
+    solutions = inverse(chain, chain.M)
+    assert isinstance(solutions, Sequence)
+    assert len(solutions) == len(BRANCHES)
+    assert all(a is b for a, b in zip(solutions, solutions, strict=True))
+    assert solutions[-1] is solutions[3]
+    assert solutions[1:3] == (solutions[1], solutions[2])
+    assert str(solutions) == str(tuple(solutions))
+    with pytest.raises(IndexError):
+        solutions[4]
+
+
+def test_the_hint_decides_between_turns(chain: Chain) -> None:
+    wide = dataclasses.replace(chain, lower=np.full(5, -7.0), upper=np.full(5, 7.0))
+    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0])
+    solution = inverse(wide, forward(wide, q), q_hint=q + 0.1)[0]
+    np.testing.assert_allclose(solution.angles, q, atol=1e-12)
 
 
 def test_a_limit_beyond_pi_moves_the_answer_into_its_turn(chain: Chain) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -16,20 +17,20 @@ from app.kinematics.forward import forward
 from app.kinematics.inverse import Solution, inverse
 from app.kinematics.solver import Solver
 from tests.kinematics.by_subproblems import matched, same, solve
-from tests.kinematics.family import Offsets, member, random_member, random_pose
+from tests.kinematics.family import Offsets, member, random_member, random_offsets, random_pose
 
 MEMBERS, POSES = 200, 10
 # [m] and [rad]; {S} may stand two metres away, at which forward kinematics is no better.
 POSITION, ROTATION = 1e-14, 1e-12
 
-Case = tuple[Chain, Offsets, FloatArray, FloatArray, tuple[Solution, ...]]
+Case = tuple[Chain, Offsets, FloatArray, FloatArray, Sequence[Solution]]
 
 
 @pytest.fixture(scope="module")
 def solved() -> list[Case]:
     """(member, what it is made of, q, T, inverse(T)) of joint vectors anywhere."""
     rng = np.random.default_rng(25)
-    result = []
+    result: list[Case] = []
     for _ in range(MEMBERS):
         chain, offsets = random_member(rng)
         for q in rng.uniform(chain.lower, chain.upper, size=(POSES, 5)):
@@ -145,6 +146,49 @@ def test_tool_upright(pitch: float, rng: np.random.Generator) -> None:
         four = pitch + arm_of(chain).tilt - two - three
         q, T = at_canonical(chain, [0.7, two, three, four, -0.9])
         assert_exact(chain, q, T, 1e-9)
+
+
+def by_axis_1(
+    chain: Chain, u: float, tip: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray] | None:
+    """Joints and pose with the tool point at `u` [m], and the tool `tip` [rad] from upright."""
+    arm = arm_of(chain)
+    phi = float(rng.choice((-1.0, 1.0))) * 0.5 * math.pi + tip + arm.tilt
+    out = u - arm.a - arm.l3 * math.cos(phi)
+    least, most = max(abs(arm.l1 - arm.l2), abs(out)) + 0.005, arm.l1 + arm.l2 - 0.005
+    if least >= most:
+        return None
+    rho = float(rng.uniform(least, most))
+    three = math.acos((rho**2 - arm.l1**2 - arm.l2**2) / (2.0 * arm.l1 * arm.l2))
+    bearing = math.atan2(arm.l2 * math.sin(three), arm.l1 + arm.l2 * math.cos(three))
+    two = math.atan2(math.sqrt(rho**2 - out**2), out) - bearing
+    one, five = rng.uniform(-3.0, 3.0, 2)
+    return at_canonical(chain, [one, two, three, phi - two - three, five])
+
+
+@pytest.mark.parametrize("distance", [10.0**k for k in range(-15, -2)])
+@pytest.mark.parametrize("lateral", [False, True])
+def test_by_axis_1_no_digit_is_lost(
+    lateral: bool, distance: float, rng: np.random.Generator
+) -> None:
+    """Wherever the tool points, upright as well, where its direction tells as little as its place.
+
+    As exact as far from the axis; with {S} near the arm, so that it is not forward kinematics that
+    rounds.
+    """
+    tried = 0
+    while tried < 60:
+        offsets = random_offsets(rng, lateral=lateral)
+        chain = member(offsets, np.eye(4), np.eye(4))
+        sign, scale = float(rng.choice((-1.0, 1.0))), rng.uniform(1.0, 9.0)
+        case = by_axis_1(chain, sign * scale * distance, 10.0 ** rng.uniform(-15.0, 0.0), rng)
+        if case is None:
+            continue
+        tried += 1
+        solutions = inverse(chain, case[1])
+        best = min(solutions, key=lambda s: s.position_error + s.rotation_error)
+        assert best.position_error < 2e-15
+        assert best.rotation_error < 1e-12
 
 
 def test_inside_the_lateral_offset_the_least_miss_is_told(rng: np.random.Generator) -> None:

@@ -15,8 +15,8 @@ from app.kinematics.batch import forward_batch, inverse_batch
 from app.kinematics.branch import BRANCHES, Branch, branch_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
-from app.kinematics.freedoms import tool_pose
 from app.kinematics.projection import project
+from app.kinematics.tool import ToolTarget
 from tests.kinematics.family import Offsets, member, random_member, random_pose
 
 
@@ -69,9 +69,9 @@ def least_rotation(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
     """Least angle [rad] to `T`, its point kept, over a grid of pitches and rolls in the limits."""
     pitches, rolls = np.linspace(-math.pi, math.pi, 721), np.linspace(0.0, 1.0, 97)
     poses = [
-        tool_pose(chain, T[:3, 3], float(pitch), 0.0, shoulder, q0)
-        for shoulder in ("front", "back")
-        for pitch in pitches
+        target.pose(chain, target.facing(chain, branch, float(q0[0])))
+        for branch in BRANCHES[::2]
+        for target in (ToolTarget(T[:3, 3], float(pitch), 0.0) for pitch in pitches)
     ]
     found = inverse_batch(chain, np.array(poses), residuals=True)
     assert found.position_error is not None

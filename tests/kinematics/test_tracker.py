@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from app.geometry.arrays import FloatArray
+from app.kinematics import tracker
 from app.kinematics.branch import Branch, branch_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitch_and_roll
 from app.kinematics.reading import Reading
+from app.kinematics.stance import Stance, nearest_stance
 from app.kinematics.tool import ToolTarget
-from app.kinematics.tracker import HOP, Tracked, Tracking, leap, track
+from app.kinematics.tracker import EFFORT, HOP, Tracked, Tracking, leap, track
 
 READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
 FRONT_UP = Branch("front", "up")
@@ -64,6 +66,22 @@ def dragged(
         tracked = track(chain, q, target, branch=branch, since=since)
         yield target, tracked
         q, since = tracked.best.q, target
+
+
+def arrived(
+    chain: Chain, q: FloatArray, target: ToolTarget, since: ToolTarget, reading: Reading
+) -> Tracked:
+    """Where the calls of so many ticks lead in the end."""
+    tracked = track(chain, q, target, branch=FRONT_UP, reading=reading, since=since)
+    for _ in range(40):
+        if tracked.since is None:
+            break
+        assert tracked.ahead is None
+        tracked = track(
+            chain, tracked.best.q, target, branch=FRONT_UP, reading=reading, since=tracked.since
+        )
+    assert tracked.since is None
+    return tracked
 
 
 @pytest.mark.parametrize("split", SPLITS, ids=str)
@@ -165,7 +183,7 @@ def test_a_fast_drag_ends_where_the_slow_one_does(
         way = rng.normal(size=3)
         way *= rng.uniform(0.05, 0.3) / np.linalg.norm(way)
         target = ToolTarget(since.position + way, since.pitch, since.roll)
-        fast = track(chain, q, target, branch=FRONT_UP, reading=reading, since=since)
+        fast = arrived(chain, q, target, since, reading)
         slow, last = q, since
         for share in np.linspace(0.025, 1.0, 40):
             stop = since.towards(target, float(share))
@@ -196,11 +214,56 @@ def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, reading: R
         assert chain.within_limits(tracked.best.q)
 
 
-def test_a_drag_too_long_for_one_move_goes_on_with_the_next(chain: Chain) -> None:
-    """Half round the base at once: a tick has time for so many hops, the next has more."""
+def test_a_drag_too_long_for_one_call_goes_on_with_the_next(chain: Chain) -> None:
+    """Half round the base at once: a call has time for so many hops, the next has more."""
     since = ToolTarget.at(chain, READY)
     target = ToolTarget(np.array([-0.3, 0.3, 0.2]), since.pitch, since.roll)
-    q = READY
-    for _ in range(4):
-        q = track(chain, q, target, branch=FRONT_UP, since=since).best.q
-    assert np.allclose(forward(chain, q)[:3, 3], target.position, atol=1e-12)
+    first = track(chain, READY, target, branch=FRONT_UP, since=since)
+    assert first.since is not None
+    assert math.dist(first.since.position, target.position) > 0.1
+    for reading in (Reading.POSE, Reading.POSITION):
+        best = arrived(chain, READY, target, since, reading).best
+        assert np.allclose(forward(chain, best.q)[:3, 3], target.position, atol=1e-12)
+
+
+@pytest.mark.parametrize("reading", Reading)
+def test_a_call_looks_for_a_bounded_number_of_poses(
+    chain: Chain, reading: Reading, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However far and however blocked the way is."""
+    sought = 0
+
+    def counted(*args: Any) -> Stance:
+        nonlocal sought
+        sought += 1
+        return nearest_stance(*args)
+
+    monkeypatch.setattr(tracker, "nearest_stance", counted)
+    rng = np.random.default_rng(3)
+    most = 0
+    for q in rng.uniform(chain.lower, chain.upper, size=(40, 5)):
+        since = ToolTarget.at(chain, q)
+        target = ToolTarget(rng.normal(size=3), since.pitch + 3.0 * rng.normal(), 0.0)
+        before = sought
+        track(chain, q, target, branch=branch_of(chain, q), reading=reading, since=since)
+        most = max(most, sought - before)
+    assert EFFORT // 2 < most <= EFFORT + 1
+
+
+def test_a_pitch_that_no_hop_leads_to_turns_nothing_away(chain: Chain) -> None:
+    """With axes 2, 3 and 4 at their ends the pitch ends too, whatever the place would gain."""
+    rng = np.random.default_rng(8)
+    for number in range(300):
+        side = number % 2
+        q = rng.uniform(chain.lower, chain.upper)
+        ends = (chain.lower, chain.upper)[side]
+        q[1:4] = np.where(rng.random(3) < 0.8, ends[1:4], q[1:4])
+        since = ToolTarget.at(chain, q)
+        position = since.position + rng.normal(scale=0.05, size=3)
+        pitch = since.pitch + (1.0 if side else -1.0) * rng.uniform(0.0, 1.5)
+        target = ToolTarget(position, pitch, since.roll)
+        tracked = track(chain, q, target, branch=branch_of(chain, q), reading=Reading.PITCH)
+        pitch, _ = pitch_and_roll(chain, tracked.best.q)
+        was, now = (math.remainder(p - target.pitch, math.tau) for p in (since.pitch, pitch))
+        if np.abs(tracked.best.q - q).max() > HOP or tracked.status is Tracking.HELD:
+            assert abs(now) <= abs(was) + 1e-9

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from app.errors import InputError
-from app.geometry import se3, so3
+from app.geometry import screws, se3, so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.arm import arm_of
 from app.kinematics.badge import Badge, branches
 from app.kinematics.branch import BRANCHES
 from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
+from app.kinematics.forward import forward, jacobian_body
 from app.kinematics.velocity import (
     WELL_CONDITIONED,
     JogFrame,
@@ -23,8 +24,10 @@ from app.kinematics.velocity import (
     limit_distances,
     manipulability,
     singular_values,
+    tool_speed,
     velocity_ellipsoid,
 )
+from tests.kinematics.family import random_member
 
 READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
 DT = 0.01
@@ -235,3 +238,25 @@ def test_twists_are_of_the_tool_point(chain: Chain) -> None:
     assert np.allclose(moved[:3, 3], still[:3, 3], atol=1e-8)
     turned = se3.inverse(still) @ moved
     assert so3.log(turned[:3, :3]) == pytest.approx([0.0, 1e-5, 0.0], abs=1e-8)
+
+
+def test_the_tool_speed_is_that_of_the_jacobian(rng: np.random.Generator) -> None:
+    for _ in range(60):
+        chain, _ = random_member(rng)
+        q, qd = rng.uniform(-2.5, 2.5, 5), rng.normal(size=5)
+        exact = float(np.linalg.norm(jacobian_body(chain, q)[3:] @ qd))
+        told = tool_speed(chain, q, qd)
+        assert told >= exact - 1e-12
+        off = arm_of(chain).off_axis
+        assert told <= exact + 2.0 * off * np.abs(qd).sum() + 1e-12
+        on_axis = chain.with_tool(_on_roll_axis(chain))
+        exact = float(np.linalg.norm(jacobian_body(on_axis, q)[3:] @ qd))
+        assert tool_speed(on_axis, q, qd) == pytest.approx(exact, abs=1e-12)
+
+
+def _on_roll_axis(chain: Chain) -> FloatArray:
+    """The tool frame moved to the foot of its point on the roll axis."""
+    M = np.array(chain.M)
+    axis, point = chain.S[:3, 4], screws.point_on(chain.S[:, 4])
+    M[:3, 3] = point + axis * (axis @ (M[:3, 3] - point))
+    return M

@@ -93,7 +93,7 @@ def test_every_material_is_a_closed_solid(link: str) -> None:
 
 @pytest.mark.parametrize("link", EXTENT)
 def test_normals_are_unit_and_follow_the_faces(link: str) -> None:
-    for mesh in primitives(link).values():
+    for name, mesh in primitives(link).items():
         normals = np.asarray(mesh.vertex_normals)
         np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-4)
         triangles = mesh.triangles
@@ -102,7 +102,9 @@ def test_normals_are_unit_and_follow_the_faces(link: str) -> None:
         broad = size > 1e-9
         for corner in range(3):
             cosine = (normals[mesh.faces[broad, corner]] * area[broad]).sum(axis=1) / size[broad]
-            assert cosine.min() > np.cos(np.radians(50.0))
+            # The edges of paint, 0.2 mm high, are shaded with its face.
+            widest = 95.0 if name == "blue lettering" else 50.0
+            assert cosine.min() > np.cos(np.radians(widest))
 
 
 def test_metal_is_not_a_mirror() -> None:

@@ -51,6 +51,6 @@ def test_forks_have_air_around_what_turns_in_them(name: str) -> None:
         assert parent.min_gap(child, 1.0) >= AIR
 
 
-def test_a_link_moved_by_a_millimetre_is_noticed() -> None:
+def test_a_link_out_of_place_by_two_millimetres_is_noticed() -> None:
     parent, child = pair("axis_3", 0.0)
     assert (parent ^ child.translate((0.0, 2.0, 0.0))).volume() > ROUNDING

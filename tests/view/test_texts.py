@@ -23,6 +23,7 @@ from app.view.texts import (
     degrees,
     headline,
     millimetres,
+    part,
     room,
     sentence,
 )
@@ -95,6 +96,24 @@ def test_a_gap_is_told_with_the_axis_and_the_leap(state: State) -> None:
         "Branches; position gives way by 12 mm."
     )
     assert headline(held) == STATUS[Status.HELD]
+
+
+def test_a_contact_is_told_with_both_parts_and_the_distance(state: State) -> None:
+    parts = ("finger_left_link", "upper_arm_link")
+    blocked = with_findings(state, Finding(Reason.CONTACT, 0.0083, parts=parts))
+    assert blocked.status is Status.BLOCKED
+    assert sentence(blocked) == (
+        "Left finger and upper arm are 8.3 mm apart: the arm stops at 5.0 mm."
+    )
+    assert headline(blocked) == STATUS[Status.BLOCKED]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("pan_link", "shoulder"), ("forearm_link", "forearm"), ("table", "table"), ("cup_2", "cup 2")],
+)
+def test_parts_are_named_as_people_name_them(name: str, said: str) -> None:
+    assert part(name) == said
 
 
 def test_the_nearest_limit_is_told_with_its_axis() -> None:

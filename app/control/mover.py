@@ -1,0 +1,221 @@
+"""The step of one tick: on towards the goal under every limit, and clear of every contact.
+
+No step is taken from which the arm could not stop in time: its whole way to rest has to be clear.
+So what stands in the way is met at rest, and the brake is the same that a stop uses.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from app.collision.clearance import SETTLING, advance, surely_clear
+from app.collision.contact import Contact
+from app.collision.world import LONGEST_WAY, World
+from app.control.arm import Arm
+from app.control.state import Finding, Jogging, Reason, State
+from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.arm import arm_of
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.freedoms import pitched_frame
+from app.kinematics.velocity import JogFrame, jog, tool_speed
+from app.motion.limiter import Limiter, Limits, Motion
+
+PROBE = 0.02
+"""[rad] An arm that waits goes on once the way is clear so far; from less it would only come back
+to where it was."""
+
+PLANNED = 0.9
+"""Of the tool's most, what is planned for: what is planned at one place is faster at the next."""
+
+AHEAD = 0.3
+"""[s] About what it takes to slow down by as much as the tool gains on a bend."""
+
+SLOWINGS = 4
+"""How often a step is planned slower when the tool would be too fast."""
+
+
+class Mover:
+    """Moves one arm. Its methods are pure."""
+
+    def __init__(self, arm: Arm, world: World | None, tool_speed: float) -> None:
+        """``world``: what must not be touched. ``tool_speed``: the most of the tool point [m/s]."""
+        self._arm = arm
+        self._world = world
+        self._tool_speed = PLANNED * tool_speed
+        self._any = Limiter(arm.limits)
+        self._elbow = {elbow: Limiter(_bent(arm, elbow)) for elbow in ("up", "down")}
+
+    def step(self, state: State, dt: float) -> State:
+        """``state`` with its setpoints moved on by ``dt`` [s]."""
+        if dt <= 0.0:
+            return state
+        if not state.under_way:
+            return replace(state, blocked=False) if state.blocked else state
+        fingers = self._fingers(state, dt)
+        if state.blocked and state.motion.at_rest and self._may_go_on(state):
+            state = replace(state, blocked=False)
+        # Once it brakes it comes to rest: at the edge of what is clear it would only quiver.
+        braking = state.blocked and state.jogging is None
+        ahead = self._brake(state, dt) if braking else self._ahead(state, dt)
+        if self._world is None:
+            return replace(state, motion=ahead, gripper_setpoint=fingers)
+        contact = None if braking else self._met(state, ahead, state.gripper_setpoint)
+        if contact is not None:
+            ahead = self._brake(state, dt)
+        hand = None
+        if fingers != state.gripper_setpoint:
+            here = np.append(ahead.q, state.gripper_setpoint)
+            hand = advance(self._world, here, np.append(ahead.q, fingers), dt)
+            fingers = float(hand.x[-1])
+            if self._met(state, ahead, fingers) is not None and not ahead.at_rest:
+                fingers = state.gripper_setpoint
+        stands = state.motion.at_rest and ahead.at_rest and (ahead.q == state.setpoint).all()
+        pinched = bool(stands) and fingers == state.gripper_setpoint and hand is not None
+        after = replace(
+            state,
+            motion=state.motion if stands else ahead,
+            gripper_setpoint=fingers,
+            blocked=braking or contact is not None or pinched,
+        )
+        if braking:
+            return self._updated(after)
+        return _told(after, contact or (None if hand is None else hand.contact))
+
+    def limiter(self, state: State) -> Limiter:
+        """That which keeps the elbow on its branch, unless the motion is from or to another one."""
+        limiter = self._elbow[state.branch.elbow]
+        limits = limiter.limits
+        for q in (state.setpoint, state.goal):
+            if not ((q >= limits.lower) & (q <= limits.upper)).all():
+                return self._any
+        return limiter
+
+    def halt(self, state: State) -> tuple[FloatArray, float, float]:
+        """Where a brake begun now ends (n,) [rad], how far off the tool is then [m], and when."""
+        limiter, motion = self._any, state.motion
+        chain = self._arm.chain_to(state.tool)
+        end = limiter.halt(motion)
+        way = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
+        return frozen(end), way, limiter.time_to_halt(motion)
+
+    def _ahead(self, state: State, dt: float) -> Motion:
+        limiter, motion = self.limiter(state), state.motion
+        if state.halted is not None:
+            return self._any.stop(motion, dt)
+        if state.paused:
+            return limiter.pause(motion, state.goal, dt)
+        chain = self._arm.chain_to(state.tool)
+        share = min(state.speed, self._share(chain, state))
+        for _ in range(SLOWINGS):
+            if state.jogging is not None:
+                rates = share * _rates(chain, motion.q, state.jogging, dt)
+                ahead = self._any.at_rate(motion, rates, dt)
+            else:
+                ahead = limiter.towards(motion, state.goal, dt, share)
+            speed = tool_speed(chain, ahead.q, ahead.qd)
+            if speed <= max(self._tool_speed, tool_speed(chain, motion.q, motion.qd)):
+                break
+            share *= 0.9 * self._tool_speed / speed
+        return ahead
+
+    def _brake(self, state: State, dt: float) -> Motion:
+        """The very way to rest that the tick before found clear."""
+        return self.limiter(state).stop(state.motion, dt)
+
+    def _share(self, chain: Chain, state: State) -> float:
+        """Of the joints' speeds, how much the tool may have on its way to the goal."""
+        way = state.goal - state.setpoint
+        if state.jogging is not None or not way.any():
+            return 1.0
+        fastest = way / float(np.max(np.abs(way) / chain.speed))
+        # Where the arm is by the time it could have slowed down the tool may be farther out.
+        soon = np.clip(state.setpoint + AHEAD * state.motion.qd, chain.lower, chain.upper)
+        speed = max(tool_speed(chain, q, fastest) for q in (state.setpoint, soon))
+        return min(1.0, self._tool_speed / speed) if speed > 0.0 else 1.0
+
+    def _fingers(self, state: State, dt: float) -> float:
+        reach = self._arm.gripper.speed * dt
+        if state.halted is not None or state.paused:
+            return state.gripper_setpoint
+        return state.gripper_setpoint + min(
+            max(state.gripper_goal - state.gripper_setpoint, -reach), reach
+        )
+
+    def _met(self, state: State, ahead: Motion, fingers: float) -> Contact | None:
+        """What is met on the way to ``ahead`` and on to rest; None when nothing is."""
+        assert self._world is not None
+        limiter, x = self.limiter(state), np.append(state.setpoint, fingers)
+        if surely_clear(self._world, x, np.append(limiter.halt(ahead), fingers)):
+            return None
+        way = limiter.way_to_halt(ahead, LONGEST_WAY)
+        for a, b in pairwise([state.setpoint, *way]):
+            step = advance(self._world, np.append(a, fingers), np.append(b, fingers), SETTLING)
+            if step.contact is not None or step.stopped:
+                here = self._world.nearest(x)
+                return here if step.contact is None else _as_far_as(step.contact, here)
+        return None
+
+    def _updated(self, state: State) -> State:
+        """``state`` with the distance of the contact it brakes for as it is now."""
+        assert self._world is not None
+        here = self._world.nearest(np.append(state.setpoint, state.gripper_setpoint))
+        known = any(
+            finding.reason is Reason.CONTACT and (here is None or finding.parts != here.parts)
+            for finding in state.findings
+        )
+        return state if known else _told(state, here)
+
+    def _may_go_on(self, state: State) -> bool:
+        """Whether the way of an arm that waits is clear again, at its beginning."""
+        assert self._world is not None
+        way = state.goal - state.setpoint
+        if not way.any():
+            return True
+        share = min(1.0, PROBE / float(np.abs(way).sum()))
+        x = np.append(state.setpoint, state.gripper_setpoint)
+        towards = np.append(state.setpoint + share * way, state.gripper_setpoint)
+        step = advance(self._world, x, towards, SETTLING)
+        return bool((step.x == towards).all())
+
+
+def _as_far_as(met: Contact, here: Contact | None) -> Contact:
+    """The parts that are about to meet, and how far they are apart where they are now."""
+    return here if here is not None and here.parts == met.parts else met
+
+
+def _bent(arm: Arm, elbow: str) -> Limits:
+    """The limits of ``arm`` with its elbow kept on one side of the stretched arm."""
+    canonical = arm_of(arm.chain)
+    limits = arm.limits
+    sign, shift = canonical.signs[2], canonical.shifts[2]
+    seam = -sign * shift
+    lower, upper = np.array(limits.lower), np.array(limits.upper)
+    if lower[2] < seam < upper[2]:
+        if (elbow == "up") == (sign > 0.0):
+            lower[2] = seam
+        else:
+            upper[2] = seam
+    return replace(limits, lower=lower, upper=upper)
+
+
+def _rates(chain: Chain, q: FloatArray, jogging: Jogging, dt: float) -> FloatArray:
+    """The joint rates (n,) [rad/s] of a jog."""
+    R = forward(chain, q)[:3, :3]
+    pitched = pitched_frame(chain, q)
+    v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
+    omega = jogging.rates[3] * pitched[:, 1] + jogging.rates[4] * pitched[:, 0]
+    return jog(chain, q, np.concatenate((omega, v)), JogFrame.BASE, dt)
+
+
+def _told(state: State, contact: Contact | None) -> State:
+    """``state`` with ``contact`` as its first finding, in place of any before it."""
+    others = tuple(finding for finding in state.findings if finding.reason is not Reason.CONTACT)
+    if contact is None:
+        return state if others == state.findings else replace(state, findings=others)
+    finding = Finding(Reason.CONTACT, contact.distance, parts=contact.parts)
+    return replace(state, findings=(finding, *others))

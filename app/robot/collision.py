@@ -1,0 +1,70 @@
+"""The bodies that a robot description gives its links, as the collision core takes them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.collision.linkage import GROUND, Linkage, Mover
+from app.collision.pairs import pairs_that_meet
+from app.collision.shape import Shape, hull
+from app.collision.world import Part, World
+from app.errors import InputError
+from app.geometry.arrays import FloatArray, frozen
+from app.robot.model import Body, RobotModel
+
+
+def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
+    """The arm's own collision bodies, and sentences for a person on what is left out of them.
+
+    Every shape counts as its convex hull. x is the arm's joint angles (n,) and the driven finger
+    joint [rad]. The world is None when no link has a shape.
+    """
+    movers: list[Mover] = []
+    # Of each body the piece it moves with, and where it is in the frame of that.
+    places: dict[str | None, tuple[int, FloatArray]] = {None: (GROUND, np.eye(4))}
+    parts: list[Part] = []
+    notes: list[str] = []
+    for body in model.bodies:
+        piece, T = places[body.parent]
+        T = T @ body.T_parent_body
+        drive = _drive(model, body)
+        if drive is not None:
+            movers.append(Mover(piece, T, body.axis, *drive))
+            piece, T = len(movers), np.eye(4)
+        places[body.name] = piece, T
+        shapes, refused = _shapes(body)
+        notes += refused
+        if shapes:
+            parts.append(Part(body.name, piece, (frozen(T),) * len(shapes), shapes))
+    if not parts:
+        return None, tuple(notes)
+    bare = [body.name for body in model.bodies if body.visuals and not body.collisions]
+    if bare:
+        notes.append(f"Without collision shapes, and so not checked: {', '.join(bare)}.")
+    linkage = Linkage(movers)
+    chain, gripper = model.arm.chain, model.arm.gripper
+    lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
+    return World(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(notes)
+
+
+def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:
+    """Which entry of x turns the body's joint, with factor and offset; None where none does."""
+    chain = model.arm.chain
+    if body.joint is None:
+        return None
+    if body.joint in chain.names:
+        return chain.names.index(body.joint), 1.0, 0.0
+    if body.joint in model.fingers:
+        return chain.n, *model.fingers[body.joint]
+    return None
+
+
+def _shapes(body: Body) -> tuple[tuple[Shape, ...], list[str]]:
+    shapes: list[Shape] = []
+    refused: list[str] = []
+    for collision in body.collisions:
+        try:
+            shapes.append(hull(collision.mesh.vertices))
+        except InputError as error:
+            refused.append(f"A collision shape of link {body.name!r} is left out: {error}")
+    return tuple(shapes), refused

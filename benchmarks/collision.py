@@ -1,0 +1,202 @@
+"""What collision costs: the nearest pair beside plainer ways to find it, and one control tick.
+
+    python -m benchmarks.collision
+
+Every way measures the same random postures by turns, each posture several times over, and its
+quickest time counts; the tables give the median and the 95th percentile over the postures. Times
+are the thread's own on the processor, so that a busy machine counts little.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+
+from app.collision.clearance import advance
+from app.collision.shape import half_space
+from app.collision.world import World, obstacle
+from app.control.state import Status
+from app.geometry.arrays import FloatArray
+from app.robot.collision import world_of
+from app.robot.model import RobotModel, load
+from app.settings import READY_POSTURE_DEG
+
+TICK = 0.01
+TURNS = 5
+SEED = 450
+TICKS = 400
+
+DRIVES: dict[str, tuple[Sequence[float], Sequence[float]]] = {
+    "through free space": (READY_POSTURE_DEG, (90.0, -40.0, 60.0, 30.0, 90.0)),
+    "into the table": (READY_POSTURE_DEG, (0.0, 7.0, 85.0, 8.0, 0.0)),
+    "low over the table": ((0.0, -37.3, 97.0, -2.0, 0.0), (120.0, -37.3, 97.0, -2.0, 0.0)),
+    "folding up": (READY_POSTURE_DEG, (0.0, -124.0, 127.0, 107.0, 0.0)),
+}
+"""Start and goal of each, joint angles [deg]."""
+
+
+def approach(x: FloatArray, end: FloatArray, speed: FloatArray, dt: float) -> FloatArray:
+    """``x`` (k,) a step of ``dt`` [s] on, straight towards ``end`` at the greatest speed."""
+    needed = float(np.max(np.abs(end - x) / speed))
+    return end if needed <= dt else np.asarray(x + (end - x) * (dt / needed))
+
+
+class Row(NamedTuple):
+    """One line of a table: microseconds, and what there is to say."""
+
+    name: str
+    median: float
+    most: float
+    remark: str
+
+
+def world_on_table(model: RobotModel) -> World:
+    """The arm's bodies above the table."""
+    world, _ = world_of(model)
+    if world is None:
+        raise SystemExit("The robot description has no collision shapes.")
+    return world.with_obstacles([obstacle("table", np.eye(4), half_space())])
+
+
+class RawMeshes:
+    """The visible triangles of each link, without hulls, for the pairs of a world but the table."""
+
+    def __init__(self, model: RobotModel, world: World) -> None:
+        self._world = world
+        bodies = {body.name: body for body in model.bodies}
+        self._meshes = {}
+        for number, part in enumerate(world.parts):
+            if part.name in bodies:
+                meshes = [visual.mesh for visual in bodies[part.name].visuals]
+                self._meshes[number] = _bvh(meshes)
+        self._pairs = [(a, b) for a, b in world.pairs if a in self._meshes and b in self._meshes]
+        self._request = coal.DistanceRequest()
+
+    def nearest(self, x: FloatArray) -> float:
+        """How near the links are to each other [m]."""
+        poses = self._world.linkage.poses(x)
+        placed = {}
+        for number in self._meshes:
+            part = self._world.parts[number]
+            T = poses[part.mover] @ part.T_mover_shape[0]
+            placed[number] = coal.Transform3s(T[:3, :3], T[:3, 3])
+        nearest: float = min(
+            coal.distance(
+                self._meshes[a],
+                placed[a],
+                self._meshes[b],
+                placed[b],
+                self._request,
+                coal.DistanceResult(),
+            )
+            for a, b in self._pairs
+        )
+        return nearest
+
+
+def _bvh(meshes: Sequence[Any]) -> Any:
+    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    count = 0
+    for mesh in meshes:
+        points.extend(list(np.asarray(mesh.vertices)))
+        faces.extend([coal.Triangle(*face) for face in (mesh.faces + count).tolist()])
+        count += len(mesh.vertices)
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), count)
+    model.addSubModel(points, faces)
+    model.endModel()
+    return model
+
+
+def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
+    """The least of several times [us]."""
+    best = float("inf")
+    for _ in range(turns):
+        start = time.thread_time()
+        work()
+        best = min(best, time.thread_time() - start)
+    return 1e6 * best
+
+
+def nearest_rows(model: RobotModel, world: World, postures: FloatArray) -> list[Row]:
+    """The ways to find the nearest pair."""
+    every = np.arange(len(world.first))
+    raw = RawMeshes(model, world)
+    ways: dict[str, tuple[Callable[[FloatArray], object], int]] = {
+        "katana450 `nearest`": (world.nearest, TURNS),
+        "coal, the same hulls, every pair": (lambda x: world.at(x).distances(every).min(), TURNS),
+        "coal, the visible meshes, without the table": (raw.nearest, 1),
+    }
+    times: dict[str, list[float]] = {name: [] for name in ways}
+    for x in postures:
+        for name, (way, turns) in ways.items():
+            times[name].append(quickest(lambda way=way, x=x: way(x), turns))  # type: ignore[misc]
+    remarks = (
+        f"{len(world.part_of)} bodies, {len(world.first)} pairs",
+        "",
+        f"{len(raw._pairs)} pairs of links",
+    )
+    return [
+        Row(name, float(np.median(took)), float(np.percentile(took, 95.0)), remark)
+        for (name, took), remark in zip(times.items(), remarks, strict=True)
+    ]
+
+
+def tick_rows(model: RobotModel, world: World) -> list[Row]:
+    """What one tick of each drive takes."""
+    rows = []
+    speed = np.append(model.arm.chain.speed, model.arm.gripper.speed)
+    for name, ends in DRIVES.items():
+        x, goal = (np.append(np.radians(end), 0.0) for end in ends)
+        took = []
+        remark = Status.OK
+        for _ in range(TICKS):
+            towards = approach(x, goal, speed, TICK)
+            if (towards == x).all():
+                break
+            took.append(quickest(lambda x=x, end=towards: advance(world, x, end, TICK)))  # type: ignore[misc]
+            step = advance(world, x, towards, TICK)
+            x = step.x
+            if step.stopped:
+                remark = Status.BLOCKED
+                break
+        rows.append(
+            Row(name, float(np.median(took)), float(np.percentile(took, 95.0)), remark.value)
+        )
+    return rows
+
+
+def table(heading: str, rows: Sequence[Row]) -> str:
+    """The rows in Markdown."""
+    lines = [f"| {heading} | median, µs | 95 %, µs | |", "|---|--:|--:|---|"]
+    lines += [f"| {r.name} | {r.median:.0f} | {r.most:.0f} | {r.remark} |" for r in rows]
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure and print both tables."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.collision", description=__doc__)
+    parser.add_argument("--postures", type=int, default=100, help="how many (default: 100)")
+    count = parser.parse_args(arguments).postures
+    model = load()
+    start = time.perf_counter()
+    world = world_on_table(model)
+    built = time.perf_counter() - start
+    chain, gripper = model.arm.chain, model.arm.gripper
+    lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
+    postures = np.random.default_rng(SEED).uniform(lower, upper, (count, len(lower)))
+    print(f"{count} postures of seed {SEED}; load average {os.getloadavg()[0]:.1f}.")
+    print(f"Bodies read and pairs found in {built:.2f} s.\n")
+    print(table("the nearest pair", nearest_rows(model, world, postures)))
+    print()
+    print(table("one tick of a drive", tick_rows(model, world)))
+
+
+if __name__ == "__main__":
+    main()

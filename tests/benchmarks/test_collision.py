@@ -1,0 +1,36 @@
+"""The collision benchmark measures what it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.robot.model import RobotModel
+from benchmarks.collision import DRIVES, RawMeshes, main, tick_rows, world_on_table
+
+
+def test_it_prints_both_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--postures", "3"])
+    printed = capsys.readouterr().out
+    assert "the nearest pair" in printed
+    for drive in DRIVES:
+        assert drive in printed
+
+
+def test_raw_meshes_are_no_nearer_than_the_hulls(model: RobotModel) -> None:
+    world = world_on_table(model)
+    raw = RawMeshes(model, world)
+    for x in np.random.default_rng(1).uniform(-0.5, 0.5, (5, 6)):
+        contact = world.nearest(x)
+        assert contact is not None
+        assert raw.nearest(x) >= contact.distance - 1e-6
+
+
+def test_drives_end_as_their_names_say(model: RobotModel) -> None:
+    rows = {row.name: row.remark for row in tick_rows(model, world_on_table(model))}
+    assert rows == {
+        "through free space": "ok",
+        "into the table": "blocked",
+        "low over the table": "ok",
+        "folding up": "blocked",
+    }

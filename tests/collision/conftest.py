@@ -1,0 +1,40 @@
+"""The robot's own collision world, alone and on its table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.collision.shape import half_space
+from app.collision.world import World, obstacle
+from app.geometry.arrays import FloatArray
+from app.robot.collision import world_of
+from app.robot.model import RobotModel
+
+
+@pytest.fixture(scope="session")
+def bare(model: RobotModel) -> World:
+    """The arm without anything round it."""
+    world, notes = world_of(model)
+    assert world is not None
+    assert notes == ()
+    return world
+
+
+@pytest.fixture(scope="session")
+def world(bare: World) -> World:
+    """The arm on its table."""
+    return bare.with_obstacles([obstacle("table", np.eye(4), half_space())])
+
+
+@pytest.fixture(scope="session")
+def limits(model: RobotModel) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper limits (6,) [rad] of the joints and the fingers."""
+    chain, gripper = model.arm.chain, model.arm.gripper
+    return np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
+
+
+@pytest.fixture
+def postures(limits: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """(200, 6) random ones [rad]."""
+    return np.random.default_rng(7).uniform(*limits, (200, 6))

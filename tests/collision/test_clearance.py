@@ -1,0 +1,156 @@
+"""How far a step goes: all the way where there is room, never too near, always away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
+from app.collision.linkage import Linkage, Mover
+from app.collision.shape import box, cylinder
+from app.collision.world import Part, World, obstacle
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.robot.model import RobotModel
+
+TICK = 0.01
+SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks together
+
+
+def approach(x: FloatArray, end: FloatArray, speed: FloatArray, dt: float) -> FloatArray:
+    """``x`` (k,) a step of ``dt`` [s] on, straight towards ``end`` at the greatest speed."""
+    needed = float(np.max(np.abs(end - x) / speed))
+    return end if needed <= dt else np.asarray(x + (end - x) * (dt / needed))
+
+
+def at(x: float, y: float, z: float) -> FloatArray:
+    return se3.from_rotation_translation(np.eye(3), (x, y, z))
+
+
+@pytest.fixture(scope="module")
+def bar() -> World:
+    """A bar 1 m long that turns about z, a wall a quarter turn away, and a reed half way."""
+    linkage = Linkage([Mover(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
+    parts = [
+        Part("bar", 1, (at(0.6, 0.0, 0.0),), (box((1.0, 0.02, 0.02)),)),
+        obstacle("wall", at(0.0, 1.0, 0.0), box((0.02, 1.0, 1.0))),
+        obstacle("reed", at(0.6, -0.6, 0.0), cylinder(0.0005, 1.0)),
+    ]
+    return World(linkage, parts, [(0, 1), (0, 2)])
+
+
+def turned(bar: World, start: float, goal: float, speed: float) -> Iterator[FloatArray]:
+    """The postures of the bar, tick by tick, until it rests."""
+    x, end = np.array([start]), np.array([goal])
+    for _ in range(2000):
+        step = advance(bar, x, approach(x, end, np.array([speed]), TICK), TICK)
+        if (step.x == x).all():
+            return
+        x = step.x
+        yield x
+    raise AssertionError("the bar never came to rest")
+
+
+@pytest.mark.parametrize("speed", [0.2, 2.0, 20.0])
+def test_the_bar_stops_before_the_wall(bar: World, speed: float) -> None:
+    *_, last = turned(bar, 0.0, 3.0, speed)
+    contact = bar.nearest(last)
+    assert contact is not None
+    assert contact.parts == ("bar", "wall")
+    assert STOP - SLIGHTLY <= contact.distance < STOP + 10.0 * CREEP / (TICK / SETTLING)
+
+
+def test_it_slows_down_on_the_way(bar: World) -> None:
+    way = [0.0, *(float(x[0]) for x in turned(bar, 0.0, 3.0, 2.0))]
+    steps = np.diff(way)
+    assert steps.max() == pytest.approx(2.0 * TICK)
+    slowing = steps[steps < 0.99 * steps.max()]
+    assert len(slowing) > 10
+    assert (np.diff(slowing) < 0.0).all()
+
+
+@pytest.mark.parametrize("speed", [2.0, 8.0, 20.0])
+def test_it_does_not_jump_over_a_reed_thinner_than_its_step(bar: World, speed: float) -> None:
+    *_, last = turned(bar, 0.0, -1.5, speed)
+    assert last[0] > -np.pi / 4
+    contact = bar.nearest(last)
+    assert contact is not None
+    assert contact.parts == ("bar", "reed")
+    assert contact.distance >= STOP - SLIGHTLY
+
+
+def test_away_it_goes_as_fast_as_it_can(bar: World) -> None:
+    *_, last = turned(bar, 0.0, 3.0, 2.0)
+    step = advance(bar, last, last - 2.0 * TICK, TICK)
+    assert step.contact is None
+    assert (step.x == last - 2.0 * TICK).all()
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.002, 0.008])
+def test_from_too_near_it_goes_away_and_no_nearer(bar: World, depth: float) -> None:
+    """Where the wall was put onto the bar, or a driver went too far."""
+    *_, last = turned(bar, 0.0, 3.0, 2.0)
+    x = last + (STOP - 0.004 + depth) / 1.1
+    contact = bar.nearest(x)
+    assert contact is not None
+    assert contact.distance < STOP
+    inwards = advance(bar, x, x + 0.01, TICK)
+    assert inwards.stopped
+    assert (inwards.x == x).all()
+    assert inwards.contact is not None
+    assert inwards.contact.parts == ("bar", "wall")
+    for _ in range(20):
+        outwards = advance(bar, x, x - 2.0 * TICK, TICK)
+        assert not outwards.stopped
+        x = outwards.x
+    away = bar.nearest(x)
+    assert away is not None
+    assert away.distance > 2.0 * STOP
+
+
+def test_a_step_with_room_is_done_to_the_bit(bar: World) -> None:
+    x, towards = np.array([0.1]), np.array([0.1 + 1e-3])
+    step = advance(bar, x, towards, TICK)
+    assert step.x is towards
+    assert step.contact is None
+    assert not step.stopped
+    assert advance(bar, x, np.array([0.1]), TICK).x is x
+
+
+def test_the_same_step_is_the_same_to_the_bit(world: World, postures: FloatArray) -> None:
+    for x, towards in zip(postures[:50], postures[50:100], strict=True):
+        end = x + 0.02 * np.sign(towards - x)
+        one, two = advance(world, x, end, TICK), advance(world, x, end, TICK)
+        assert one.x.tobytes() == two.x.tobytes()
+
+
+def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
+    model: RobotModel, world: World, limits: tuple[FloatArray, FloatArray]
+) -> None:
+    """From goal to goal, most of them in the table or in the arm itself; also between the ticks."""
+    rng = np.random.default_rng(10)
+    speed = np.append(model.arm.chain.speed, model.arm.gripper.speed)
+    x = np.append(np.radians((0.0, -68.0, 85.0, 8.0, 0.0)), 0.0)
+    stops = 0
+    for goal in rng.uniform(*limits, (25, 6)):
+        for _ in range(250):
+            step = advance(world, x, approach(x, goal, speed, TICK), TICK)
+            if step.contact is not None:
+                middle = world.nearest(0.5 * (x + step.x))
+                end = world.nearest(step.x)
+                assert middle is not None
+                assert end is not None
+                assert middle.distance > 0.5 * STOP
+                assert end.distance >= STOP - SLIGHTLY
+            x = step.x
+            if step.stopped:
+                stops += 1
+                break
+    assert stops >= 5
+
+
+def test_a_graze_is_thinner_than_any_part(world: World) -> None:
+    thinnest = min(2.0 * float(half.min()) for half in world.box_half)
+    assert thinnest > GRAZE

@@ -1,0 +1,39 @@
+"""Where the moving pieces are, against another reader of the same file."""
+
+from __future__ import annotations
+
+import numpy as np
+import yourdfpy
+
+from app.collision.linkage import GROUND
+from app.collision.world import World
+from app.geometry.arrays import FloatArray
+from app.robot.model import RobotModel
+from robot_description import URDF_PATH
+
+
+def test_every_part_is_where_the_description_has_it(
+    model: RobotModel, bare: World, postures: FloatArray
+) -> None:
+    robot = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
+    for x in postures[:20]:
+        robot.update_cfg(model.joint_angles(x[:-1], float(x[-1])))
+        T = bare.linkage.poses(x)
+        for part in bare.parts:
+            expected = robot.get_transform(part.name, "base_link")
+            np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
+
+
+def test_what_lies_between_two_pieces(bare: World) -> None:
+    mover = {part.name: part.mover for part in bare.parts}
+
+    def between(a: str, b: str) -> frozenset[int]:
+        return bare.linkage.variables_between(mover[a], mover[b])
+
+    assert mover["base_link"] == mover["arm_base_link"] == GROUND
+    assert between("base_link", "arm_base_link") == frozenset()
+    assert between("pan_link", "wrist_link") == {1, 2, 3}
+    assert between("wrist_link", "pan_link") == {1, 2, 3}
+    assert between("roll_link", "gripper_link") == frozenset()
+    # One slider drives both fingers.
+    assert between("finger_left_link", "finger_right_link") == {5}

@@ -1,0 +1,85 @@
+"""Convex shapes against sizes known beforehand."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from app.collision.linkage import Linkage, Mover
+from app.collision.shape import Shape, box, cylinder, half_space, hull
+from app.collision.world import Part, World, obstacle
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+
+CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
+
+
+def apart(one: Shape, other: Shape, p: tuple[float, float, float]) -> float:
+    """The distance between two shapes, the second at ``p`` [m] on a joint that stays at zero."""
+    T = se3.from_rotation_translation(np.eye(3), p)
+    linkage = Linkage([Mover(0, T, np.array([0.0, 0.0, 1.0]), 0)])
+    parts = [obstacle("one", np.eye(4), one), Part("other", 1, (np.eye(4),), (other,))]
+    contact = World(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
+    assert contact is not None
+    assert contact.parts == ("one", "other")
+    assert np.linalg.norm(contact.normal) == pytest.approx(1.0)
+    np.testing.assert_allclose(
+        contact.points[1] - contact.points[0], contact.distance * contact.normal, atol=1e-6
+    )
+    return contact.distance
+
+
+@pytest.mark.parametrize("cube", [hull(CUBE), box((1.0, 1.0, 1.0))], ids=["hull", "box"])
+@pytest.mark.parametrize(
+    ("other", "p", "distance"),
+    [
+        (box((1.0, 1.0, 1.0)), (1.3, 0.0, 0.0), 0.3),
+        (box((1.0, 1.0, 1.0)), (1.3, 1.4, 0.0), 0.5),
+        (cylinder(0.25, 2.0), (1.0, 0.0, 0.0), 0.25),
+        (cylinder(0.25, 2.0), (0.0, 0.0, 1.7), 0.2),
+        (hull(CUBE + 1.0), (0.0, 0.0, 0.1), 0.1),
+    ],
+)
+def test_distances(
+    cube: Shape, other: Shape, p: tuple[float, float, float], distance: float
+) -> None:
+    assert apart(cube, other, p) == pytest.approx(distance, abs=1e-6)
+
+
+def test_shapes_in_each_other_have_a_depth() -> None:
+    assert apart(hull(CUBE), hull(CUBE), (0.9, 0.0, 0.0)) == pytest.approx(-0.1, abs=1e-5)
+
+
+@pytest.mark.parametrize("side", [0.0, 0.7, -2.0])
+def test_a_half_space_is_flat_and_endless(side: float) -> None:
+    assert apart(half_space(), hull(CUBE), (side, -side, 0.6)) == pytest.approx(0.1, abs=1e-9)
+    assert apart(half_space(), hull(CUBE), (side, 0.0, 0.45)) == pytest.approx(-0.05, abs=1e-6)
+
+
+def test_shapes_are_where_they_are_put() -> None:
+    T = se3.from_rotation_translation(so3.rotation_z(np.pi / 4), (2.0, 0.0, 0.0))
+    linkage = Linkage([Mover(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
+    parts = [Part("turning", 1, (np.eye(4),), (hull(CUBE),)), obstacle("turned", T, hull(CUBE))]
+    contact = World(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
+    assert contact is not None
+    assert contact.distance == pytest.approx(1.5 - np.sqrt(0.5), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [CUBE[:, :2] @ np.eye(2, 3), CUBE[:3], np.zeros((9, 3)), np.full((4, 3), np.nan)],
+    ids=["flat", "three", "one", "nan"],
+)
+def test_points_without_a_volume_are_refused(points: FloatArray) -> None:
+    with pytest.raises(InputError):
+        hull(points)
+
+
+def test_sizes_must_be_above_zero() -> None:
+    with pytest.raises(InputError, match="above 0"):
+        box((1.0, 0.0, 1.0))
+    with pytest.raises(InputError, match="above 0"):
+        cylinder(-0.1, 1.0)

@@ -1,0 +1,85 @@
+"""The nearest pair, and the bounds that spare most pairs a closer look."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.collision.world import World
+from app.geometry.arrays import FloatArray
+
+
+def test_the_nearest_pair_is_the_nearest_of_all(world: World, postures: FloatArray) -> None:
+    for x in postures[:60]:
+        placed = world.at(x)
+        every = placed.distances(np.arange(len(world.first)))
+        contact = world.nearest(x)
+        assert contact is not None
+        assert contact.distance == every.min()
+        one, other = (
+            world.parts[world.part_of[side[every.argmin()]]].name
+            for side in (world.first, world.second)
+        )
+        assert contact.parts == (one, other)
+
+
+def test_points_and_normal_tell_the_distance(world: World, postures: FloatArray) -> None:
+    for x in postures[:60]:
+        contact = world.nearest(x)
+        assert contact is not None
+        way = contact.points[1] - contact.points[0]
+        np.testing.assert_allclose(way, contact.distance * contact.normal, atol=2e-6)
+
+
+def test_no_pair_is_nearer_than_its_bound(world: World, postures: FloatArray) -> None:
+    for x in postures[:30]:
+        placed = world.at(x)
+        pairs, bounds = placed.nearer_than(np.inf)
+        assert len(pairs) == len(world.first)
+        # The ball of the table is flat to a micrometre.
+        assert (placed.distances(pairs) >= bounds - 2e-6).all()
+
+
+def test_pairs_not_looked_at_are_far(world: World, postures: FloatArray) -> None:
+    limit = np.linspace(0.0, 0.2, len(world.first))
+    for x in postures[:30]:
+        placed = world.at(x)
+        left = np.setdiff1d(np.arange(len(world.first)), placed.nearer_than(limit)[0])
+        assert (placed.distances(left) >= limit[left] - 2e-6).all()
+
+
+def test_no_distance_changes_more_than_the_bodies_travel(
+    world: World, postures: FloatArray
+) -> None:
+    rng = np.random.default_rng(8)
+    tightest = 0.0
+    for x in postures[:60]:
+        step = rng.uniform(-1.0, 1.0, 6) * 0.02 * (rng.random(6) < 0.5)
+        here, there = world.at(x), world.at(x + step)
+        travel = world.travel(here, x, x + step)
+        pairs = np.arange(len(world.first))
+        change = np.abs(there.distances(pairs) - here.distances(pairs))
+        apart = here.distances(pairs) > 0.0
+        assert (change <= travel + 2e-6)[apart].all()
+        tightest = max(tightest, float((change / np.maximum(travel, 1e-6))[apart].max()))
+    # The bound is no mere formality.
+    assert tightest > 0.8
+
+
+def test_a_joint_that_carries_both_bodies_brings_none_nearer(world: World) -> None:
+    x = np.zeros(6)
+    placed = world.at(x)
+    travel = world.travel(placed, x, np.array([0.02, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    mover = world.mover_of
+    both = (mover[world.first] > 0) & (mover[world.second] > 0)
+    assert (travel[both] == 0.0).all()
+    assert (travel[~both] > 0.0).all()
+
+
+def test_a_world_without_pairs_has_no_nearest(bare: World) -> None:
+    assert World(bare.linkage, bare.parts, []).nearest(np.zeros(6)) is None
+
+
+def test_obstacles_meet_all_that_moves(world: World, bare: World) -> None:
+    table = len(bare.parts)
+    met = {a for a, b in world.pairs if b == table}
+    assert met == {number for number, part in enumerate(bare.parts) if part.mover > 0}

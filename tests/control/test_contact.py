@@ -1,0 +1,207 @@
+"""Driven at full speed into table, itself and a cup, the arm stops, says so and goes away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from app.collision.clearance import STOP
+from app.collision.shape import cylinder, half_space
+from app.collision.world import World, obstacle
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.state import JointTarget, Reason, State, Status
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.robot.collision import world_of
+from app.robot.model import RobotModel
+
+TICK = 0.01
+SLIGHTLY = 2e-5  # m
+LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
+"""The fingers a hand's breadth above the table."""
+
+
+@pytest.fixture(scope="module")
+def world(model: RobotModel) -> World:
+    """The arm on its table, a cup before it."""
+    found, _ = world_of(model)
+    assert found is not None
+    cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
+    cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
+    return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
+
+
+@pytest.fixture
+def guarded(session: Session, world: World) -> Session:
+    return Session(session.arm, session.ready, world)
+
+
+def clearance(world: World, state: State) -> float:
+    contact = world.nearest(np.append(state.setpoint, state.gripper_setpoint))
+    assert contact is not None
+    return contact.distance
+
+
+def run(
+    session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 500
+) -> tuple[State, list[float]]:
+    """Until the arm rests: its last state, and how near anything was after each tick."""
+    commands = list(commands)
+    near = []
+    for _ in range(ticks):
+        state = session.step(state, commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        if session.world is not None:
+            near.append(clearance(session.world, state))
+        commands = []
+        if not state.moving:
+            return state, near
+    raise AssertionError("the arm never came to rest")
+
+
+def standing(session: Session, q: FloatArray, gripper: float = 0.0) -> State:
+    return session.begin(q, gripper, 0.0)
+
+
+INTO: dict[str, tuple[FloatArray, list[cmd.Command], set[str]]] = {
+    "table": (LOW, [cmd.SetJoint(1, 0.13)], {"table"}),
+    "base": (
+        np.radians((0.0, -120.0, 100.0, 0.0, 0.0)),
+        [cmd.SetJoint(3, np.radians(107.0)), cmd.SetJoint(2, np.radians(127.0))],
+        {"base_link", "arm_base_link", "pan_link", "upper_arm_link"},
+    ),
+    "cup": (LOW, [cmd.SetJoint(0, -0.6)], {"cup"}),
+}
+
+
+@pytest.mark.parametrize("what", INTO)
+def test_at_full_speed_it_stops_before(guarded: Session, what: str) -> None:
+    start, commands, met = INTO[what]
+    state, near = run(guarded, standing(guarded, start), commands)
+    assert min(near) >= STOP - SLIGHTLY
+    assert state.blocked
+    assert state.status is Status.BLOCKED
+    assert state.under_way
+    finding = state.findings[0]
+    assert finding.reason is Reason.CONTACT
+    assert finding.parts is not None
+    assert met & set(finding.parts)
+    assert finding.amount == pytest.approx(near[-1], abs=1e-9)
+    assert STOP - SLIGHTLY <= finding.amount < 2.0 * STOP
+
+
+@pytest.mark.parametrize("what", INTO)
+def test_without_a_world_it_would_have_gone_in(session: Session, world: World, what: str) -> None:
+    start, commands, _ = INTO[what]
+    state = session.step(standing(session, start), commands, TICK)
+    deepest = clearance(world, state)
+    while state.moving:
+        state = session.step(state, [], state.t + TICK)
+        deepest = min(deepest, clearance(world, state))
+    assert deepest < 0.0
+
+
+@pytest.mark.parametrize("what", INTO)
+def test_it_goes_away_at_full_speed(guarded: Session, what: str) -> None:
+    start, commands, _ = INTO[what]
+    blocked, _ = run(guarded, standing(guarded, start), commands)
+    back = cmd.SetJoints(start)
+    state, near = run(guarded, blocked, [back])
+    assert (state.setpoint == start).all()
+    assert state.findings == ()
+    free, _ = run(Session(guarded.arm, guarded.ready), standing(guarded, blocked.setpoint), [back])
+    assert state.t - blocked.t <= free.t + 2.0 * TICK
+    assert min(near) >= STOP - SLIGHTLY
+
+
+def test_an_arm_that_waits_keeps_still_to_the_bit(guarded: Session) -> None:
+    start, commands, _ = INTO["table"]
+    blocked, _ = run(guarded, standing(guarded, start), commands)
+    state = blocked
+    for _ in range(50):
+        state = guarded.step(state, [], state.t + TICK)
+        assert state.setpoint is blocked.setpoint
+        assert state.findings == blocked.findings
+
+
+def test_an_arm_that_waits_goes_on_once_the_way_is_free(guarded: Session, world: World) -> None:
+    start, commands, _ = INTO["cup"]
+    blocked, _ = run(guarded, standing(guarded, start), commands)
+    cup = len(world.parts) - 1
+    pairs = [pair for pair in world.pairs if cup not in pair]
+    without_cup = World(world.linkage, world.parts[:-1], pairs)
+    freed = Session(guarded.arm, guarded.ready, without_cup)
+    state, _ = run(freed, blocked, [])
+    assert (state.setpoint == state.goal).all()
+    assert state.status is Status.OK
+
+
+def test_letting_go_before_a_contact_gives_the_rest_of_the_way_up(guarded: Session) -> None:
+    state = standing(guarded, LOW)
+    blocked, _ = run(guarded, state, [cmd.MoveTool(np.array([0.40, 0.23, -0.35]))])
+    assert blocked.blocked
+    let_go = guarded.step(blocked, [cmd.Settle()], blocked.t + TICK)
+    assert (let_go.goal == blocked.setpoint).all()
+    assert isinstance(let_go.target, JointTarget)
+    assert not let_go.under_way
+    assert let_go.findings[0].reason is Reason.CONTACT
+
+
+def test_reset_forgets_the_contact(guarded: Session) -> None:
+    start, commands, _ = INTO["table"]
+    blocked, _ = run(guarded, standing(guarded, start), commands)
+    reset = guarded.step(blocked, [cmd.Reset()], blocked.t + TICK)
+    assert reset.findings == ()
+    assert reset.status is Status.OK
+
+
+def test_fingers_do_not_open_into_a_cup_and_the_arm_goes_on(guarded: Session) -> None:
+    """The tool beside the cup, closed; then both are told to move."""
+    start, commands, _ = INTO["cup"]
+    blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), commands)
+    at_cup = guarded.step(blocked, [cmd.Reset()], blocked.t + TICK)
+    state, near = run(guarded, at_cup, [cmd.SetGripper(0.30)])
+    assert state.blocked
+    assert state.gripper_setpoint < 0.30
+    assert min(near) >= STOP - SLIGHTLY
+    assert "cup" in (state.findings[0].parts or ())
+    state, near = run(guarded, state, [cmd.SetJoint(0, 0.5)])
+    assert state.setpoint[0] == 0.5
+    assert state.gripper_setpoint == 0.30
+    assert min(near) >= STOP - SLIGHTLY
+
+
+def test_an_arm_found_in_a_contact_may_leave_it(guarded: Session, world: World) -> None:
+    """As when a cup is put where the arm already is."""
+    inside = np.radians((-13.0, -40.0, 95.0, -20.0, 0.0))
+    state = standing(guarded, inside)
+    depth = clearance(world, state)
+    assert depth < 0.0
+    deeper, near = run(guarded, state, [cmd.SetJoint(1, 0.0)])
+    assert deeper.blocked
+    assert min(near) >= depth - SLIGHTLY
+    state, near = run(guarded, deeper, [cmd.SetJoint(1, np.radians(-70.0))])
+    assert state.status is Status.OK
+    assert near[-1] > STOP
+
+
+def test_guarded_steps_are_a_fold_that_can_be_replayed_to_the_bit(guarded: Session) -> None:
+    start, commands, _ = INTO["base"]
+    ends = [run(guarded, standing(guarded, start), commands)[0] for _ in range(2)]
+    assert ends[0].setpoint.tobytes() == ends[1].setpoint.tobytes()
+    assert ends[0].findings == ends[1].findings
+
+
+def test_far_from_everything_a_world_changes_nothing(session: Session, guarded: Session) -> None:
+    commands: list[cmd.Command] = [cmd.SetJoint(0, 1.0), cmd.SetGripper(0.2)]
+    free, kept = (each.begin(each.ready, 0.0, 0.0) for each in (session, guarded))
+    for _ in range(80):
+        free = session.step(free, commands, free.t + TICK)
+        kept = guarded.step(kept, commands, kept.t + TICK)
+        assert (free.setpoint == kept.setpoint).all()
+        assert free.gripper_setpoint == kept.gripper_setpoint
+        commands = []
+    assert kept.findings == ()

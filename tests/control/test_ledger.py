@@ -1,0 +1,77 @@
+"""No silent stop: whatever holds the arm back is an entry, once, and has a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.ledger import Entry, news
+from app.control.session import Session
+from app.control.state import Finding, Reason, State, Status
+from app.view.texts import REASONS, STATUS, sentence
+
+TICK = 0.01
+
+
+def run(
+    session: Session, state: State, commands: Sequence[cmd.Command], ticks: int
+) -> tuple[State, list[Entry]]:
+    entries: list[Entry] = []
+    for number in range(ticks):
+        before = state
+        state = session.step(state, commands if number == 0 else [], state.t + TICK)
+        entries += news(before, state)
+    return state, entries
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+FAULTS: dict[Reason, list[cmd.Command]] = {
+    Reason.AXIS_LIMIT: [cmd.SetJoint(0, 4.0)],
+    Reason.GRIPPER_LIMIT: [cmd.SetGripper(2.0)],
+    Reason.OUT_OF_REACH: [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))],
+    Reason.HALTED: [cmd.Stop()],
+    Reason.PAUSED: [cmd.Pause()],
+}
+
+
+@pytest.mark.parametrize("reason", FAULTS)
+def test_what_holds_the_arm_back_is_told_once(
+    session: Session, state: State, reason: Reason
+) -> None:
+    state, entries = run(session, state, FAULTS[reason], 40)
+    came = [entry for entry in entries if entry.began and entry.finding.reason is reason]
+    assert len(came) == 1
+    assert 0.0 < came[0].t <= state.t
+    assert sentence(state)
+
+
+def test_what_is_over_is_told_too(session: Session, state: State) -> None:
+    halted, _ = run(session, state, [cmd.Stop()], 3)
+    released, entries = run(session, halted, [cmd.Release()], 3)
+    assert [(e.finding.reason, e.began) for e in entries] == [(Reason.HALTED, False)]
+    assert released.findings == ()
+
+
+def test_a_number_that_changes_is_no_news(session: Session, state: State) -> None:
+    far, _ = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))], 40)
+    farther, more = run(session, far, [cmd.MoveTool(np.array([0.95, 0.0, 0.1]))], 40)
+    assert farther.findings[0].reason is Reason.OUT_OF_REACH
+    assert [entry for entry in more if entry.finding.reason is Reason.OUT_OF_REACH] == []
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_every_reason_has_its_sentence(reason: Reason) -> None:
+    said = REASONS[reason](Finding(reason, 0.0123, axis=2, parts=("base_link", "table"), time=0.4))
+    assert len(said) > 10
+
+
+@pytest.mark.parametrize("status", Status)
+def test_every_status_has_its_words(status: Status) -> None:
+    assert STATUS[status]

@@ -1,0 +1,251 @@
+"""Stop, pause, speed and jog: what a hand on the arm must be able to trust."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.session import TOOL_SPEED, Session
+from app.control.state import JointTarget, Reason, State, Status
+from app.errors import InputError
+from app.geometry.arrays import FloatArray
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward, jacobian_body
+from app.kinematics.freedoms import pitch_and_roll
+from app.kinematics.velocity import JogFrame
+from app.motion.limiter import Limiter, Motion
+
+TICK = 0.01
+FAR = np.array([2.0, -0.4, 0.6, 0.8, -1.5])
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
+    commands = list(commands)
+    for _ in range(ticks):
+        before, state = state, session.step(state, commands, state.t + TICK)
+        check(session, before.motion, state.motion)
+        commands = []
+    return state
+
+
+def check(session: Session, before: Motion, after: Motion) -> None:
+    limits, slack = session.arm.limits, 1.0 + 1e-6
+    assert (np.abs(after.qd) <= limits.speed * slack).all()
+    assert (np.abs(after.qd - before.qd) <= limits.acceleration * TICK * slack + 1e-8).all()
+    assert (np.abs(after.qdd - before.qdd) <= limits.jerk * TICK * slack + 1e-7).all()
+
+
+def speed(chain: Chain, motion: Motion) -> float:
+    return float(np.linalg.norm(jacobian_body(chain, motion.q)[3:] @ motion.qd))
+
+
+def point(chain: Chain, q: FloatArray) -> FloatArray:
+    return forward(chain, q)[:3, 3]
+
+
+def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
+    session: Session, state: State
+) -> None:
+    chain = session.arm.chain
+    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    assert speed(chain, moving.motion) > 0.1
+    halted = run(session, moving, [cmd.Stop()])
+    assert halted.status is Status.HALTED
+    (finding,) = halted.findings
+    assert finding.reason is Reason.HALTED
+    ticks = 1
+    while halted.moving:
+        # Braking from the first tick on.
+        before, halted = halted, run(session, halted, [])
+        assert speed(chain, halted.motion) <= speed(chain, before.motion) + 0.05
+        ticks += 1
+    assert halted.motion.at_rest
+    assert ticks * TICK == pytest.approx(finding.time, abs=2 * TICK)
+    way = math.dist(point(chain, moving.setpoint), point(chain, halted.setpoint))
+    assert finding.amount == pytest.approx(way, abs=1e-4)
+    assert halted.findings == (finding,)
+
+
+ORDERS: list[cmd.Command] = [
+    cmd.SetJoint(0, 1.0),
+    cmd.SetJoints(FAR),
+    cmd.MoveTool(np.array([0.3, 0.2, 0.1])),
+    cmd.TurnTool(0.3, 0.3),
+    cmd.SetPose(np.eye(4)),
+    cmd.SetGripper(0.2),
+    cmd.Home(),
+    cmd.Stretch(),
+    cmd.Reset(),
+    cmd.Settle(),
+    cmd.Pause(),
+    cmd.Resume(),
+    cmd.Jog(np.array([0.1, 0.0, 0.0, 0.0, 0.0])),
+]
+
+
+def test_nothing_moves_after_a_stop_until_it_is_released_and_told_afresh(
+    session: Session, state: State
+) -> None:
+    moving = run(session, state, [cmd.SetJoints(FAR), cmd.SetGripper(0.3)], 30)
+    halted = run(session, moving, [cmd.Stop()], 200)
+    grip = moving.gripper_setpoint
+    for order in ORDERS:
+        after = run(session, halted, [order], 50)
+        assert (after.setpoint == halted.setpoint).all(), order
+        assert after.gripper_setpoint == halted.gripper_setpoint == grip
+        assert after.status is Status.HALTED
+    released = run(session, halted, [cmd.Release()], 100)
+    assert released.status is Status.OK
+    assert (released.setpoint == halted.setpoint).all()
+    assert isinstance(released.target, JointTarget)
+    assert released.gripper_setpoint == grip
+    assert run(session, released, [cmd.SetJoint(0, 1.0)], 5).moving
+
+
+def test_a_stop_in_the_same_tick_beats_what_came_with_it(session: Session, state: State) -> None:
+    batches: list[list[cmd.Command]] = [
+        [cmd.Stop(), cmd.SetJoints(FAR)],
+        [cmd.SetJoints(FAR), cmd.Stop()],
+    ]
+    for batch in batches:
+        after = run(session, state, batch, 100)
+        assert (after.setpoint == state.setpoint).all()
+        assert after.status is Status.HALTED
+
+
+def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    once = run(session, moving, [cmd.Stop()], 20)
+    twice = run(session, once, [cmd.Stop()])
+    assert twice.findings == once.findings
+    assert twice.halted == once.halted
+
+
+def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: State) -> None:
+    start = state.setpoint
+    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    paused = run(session, moving, [cmd.Pause()], 150)
+    assert paused.status is Status.PAUSED
+    assert not paused.moving
+    assert (paused.setpoint != paused.goal).any()
+    way = FAR - start
+    for at in (moving.setpoint, paused.setpoint):
+        share = (at - start) @ way / (way @ way)
+        assert np.allclose(at, start + share * way, atol=1e-9)
+    again = run(session, paused, [cmd.Resume()], 400)
+    assert (again.setpoint == FAR).all()
+    assert again.findings == ()
+    # What is asked meanwhile is gone for when it goes on.
+    told = run(session, paused, [cmd.Home()], 50)
+    assert (told.setpoint == paused.setpoint).all()
+    assert {f.reason for f in told.findings} == {Reason.PAUSED}
+    assert (run(session, told, [cmd.Resume()], 400).setpoint == session.ready).all()
+
+
+def test_the_speed_scale_counts_at_once_and_for_every_joint(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoints(FAR)], 70)
+    slow = run(session, moving, [cmd.SpeedScale(0.1)], 120)
+    limits = session.arm.limits
+    assert (np.abs(slow.motion.qd) <= 0.1 * limits.speed * (1 + 1e-9)).all()
+    assert (np.abs(slow.motion.qd) / limits.speed).max() > 0.09
+    fast = run(session, slow, [cmd.SpeedScale(1.0)], 600)
+    assert (fast.setpoint == FAR).all()
+
+
+@pytest.mark.parametrize("share", [0.0, -0.1, 1.1, math.nan, math.inf, True, "1"])
+def test_a_speed_that_is_none_is_refused(share: float) -> None:
+    with pytest.raises(InputError, match="speed"):
+        cmd.SpeedScale(share)
+
+
+def test_the_tool_is_never_faster_than_it_may_be(session: Session, state: State) -> None:
+    rng = np.random.default_rng(7)
+    chain, fastest = session.arm.chain, 0.0
+    for number in range(40):
+        goal = rng.uniform(chain.lower, chain.upper)
+        ticks = int(rng.integers(20, 200))
+        command: cmd.Command = cmd.SetJoints(goal)
+        if number % 4 == 3:
+            command = cmd.MoveTool(rng.uniform(-0.5, 0.5, 3))
+        for _ in range(ticks):
+            state = run(session, state, [command])
+            fastest = max(fastest, speed(chain, state.motion))
+            command = cmd.SpeedScale(1.0)
+    assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
+
+
+JOGS: dict[str, tuple[list[float], JogFrame]] = {
+    "x": ([0.1, 0.0, 0.0, 0.0, 0.0], JogFrame.BASE),
+    "z": ([0.0, 0.0, 0.1, 0.0, 0.0], JogFrame.BASE),
+    "ahead": ([-0.1, 0.0, 0.0, 0.0, 0.0], JogFrame.TOOL),
+    "pitch": ([0.0, 0.0, 0.0, 0.3, 0.0], JogFrame.BASE),
+    "roll": ([0.0, 0.0, 0.0, 0.0, 0.3], JogFrame.BASE),
+}
+
+
+@pytest.mark.parametrize("name", JOGS)
+def test_a_jog_goes_where_it_is_held_to(session: Session, name: str) -> None:
+    rates, frame = JOGS[name]
+    chain = session.arm.chain
+    state = session.begin(np.array([0.4, -1.2, 1.6, 0.3, 0.2]), 0.0, 0.0)
+    start, R = point(chain, state.setpoint), forward(chain, state.setpoint)[:3, :3]
+    before = pitch_and_roll(chain, state.setpoint)
+    for _ in range(60):
+        state = run(session, state, [cmd.Jog(np.array(rates), frame)])
+    after = pitch_and_roll(chain, state.setpoint)
+    moved = point(chain, state.setpoint) - start
+    v = np.array(rates[:3])
+    wanted = v if frame is JogFrame.BASE else R @ v
+    if wanted.any():
+        assert moved @ wanted / np.linalg.norm(wanted) > 0.02
+        assert np.linalg.norm(np.cross(moved, wanted)) < 0.1 * np.linalg.norm(moved) * 0.1
+        assert np.allclose(before, after, atol=0.02)
+    else:
+        turned = np.subtract(after, before)
+        assert turned[0] * rates[3] + turned[1] * rates[4] > 0.02
+        assert np.linalg.norm(moved) < 5e-3
+
+
+def test_a_jog_nobody_holds_on_to_ends_by_itself(session: Session, state: State) -> None:
+    jog = cmd.Jog(np.array([-0.15, 0.0, 0.0, 0.0, 0.0]))
+    held = state
+    for _ in range(30):
+        held = run(session, held, [jog])
+    until = held.t + cmd.JOG_TIME
+    ticks = 0
+    while held.jogging is not None:
+        held = run(session, held, [])
+        ticks += 1
+    assert held.t == pytest.approx(until, abs=2 * TICK)
+    assert speed(session.arm.chain, held.motion) > 0.05
+    # From then on it brakes as fast as it can, and that is all.
+    rest = held.t + Limiter(session.arm.limits).time_to_halt(held.motion)
+    while held.moving:
+        held = run(session, held, [])
+    assert held.t <= rest + 3 * TICK
+    assert (held.setpoint == held.goal).all()
+    assert held.findings == ()
+
+
+def test_a_jog_stops_before_a_limit(session: Session, state: State) -> None:
+    chain = session.arm.chain
+    for _ in range(500):
+        state = run(session, state, [cmd.Jog(np.array([0.0, 0.3, 0.0, 0.0, 0.0]))])
+        assert chain.within_limits(state.setpoint, slack=0.0)
+
+
+@pytest.mark.parametrize("rates", [[0.1] * 4, [math.nan] * 5, "fast", [[0.1] * 5]])
+def test_a_jog_that_is_none_is_refused(rates: object) -> None:
+    with pytest.raises(InputError, match="jog"):
+        cmd.Jog(rates)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="JogFrame"):
+        cmd.Jog(np.zeros(5), "world")  # type: ignore[arg-type]

@@ -1,0 +1,65 @@
+"""What collision bodies are made of what a URDF says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from app.robot.collision import world_of
+from app.robot.model import RobotModel, load
+
+ARMS = Path(__file__).resolve().parent / "arms"
+PINCHER = ARMS / "pincherx_150.urdf"
+
+
+def with_forearm(tmp_path: Path, shapes: str) -> RobotModel:
+    text = PINCHER.read_text(encoding="utf-8")
+    assert '<link name="forearm"/>' in text
+    path = tmp_path / "edited.urdf"
+    path.write_text(text.replace('<link name="forearm"/>', f'<link name="forearm">{shapes}</link>'))
+    return load(path)
+
+
+@pytest.mark.parametrize("arm", ["pincherx_150.urdf", "youbot_arm.urdf"])
+def test_an_arm_without_collision_shapes_has_no_world(arm: str) -> None:
+    model = load(ARMS / arm)
+    assert not model.collides
+    assert world_of(model) == (None, ())
+
+
+def test_our_own_arm_has_every_link_in_it(model: RobotModel) -> None:
+    world, notes = world_of(model)
+    assert notes == ()
+    assert world is not None
+    shaped = [body for body in model.bodies if body.collisions]
+    assert [part.name for part in world.parts] == [body.name for body in shaped]
+    assert [len(part.shapes) for part in world.parts] == [len(b.collisions) for b in shaped]
+
+
+def test_primitives_stand_where_the_file_puts_them(tmp_path: Path) -> None:
+    model = with_forearm(
+        tmp_path,
+        '<collision><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/>'
+        '<geometry><box size="0.2 0.04 0.06"/></geometry></collision>',
+    )
+    world, _ = world_of(model)
+    assert model.collides
+    assert world is not None
+    (part,) = world.parts
+    (shape,) = part.shapes
+    np.testing.assert_allclose(shape.low, (0.08, -0.1, -0.03), atol=1e-9)
+    np.testing.assert_allclose(shape.high, (0.12, 0.1, 0.03), atol=1e-9)
+
+
+def test_shapes_without_a_volume_or_a_file_are_told(tmp_path: Path) -> None:
+    sheet = trimesh.Trimesh(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2]])
+    sheet.export(tmp_path / "sheet.stl")
+    mesh = '<collision><geometry><mesh filename="{}.stl"/></geometry></collision>'
+    model = with_forearm(tmp_path, mesh.format("sheet") + mesh.format("none"))
+    world, notes = world_of(model)
+    assert world is None
+    assert [note for note in notes if "'forearm'" in note and "one plane" in note]
+    assert [note for note in model.notes if "none.stl" in note]

@@ -1,0 +1,66 @@
+"""The props are as large as their file says, and a broken file is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from app.errors import RobotDescriptionError
+from app.robot.props import load_props
+from robot_description import PROPS_PATH
+
+
+def bounds(mesh: Path) -> Any:
+    return trimesh.load_scene(mesh).bounds
+
+
+def test_the_meshes_have_the_numbers_of_the_file() -> None:
+    props = load_props()
+    for vessel in (props.cup, props.basin):
+        low, high = bounds(vessel.mesh)
+        assert np.allclose(high[:2], vessel.outer_radius, rtol=0.01)
+        assert np.allclose(low[:2], -vessel.outer_radius, rtol=0.01)
+        assert (low[2], high[2]) == pytest.approx((0.0, vessel.height), abs=5e-4)
+    low, high = bounds(props.table.mesh)
+    assert (low[0], high[0]) == pytest.approx(props.table.x, abs=1e-3)
+    assert (low[1], high[1]) == pytest.approx(props.table.y, abs=1e-3)
+    assert (low[2], high[2]) == pytest.approx((-props.table.thickness, 0.0), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("prop", "change", "said"),
+    [
+        ("cup", {"height": -1.0}, "'height' is -1.0"),
+        ("cup", {"outer_radius": 0.01}, "no thickness"),
+        ("basin", {"mass": float("nan")}, "'mass' is nan"),
+        ("basin", {"floor": "thick"}, "could not convert"),
+        ("table", {"x": [1.0, 0.0]}, "no span"),
+        ("table", {"mesh": "chair.glb"}, "no mesh"),
+    ],
+)
+def test_props_that_are_none_are_refused(
+    tmp_path: Path, prop: str, change: dict[str, object], said: str
+) -> None:
+    described = json.loads(PROPS_PATH.read_text(encoding="utf-8"))
+    described[prop].update(change)
+    for name in ("cup", "basin", "table"):
+        (tmp_path / f"{name}.glb").touch()
+    path = tmp_path / "props.json"
+    path.write_text(json.dumps(described), encoding="utf-8")
+    with pytest.raises(RobotDescriptionError, match=said):
+        load_props(path)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", '{"cup": 3, "basin": 3, "table": 3}'])
+def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "props.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RobotDescriptionError, match=r"props\.json"):
+        load_props(path)
+    with pytest.raises(RobotDescriptionError, match=r"none\.json"):
+        load_props(tmp_path / "none.json")

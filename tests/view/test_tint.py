@@ -1,0 +1,79 @@
+"""The coats of parts that are about to touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+import pytest
+import viser
+
+from app.control.session import Session
+from app.control.state import Finding, Reason, State
+from app.robot.model import RobotModel
+from app.view.tint import Tint
+
+
+@dataclass
+class Coat:
+    visible: bool = True
+
+
+@dataclass
+class Scene:
+    """Remembers what is added to it."""
+
+    coats: dict[str, Coat] = field(default_factory=dict)
+
+    def add_mesh_simple(self, name: str, *_surface: object, **_look: object) -> Coat:
+        self.coats[name] = Coat()
+        return self.coats[name]
+
+    def coated(self) -> set[str]:
+        return {name.split("/")[1] for name, coat in self.coats.items() if coat.visible}
+
+
+@dataclass
+class Server:
+    scene: Scene
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+def touching(state: State, one: str, other: str) -> State:
+    return replace(state, findings=(Finding(Reason.CONTACT, 0.006, parts=(one, other)),))
+
+
+def test_both_parts_are_coated_until_they_are_apart(model: RobotModel, state: State) -> None:
+    scene = Scene()
+    paths = {body.name: f"/{body.name}" for body in model.bodies}
+    tint = Tint(cast(Any, Server(scene)), model, paths)
+    tint.follow(state)
+    assert scene.coats == {}
+    tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
+    assert scene.coated() == {"finger_left_link", "upper_arm_link"}
+    body = next(body for body in model.bodies if body.name == "finger_left_link")
+    assert sum("finger_left" in name for name in scene.coats) == len(body.collisions)
+    # The table has no coat of its own.
+    tint.follow(touching(state, "finger_left_link", "table"))
+    assert scene.coated() == {"finger_left_link"}
+    made = len(scene.coats)
+    tint.follow(state)
+    assert scene.coated() == set()
+    tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
+    assert len(scene.coats) == made
+    assert scene.coated() == {"finger_left_link", "upper_arm_link"}
+
+
+def test_viser_takes_the_coats(model: RobotModel, state: State) -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        paths = {body.name: f"/{body.name}" for body in model.bodies}
+        tint = Tint(server, model, paths)
+        tint.follow(touching(state, "wrist_link", "pan_link"))
+        tint.follow(state)
+    finally:
+        server.stop()
