@@ -3,6 +3,8 @@
 "use strict";
 (() => {
   const TELL_EVERY = 50; // ms
+  const AGAIN = 100; // ms
+  const TRIES = 30;
   const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
 
@@ -23,7 +25,8 @@
   );
 
   let camera = null; // where this person last looked from
-  let kept = null; //   the same while the scene is being sent anew
+  let kept = null; //   the same, from when the line is back until viser looks from there again
+  let tries = 0;
   let seen = 0;
   let told = 0;
   let telling = false;
@@ -45,13 +48,21 @@
     else requestAnimationFrame(soon);
   }
 
-  function look({ position, look_at, up_direction }) {
-    return [
+  // viser starts anew from its first view whenever the line is back; told often enough, it looks
+  // where the person had looked.
+  function look(worker) {
+    const { position, look_at, up_direction } = kept;
+    const messages = [
       { type: "SetCameraUpDirectionMessage", position: up_direction, initial: false },
       { type: "SetCameraLookAtMessage", look_at, initial: false },
       { type: "SetCameraPositionMessage", position, initial: false },
     ];
+    const data = { type: "message_batch", messages, ours: true };
+    worker.dispatchEvent(new MessageEvent("message", { data }));
   }
+
+  const same = (a, b) =>
+    ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-3));
 
   const Plain = window.Worker;
   window.Worker = class extends Plain {
@@ -64,24 +75,31 @@
     postMessage(data, ...rest) {
       if (data?.type === "set_server" && page)
         data = { ...data, server: `${data.server}?page=${page}` };
-      if (data?.type === "send" && data.message.type === "ViewerCameraMessage" && !kept)
-        camera = data.message;
+      if (data?.type === "send" && data.message.type === "ViewerCameraMessage") this.#looks(data.message);
       super.postMessage(data, ...rest);
+    }
+
+    #looks(message) {
+      if (kept && (same(kept, message) || tries >= TRIES)) kept = null;
+      if (!kept) camera = message;
+      else if (tries > 0) {
+        tries += 1;
+        setTimeout(() => kept && look(this), AGAIN);
+      }
     }
 
     #hear(data) {
       if (data?.type === "connected") {
         seen = 0;
         kept = camera;
+        tries = 0;
       }
       if (data?.type !== "message_batch" || data.ours) return;
       seen += 1;
       tell((message) => super.postMessage(message));
-      if (!kept) return;
-      data.messages = data.messages.filter((each) => !(/^SetCamera/.test(each.type) && each.initial));
-      if (!data.messages.some((each) => each.type === "ReplayDoneMessage")) return;
-      data.messages.push(...look(kept));
-      kept = null;
+      if (!kept || tries > 0 || !data.messages.some(({ type }) => type === "ReplayDoneMessage")) return;
+      tries = 1;
+      setTimeout(() => kept && look(this), AGAIN);
     }
   };
 

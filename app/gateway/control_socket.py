@@ -106,9 +106,9 @@ class ControlSocket:
 
     def _do(self, window: Window, request: requests.AnyRequest) -> None:
         hub = self._hub
+        hub.beat(window)
         match request:
             case requests.Beat(n=n):
-                hub.beat(window)
                 self.tell({"is": "echo", "n": n})
             case requests.Stop():
                 hub.stop(window.person.name)
@@ -138,7 +138,8 @@ class ControlSocket:
         told_at = looked_at = float("-inf")
         while True:
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._news.wait(), PUSH_EVERY)
+                async with asyncio.timeout(PUSH_EVERY):
+                    await self._news.wait()
             self._news.clear()
             while self._notices:
                 await self._say(self._notices.popleft())

@@ -1,49 +1,93 @@
 """How far a browser is behind, and how much more may be sent to it.
 
-The page says how many frames it has put on its screen. What was sent and not yet seen is bounded
-by time: while the oldest of it is overdue nothing more is taken from viser, which meanwhile
-replaces what it holds by what is newer. So a slow link shows few pictures instead of old ones.
+The page says how many frames it has put on its screen. What was sent and not yet seen is bounded,
+in bytes, to what the line has lately carried in time; while it is full nothing more is taken from
+viser, which meanwhile replaces what it holds by what is newer. So a thin line shows few pictures
+instead of old ones.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from typing import NamedTuple
 
 OVERDUE = 0.3
-"""[s] From sending to seeing; several times what a good link and a slow machine need."""
+"""[s] From sending to seeing, beyond what the line needs at its best."""
+
+FORGET = 0.005
+"""[s/s] What a line needs at its best may grow so fast."""
+
+LEAST, FIRST, MOST = 2_048, 24_576, 262_144
+"""Bytes that may be on the way: at least, at first, at most. More while all is seen in time, half
+as many when not."""
+
+LONGEST_LINE = 1.0
+"""[s] What a line may need at its best and still be waited for."""
 
 LONGEST = 4096
 """Frames that are kept in mind: a minute of them, for a browser that never says what it sees."""
 
 
+class _Sent(NamedTuple):
+    t: float
+    size: int
+    age: float
+
+
 class Flow:
-    """The frames on their way to one browser. Time is an argument."""
+    """The frames on their way to one browser. Times are arguments, in seconds."""
 
     def __init__(self) -> None:
-        self._on_the_way: deque[float] = deque(maxlen=LONGEST)
+        self._on_the_way: deque[_Sent] = deque(maxlen=LONGEST)
+        self._bytes = 0
+        self._window = FIRST
+        self._quickest: float | None = None
+        self._told_at = 0.0
         self._sent = 0
         self.counts = False
         """Whether the browser says what it has seen: our page does, other programs do not."""
 
-    def sent(self, t: float) -> None:
-        """One more frame was sent at ``t`` [s]."""
+    def sent(self, size: int, t: float, age: float = 0.0) -> None:
+        """One more frame of ``size`` bytes was sent at ``t``, when it was ``age`` old already."""
         self._sent += 1
-        self._on_the_way.append(t)
+        self._on_the_way.append(_Sent(t, size, age))
+        self._bytes += size
 
-    def seen(self, count: int) -> bool:
-        """``count`` frames are on the screen by now; whether that can be true."""
+    def seen(self, count: int, t: float) -> bool:
+        """``count`` frames are on the screen at ``t``; whether that can be true."""
         missing = self._sent - count
         if not 0 <= missing <= len(self._on_the_way):
             return False
-        self.counts = True
-        while len(self._on_the_way) > missing:
-            self._on_the_way.popleft()
+        seen = [self._on_the_way.popleft() for _ in range(len(self._on_the_way) - missing)]
+        if not self.counts:
+            # The scene itself: how long that takes says little of what follows.
+            self.counts = True
+            self._bytes = sum(each.size for each in self._on_the_way)
+        elif seen:
+            size = sum(each.size for each in seen)
+            self._bytes -= size
+            took = t - seen[-1].t
+            known = (
+                took if self._quickest is None else self._quickest + FORGET * (t - self._told_at)
+            )
+            self._quickest = min(known, took, LONGEST_LINE)
+            self._told_at = t
+            if t - seen[0].t > self._quickest + OVERDUE:
+                self._window = max(self._window // 2, LEAST)
+            else:
+                self._window = min(self._window + size // 2, MOST)
         return True
 
     def age(self, t: float) -> float:
-        """How old the oldest frame is that was sent and is not on the screen [s]; 0 without."""
-        return t - self._on_the_way[0] if self.counts and self._on_the_way else 0.0
+        """How old the oldest frame is that was sent and is not on the screen; 0 without."""
+        if not (self.counts and self._on_the_way):
+            return 0.0
+        oldest = self._on_the_way[0]
+        return t - oldest.t + oldest.age
 
     def has_room(self, t: float) -> bool:
         """Whether another frame may be sent."""
-        return self.age(t) < OVERDUE
+        if not (self.counts and self._on_the_way):
+            return True
+        in_time = t - self._on_the_way[0].t < OVERDUE + (self._quickest or 0.0)
+        return in_time and self._bytes < self._window

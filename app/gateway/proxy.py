@@ -30,9 +30,12 @@ log = logging.getLogger(__name__)
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
-BUFFER = 16_384
+BUFFER = 4_096
 """Bytes that may wait in the machine between viser and us: what waits there is not replaced by
 what is newer."""
+
+CROWDED = 0.1
+"""[s] While a browser is this far behind, it is worth while to read how old a frame is."""
 
 LOOK_AGAIN = 0.1
 """[s] How soon a browser that is behind is looked at again, should it say nothing."""
@@ -131,9 +134,11 @@ class _Line:
             while not self._flow.has_room(self._hub.clock()):
                 self._room.clear()
                 with suppress(TimeoutError):
-                    await asyncio.wait_for(self._room.wait(), LOOK_AGAIN)
+                    async with asyncio.timeout(LOOK_AGAIN):
+                        await self._room.wait()
             assert isinstance(frame, bytes)
-            await self._send(frame)
+            waited = self._flow.age(self._hub.clock()) > CROWDED
+            await self._send(frame, _age(frame) if waited else 0.0)
 
     async def _up(self) -> None:
         """What the firewall lets pass."""
@@ -154,7 +159,7 @@ class _Line:
         """To a message that stays here; False for one that lies."""
         if verdict.seen is not None:
             self._room.set()
-            return self._flow.seen(verdict.seen)
+            return self._flow.seen(verdict.seen, self._hub.clock())
         if verdict.corrections:
             await self._send(_frame(verdict.corrections))
         window = self._hub.window(self._key)
@@ -164,10 +169,10 @@ class _Line:
             window.tell({"is": "refused", "why": verdict.refusal})
         return True
 
-    async def _send(self, frame: bytes) -> None:
+    async def _send(self, frame: bytes, age: float = 0.0) -> None:
         async with self._sending:
             await self._browser.send_bytes(frame)
-            self._flow.sent(self._hub.clock())
+            self._flow.sent(len(frame), self._hub.clock(), age)
 
     def _drive(self) -> None:
         if not self._key:
@@ -182,6 +187,17 @@ async def _narrow_socket(port: int) -> socket.socket:
     line.setblocking(False)
     await asyncio.get_running_loop().sock_connect(line, ("127.0.0.1", port))
     return line
+
+
+def _age(frame: bytes) -> float:
+    """How long ago viser made it [s]; viser's clock is this process's."""
+    packed = int.from_bytes(frame[8:16], "little")
+    body = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed])
+    return time.perf_counter() - msgspec.msgpack.decode(body, type=_Stamp).timestampSec
+
+
+class _Stamp(msgspec.Struct):
+    timestampSec: float  # noqa: N815  (viser's name)
 
 
 def _frame(messages: tuple[Any, ...]) -> bytes:

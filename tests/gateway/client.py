@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+import time
 import urllib.request
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
@@ -79,6 +80,7 @@ class Control:
         self.socket = socket
         self.heard: list[dict[str, Any]] = []
         self.alive = True
+        self.last_beat = 0.0
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
 
     @property
@@ -129,6 +131,7 @@ class Control:
                 if self.alive:
                     n += 1
                     await self.say("beat", n=n)
+                    self.last_beat = time.perf_counter()
                 await asyncio.sleep(BEAT)
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from app.gateway.bucket import Bucket
-from app.gateway.flow import LONGEST, OVERDUE, Flow
+from app.gateway.flow import LONGEST, MOST, OVERDUE, Flow
 
 
 def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:
@@ -32,7 +36,7 @@ def test_time_that_goes_back_fills_nothing() -> None:
 def test_who_says_nothing_of_what_it_sees_is_sent_all() -> None:
     flow = Flow()
     for t in range(2 * LONGEST):
-        flow.sent(float(t))
+        flow.sent(MOST, float(t))
     assert flow.has_room(1e9)
     assert flow.age(1e9) == 0.0
 
@@ -40,29 +44,68 @@ def test_who_says_nothing_of_what_it_sees_is_sent_all() -> None:
 def test_the_age_is_that_of_the_oldest_frame_that_is_not_seen() -> None:
     flow = Flow()
     for t in (1.0, 2.0, 3.0):
-        flow.sent(t)
-    assert flow.seen(1)
+        flow.sent(100, t)
+    assert flow.seen(1, 3.0)
     assert flow.age(3.5) == pytest.approx(1.5)
-    assert flow.seen(3)
+    assert flow.seen(3, 3.5)
     assert flow.age(99.0) == 0.0
 
 
 def test_nothing_more_is_sent_while_something_is_overdue() -> None:
     flow = Flow()
-    flow.sent(0.0)
-    assert flow.seen(1)
-    flow.sent(1.0)
+    flow.sent(100, 0.0)
+    assert flow.seen(1, 0.1)
+    flow.sent(100, 1.0)
     assert flow.has_room(1.0 + 0.99 * OVERDUE)
     assert not flow.has_room(1.0 + OVERDUE)
-    assert flow.seen(2)
-    assert flow.has_room(1.0 + OVERDUE)
+    assert flow.seen(2, 1.0 + OVERDUE)
+    # By now it is known that this line takes so long.
+    flow.sent(100, 2.0)
+    assert flow.has_room(2.0 + 1.99 * OVERDUE)
+    assert not flow.has_room(2.0 + 2.0 * OVERDUE)
 
 
-@pytest.mark.parametrize("count", [-1, 0, 4, 10**30])
+def test_a_frame_larger_than_the_line_goes_alone() -> None:
+    flow = Flow()
+    flow.sent(100, 0.0)
+    assert flow.seen(1, 0.1)
+    assert flow.has_room(0.1)
+    flow.sent(10 * MOST, 0.1)
+    assert not flow.has_room(0.1)
+
+
+@settings(deadline=None)
+@given(st.floats(1.5e4, 5e6), st.floats(0.0, 0.3), st.integers(200, 3000))
+def test_on_any_line_what_is_seen_is_not_old_and_the_line_is_used(
+    rate: float, trip: float, size: int
+) -> None:
+    """A line of that rate [bytes/s] and round trip [s], and viser with a frame every 16 ms."""
+    flow, t, free_at, count = Flow(), 0.0, 0.0, 1
+    flow.sent(100, 0.0)
+    assert flow.seen(1, 0.0)
+    on_the_line: deque[tuple[float, float]] = deque()
+    ages = []
+    while t < 60.0:
+        t += 0.016
+        while on_the_line and on_the_line[0][0] + trip <= t:
+            arrived, sent_at = on_the_line.popleft()
+            count += 1
+            assert flow.seen(count, t)
+            if t > 20.0:
+                ages.append(arrived - sent_at)
+        if flow.has_room(t):
+            flow.sent(size, t)
+            free_at = max(free_at, t) + size / rate
+            on_the_line.append((free_at, t))
+    assert max(ages) < 1.2 + trip
+    assert len(ages) > 0.5 * 40.0 * min(rate / size, 1.0 / 0.016)
+
+
+@pytest.mark.parametrize("count", [-1, 1, 4, 10**30])
 def test_what_cannot_have_been_seen_is_no_word(count: int) -> None:
     flow = Flow()
     for t in range(3):
-        flow.sent(float(t))
-    assert flow.seen(2)
-    assert not flow.seen(1 if count == 0 else count)
+        flow.sent(100, float(t))
+    assert flow.seen(2, 2.0)
+    assert not flow.seen(count, 2.5)
     assert flow.age(3.0) == pytest.approx(1.0)

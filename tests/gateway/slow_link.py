@@ -1,0 +1,101 @@
+"""A line that carries only so many bytes a second, between a client and a server."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from types import TracebackType
+from typing import Self
+
+SLICE = 0.02
+"""[s] What the line carries in this time goes at once."""
+
+WINDOW = 8192
+"""Bytes that the line itself holds in each direction."""
+
+
+class SlowLink:
+    """Context manager: connections to ``port`` go on to ``to_port``, both on this machine.
+
+    ``rate`` is in bytes a second in each direction for all connections together, as a thin line
+    has it, ``delay`` in seconds one way; ``cut`` silences the line without closing it.
+    """
+
+    def __init__(self, to_port: int, rate: float, delay: float = 0.0) -> None:
+        self.rate = rate
+        self.cut = False
+        self._delay = delay
+        self._to_port = to_port
+        self._loop = asyncio.new_event_loop()
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        # Else the kernel would take in seconds' worth of a thin line.
+        self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
+        self._free_at = [0.0, 0.0]
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    @property
+    def port(self) -> int:
+        """Where the line begins."""
+        port: int = self._listening.getsockname()[1]
+        return port
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        server = self._loop.run_until_complete(
+            asyncio.start_server(self._relay, sock=self._listening, limit=WINDOW)
+        )
+        self._loop.run_forever()
+        server.close()
+        tasks = asyncio.all_tasks(self._loop)
+        for task in tasks:
+            task.cancel()
+        self._loop.run_until_complete(asyncio.gather(*tasks, return_exceptions=True))
+        # What was aborted says goodbye in the next turn.
+        self._loop.run_until_complete(asyncio.sleep(0.0))
+        self._loop.close()
+
+    async def _relay(self, near: asyncio.StreamReader, back: asyncio.StreamWriter) -> None:
+        line = socket.socket()
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, WINDOW)
+        line.setblocking(False)
+        await self._loop.sock_connect(line, ("127.0.0.1", self._to_port))
+        far, forth = await asyncio.open_connection(sock=line, limit=WINDOW)
+        tasks = [
+            asyncio.create_task(self._carry(near, forth, 0)),
+            asyncio.create_task(self._carry(far, back, 1)),
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            for end in (forth, back):
+                end.transport.abort()
+
+    async def _carry(
+        self, source: asyncio.StreamReader, to: asyncio.StreamWriter, way: int
+    ) -> None:
+        to.transport.set_write_buffer_limits(high=WINDOW)
+        while data := await source.read(max(int(self.rate * SLICE), 64)):
+            now = self._loop.time()
+            self._free_at[way] = max(self._free_at[way], now) + len(data) / self.rate
+            await asyncio.sleep(self._free_at[way] - now + self._delay)
+            while self.cut:
+                await asyncio.sleep(SLICE)
+            to.write(data)
+            await to.drain()
