@@ -5,16 +5,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import numpy as np
-
-from app.collision.shape import half_space
-from app.collision.world import obstacle
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
 from app.exchange.reachability_file import load_map
 from app.gateway.gateway import Gateway
-from app.robot.collision import world_of
+from app.robot.collision import standing_around, world_of
 from app.robot.model import load
+from app.robot.props import load_props
 from app.runtime.clock import MonotonicClock
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
@@ -45,7 +42,7 @@ class Assembly:
         if world is None:
             notes.append(UNCHECKED)
         else:
-            world = world.with_obstacles([obstacle("table", np.eye(4), half_space())])
+            world = world.with_obstacles(standing_around(load_props()))
         for note in notes:
             print(f"katana450: {note}", file=sys.stderr)
         session = Session(model.arm, model.ready(settings.ready), world)

@@ -6,11 +6,13 @@ import numpy as np
 
 from app.collision.linkage import GROUND, Linkage, Mover
 from app.collision.pairs import pairs_that_meet
-from app.collision.shape import Shape, hull
-from app.collision.world import Part, World
+from app.collision.shape import Shape, cylinder, half_space, hull
+from app.collision.world import Part, World, obstacle
 from app.errors import InputError
+from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
 from app.robot.model import Body, RobotModel
+from app.robot.props import BASIN_AT, CUP_AT, Props
 
 
 def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
@@ -45,6 +47,26 @@ def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
     chain, gripper = model.arm.chain, model.arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
     return World(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(notes)
+
+
+def standing_around(props: Props) -> tuple[Part, ...]:
+    """Table, cup and basin as obstacles: a half-space, and a cylinder round each vessel."""
+    return (
+        obstacle("table", np.eye(4), half_space()),
+        *(
+            obstacle(
+                name,
+                se3.from_rotation_translation(
+                    np.eye(3), (at[0], at[1], at[2] + 0.5 * vessel.height)
+                ),
+                cylinder(vessel.outer_radius, vessel.height),
+            )
+            for name, vessel, at in (
+                ("cup", props.cup, CUP_AT),
+                ("basin", props.basin, BASIN_AT),
+            )
+        ),
+    )
 
 
 def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:

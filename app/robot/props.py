@@ -11,6 +11,12 @@ from typing import Any
 from app.errors import RobotDescriptionError
 from robot_description import PROPS_PATH
 
+Point = tuple[float, float, float]
+
+CUP_AT: Point = (0.34, -0.26, 0.0)
+BASIN_AT: Point = (0.22, 0.36, 0.0)
+"""[m] On the table in the base frame: in reach, and out of the way until wanted."""
+
 
 @dataclass(frozen=True)
 class Vessel:

@@ -6,14 +6,7 @@ from pathlib import Path
 
 import viser
 
-from app.robot.props import Props
-
-Point = tuple[float, float, float]
-
-CUP_AT: Point = (0.34, -0.26, 0.0)
-BASIN_AT: Point = (0.22, 0.36, 0.0)
-"""[m] On the table in the base frame: in reach, and out of the way until wanted."""
-
+from app.robot.props import BASIN_AT, CUP_AT, Point, Props
 
 SHADE = 0.35
 """How dark shadows on the table are."""

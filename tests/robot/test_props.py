@@ -11,7 +11,10 @@ import pytest
 import trimesh
 
 from app.errors import RobotDescriptionError
-from app.robot.props import load_props
+from app.robot.collision import standing_around, world_of
+from app.robot.model import RobotModel
+from app.robot.props import BASIN_AT, CUP_AT, load_props
+from app.settings import Settings
 from robot_description import PROPS_PATH
 
 
@@ -64,3 +67,24 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
         load_props(path)
     with pytest.raises(RobotDescriptionError, match=r"none\.json"):
         load_props(tmp_path / "none.json")
+
+
+def test_what_stands_around_holds_the_props(model: RobotModel) -> None:
+    """Nothing of a prop's mesh is outside the shape that stands for it, nor the table above it."""
+    props = load_props()
+    table, cup, basin = standing_around(props)
+    assert table.name == "table"
+    for part, vessel, at in ((cup, props.cup, CUP_AT), (basin, props.basin, BASIN_AT)):
+        points = np.asarray(trimesh.load_scene(vessel.mesh).to_mesh().vertices) + at
+        (T,) = part.T_mover_shape
+        local = (points - T[:3, 3]) @ T[:3, :3]
+        (shape,) = part.shapes
+        assert (local >= np.array(shape.low) - 2e-4).all()
+        assert (local <= np.array(shape.high) + 2e-4).all()
+        assert np.hypot(local[:, 0], local[:, 1]).max() <= vessel.outer_radius + 2e-4
+    world, _ = world_of(model)
+    assert world is not None
+    ready = np.append(model.ready(Settings().ready), 0.0)
+    found = world.with_obstacles((table, cup, basin)).nearest(ready)
+    assert found is not None
+    assert found.distance > 0.03
