@@ -1,4 +1,6 @@
-# docker build -t katana450 . && docker run --rm -p 8080:8080 katana450
+# docker build -t katana450 .
+# Here alone:       docker run --rm -p 127.0.0.1:8080:8080 katana450 serve --host 0.0.0.0 --insecure
+# Other machines:   docker run --rm -p 8080:8080 --user $(id -u) -v ./access.json:/access.json katana450
 FROM python:3.12.11-slim-bookworm AS build
 WORKDIR /src
 COPY requirements.lock ./
@@ -17,7 +19,8 @@ USER katana
 EXPOSE 8080
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=30s --timeout=3s --start-period=10s \
-  CMD ["/opt/katana450/bin/python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8080', timeout=2)"]
+  CMD ["/opt/katana450/bin/python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8080/health', timeout=2)"]
 ENTRYPOINT ["/opt/katana450/bin/katana450"]
-# Inside a container the port must be open to the outside of it; -p decides who reaches it there.
-CMD ["serve", "--host", "0.0.0.0"]
+# Inside a container the port must be open to the outside of it; -p decides who reaches it there, and
+# docs/access.md says how links are made.
+CMD ["serve", "--host", "0.0.0.0", "--access", "/access.json"]

@@ -391,7 +391,7 @@ def test_a_large_message_is_not_taken(server: AppServer) -> None:
 def test_a_word_that_is_no_request_changes_nothing(server: AppServer, text: str | bytes) -> None:
     async def attack() -> None:
         async with controlling(server.url) as watching, controlling(server.url) as control:
-            await watching.wait(windows=2, mood="ok")
+            await watching.wait(windows=2, mood="ok", holder=None)
             before = watching.status
             for _ in range(10):
                 with suppress(ConnectionClosed):
