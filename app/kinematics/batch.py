@@ -6,9 +6,10 @@ tool point next to axis 1, where there are cases to tell apart, go through the s
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Final
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,6 @@ from app import tolerances
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray
-from app.kinematics.arm import FiveAxisArm
 from app.kinematics.chain import Chain
 from app.kinematics.closed_form import Functions, closed_form
 from app.kinematics.solver import Solver
@@ -72,7 +72,7 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
     Raises InputError for the first pose that cannot be used, RobotDescriptionError for an arm of
     another kind.
     """
-    solver = Solver.of(chain)
+    made = _arm(chain)
     T = _numbers(T, (4, 4), "The poses")
     q = np.empty((len(T), 4, 5))
     inside = np.empty((len(T), 4), dtype=np.bool_)
@@ -86,7 +86,7 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
             asked, angles = _arrays(work, rows.stop - rows.start)
             np.copyto(asked, T[rows].transpose(1, 2, 0))
             _validate(asked, rows.start, angles.reshape(20, -1))
-            _solve(chain, solver, asked, angles, q[rows], inside[rows])
+            _solve(made, asked, angles, q[rows], inside[rows])
             if position is not None and rotation is not None:
                 for branch in range(4):
                     reached = _forward(chain, q[rows, branch].T)
@@ -202,16 +202,38 @@ def _direction(y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, Fl
 _ARRAYS: Final = Functions(np.atan2, np.sqrt, _root, _direction)
 
 
-def _solve(
-    chain: Chain,
-    solver: Solver,
-    T: FloatArray,
-    angles: FloatArray,
-    q: FloatArray,
-    inside: BoolArray,
-) -> None:
-    """Fill q (C, 4, 5), inside (C, 4) for the poses `T` (4, 4, C) by way of angles (2, 2, 5, C)."""
+class _Arm(NamedTuple):
+    """What is made once a chain.
+
+    posture: the closed form on arrays. turns: (joint, sign, shift, lower, upper) of the joints with
+    another angle than the canonical arm's, or with limits [rad] beyond half a turn. lower, upper:
+    (5, 1) limits [rad], with the slack.
+    """
+
+    solver: Solver
+    posture: Callable[..., Any]
+    turns: tuple[tuple[int, float, float, float, float], ...]
+    lower: FloatArray
+    upper: FloatArray
+
+
+@lru_cache(maxsize=64)
+def _arm(chain: Chain) -> _Arm:
+    solver = Solver.of(chain)
     arm = solver.arm
+    lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
+    joints = zip(range(5), arm.signs, arm.shifts, lower.tolist(), upper.tolist(), strict=True)
+    turns = tuple(
+        (i, sign, shift, a, b)
+        for i, sign, shift, a, b in joints
+        if sign < 0.0 or shift or max(-a, b) > np.pi + tolerances.LIMIT_SLACK
+    )
+    return _Arm(solver, closed_form(arm, _ARRAYS), turns, lower[:, None], upper[:, None])
+
+
+def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside: BoolArray) -> None:
+    """Fill q (C, 4, 5), inside (C, 4) for the poses `T` (4, 4, C) by way of angles (2, 2, 5, C)."""
+    solver, arm = made.solver, made.solver.arm
     rows = T
     if not arm.is_canonical:
         # T_C_S T T_tool_K, the last product row by row.
@@ -221,9 +243,9 @@ def _solve(
     r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
     # Of what overflowed or lies inside the cylinder of radius d neither is true.
     beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
-    _canonical(arm, rows, rho, r, angles)
-    _turn(chain, arm, angles)
-    inside[...] = _inside(chain, angles).reshape(4, -1).T
+    _canonical(made, rows, rho, r, angles)
+    _turn(made, angles)
+    inside[...] = _inside(made, angles).reshape(4, -1).T
     q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
     for i in beside.nonzero()[0]:
         found = solver.solve(T[:, :, i].tolist())
@@ -231,10 +253,10 @@ def _solve(
 
 
 def _canonical(
-    arm: FiveAxisArm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
+    made: _Arm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
 ) -> None:
     """Fill alpha (2, 2, 5, C) of shoulder, elbow, joint, in [-pi, pi], well off axis 1."""
-    posture = closed_form(arm, _ARRAYS)
+    posture, arm = made.posture, made.solver.arm
     x, y = rows[0, 3], rows[1, 3]
 
     def stand(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:
@@ -277,33 +299,25 @@ def _wrap(theta: FloatArray) -> None:
     theta -= turns
 
 
-def _turn(chain: Chain, arm: FiveAxisArm, angles: FloatArray) -> None:
+def _turn(made: _Arm, angles: FloatArray) -> None:
     """From alpha (2, 2, 5, C) to q, each angle in the turn inside its limits if there is one."""
-    slack = tolerances.LIMIT_SLACK
-    limits = zip(chain.lower.tolist(), chain.upper.tolist(), strict=True)
-    for i, (sign, shift, (lower, upper)) in enumerate(
-        zip(arm.signs, arm.shifts, limits, strict=True)
-    ):
-        if sign == 1.0 and not shift and max(-lower, upper) <= np.pi:
-            continue
+    for i, sign, shift, lower, upper in made.turns:
         angle = angles[:, :, i]
         if shift:
             angle -= shift
             _wrap(angle)
         if sign < 0.0:
             np.negative(angle, out=angle)
-        if max(-lower, upper) > np.pi:
-            outside = (angle < lower - slack) | (angle > upper + slack)
+        if max(-lower, upper) > np.pi + tolerances.LIMIT_SLACK:
+            outside = (angle < lower) | (angle > upper)
             for turn in (-2.0 * np.pi, 2.0 * np.pi):
                 other = angle + turn
-                fits = (other >= lower - slack) & (other <= upper + slack)
-                np.copyto(angle, other, where=outside & fits)
+                np.copyto(angle, other, where=outside & (other >= lower) & (other <= upper))
 
 
-def _inside(chain: Chain, angles: FloatArray) -> BoolArray:
+def _inside(made: _Arm, angles: FloatArray) -> BoolArray:
     """(2, 2, C) whether the joint angles (2, 2, 5, C) are inside the limits."""
-    lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
-    inside = angles >= lower[:, None]
-    inside &= angles <= upper[:, None]
+    inside = angles >= made.lower
+    inside &= angles <= made.upper
     one, two, three, four, five = inside.transpose(2, 0, 1, 3)
     return np.asarray(one & two & three & four & five)
