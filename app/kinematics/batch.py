@@ -194,9 +194,11 @@ def _root(x: FloatArray) -> FloatArray:
 def _direction(y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     angle, length = np.atan2(y, x), np.sqrt(x * x + y * y)
     # Sine and cosine cost more than all the rest here.
-    if np.minimum.reduce(length) > _SQUARES_HOLD:
-        return angle, x / length, y / length
-    return angle, np.cos(angle), np.sin(angle)
+    cosine, sine = x / length, y / length
+    if not np.minimum.reduce(length) > _SQUARES_HOLD:
+        short = ~(length > _SQUARES_HOLD)
+        cosine[short], sine[short] = np.cos(angle[short]), np.sin(angle[short])
+    return angle, cosine, sine
 
 
 _ARRAYS: Final = Functions(np.atan2, np.sqrt, _root, _direction)

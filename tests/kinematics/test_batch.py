@@ -105,6 +105,16 @@ def test_a_tool_square_to_the_plane_is_solved_as_alone(chain: Chain) -> None:
     assert_as_one_by_one(chain, np.array(T), 1e-9, 1e-12)
 
 
+def test_no_pose_depends_on_its_neighbours(chain: Chain, rng: np.random.Generator) -> None:
+    T = forward_batch(chain, random_q(chain, rng, 50))
+    alone = inverse_batch(chain, T).q
+    square = se3.from_rotation_translation(so3.rotation_z(0.5 * math.pi), [0.4, 0.0, 0.1])
+    square[:3, 0] = 0.0, 1.0, 0.0
+    on_axis = se3.from_rotation_translation(np.eye(3), [0.0, 0.0, 0.3])
+    among = inverse_batch(chain, np.concatenate((T, [square, on_axis])))
+    np.testing.assert_array_equal(among.q[:50], alone)
+
+
 def test_limits_beyond_a_half_turn_decide_the_turn(chain: Chain) -> None:
     shifted = dataclasses.replace(
         chain,
