@@ -175,7 +175,7 @@
   }
 
   worker.onmessage = ({ data }) => {
-    if (data.link === "up") up = true;
+    if (data.link === "up") [up, silent] = [true, 0];
     else if (data.link === "down") {
       if (up) since = performance.now();
       up = false;
@@ -188,8 +188,8 @@
     else if (data.heard?.is === "stopping") stopped();
     else if (data.heard?.is === "refused") toast(data.heard.why);
     else if (data.heard?.is === "status") {
-      silent = 0;
-      status = data.heard;
+      // Only what is new of it.
+      status = { ...status, ...data.heard };
       draw();
     }
     drawLink();

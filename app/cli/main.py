@@ -14,6 +14,9 @@ from app.errors import KatanaError
 from app.settings import Settings
 from robot_description import URDF_PATH
 
+SHORTEST_SILENCE, LONGEST_SILENCE = 0.2, 2.0
+"""[s] Signs of life are 0.1 s apart, and after 3 s the arm is anybody's."""
+
 FRAMES = ("shoulder", "base")
 
 
@@ -28,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             settings = Settings(
                 host=options.host,
                 port=options.port,
+                silence=options.silence,
                 access=options.access,
                 insecure=options.insecure,
                 tls_cert=options.tls_cert,
@@ -89,6 +93,14 @@ def _parser() -> argparse.ArgumentParser:
         help="a map written by `katana450 workspace --out`, to be shown in the scene",
     )
     serve.add_argument(
+        "--silence",
+        type=_silence,
+        default=Settings.silence,
+        metavar="SECONDS",
+        help="without a sign of life of whoever drives until a moving arm is stopped; the page "
+        f"gives ten a second ({SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
+    )
+    serve.add_argument(
         "--access",
         type=Path,
         metavar="FILE",
@@ -146,6 +158,18 @@ def _parser() -> argparse.ArgumentParser:
             "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
         )
     return parser
+
+
+def _silence(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not SHORTEST_SILENCE <= seconds <= LONGEST_SILENCE:
+        raise argparse.ArgumentTypeError(
+            f"a number of seconds from {SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, not {text!r}"
+        )
+    return seconds
 
 
 def _port(text: str) -> int:

@@ -13,9 +13,8 @@ from typing import Self
 
 from app.errors import LeaseError
 
-HOLD_AFTER = 0.2
-"""[s] Of silence: whoever steers is asked for ten signs of life a second; with two missing nobody
-steers, and an arm that moves is held."""
+BEAT = 0.1
+"""[s] Between two signs of life that whoever drives is asked for."""
 
 LOST_AFTER = 3.0
 """[s] Of silence: a page that reloads is back sooner, one that is gone must not keep the arm."""

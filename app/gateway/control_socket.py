@@ -30,10 +30,7 @@ RATE, BURST = 100.0, 200.0
 """Requests a second, and at once: ten signs of life, 25 jogs, and a hand on the buttons."""
 
 PUSH_EVERY = 0.1
-"""[s] Between two looks at whether there is news; a status is sent only with news in it, ..."""
-
-PUSH_AT_LEAST = 0.5
-"""[s] ... or when this time has passed, so that a page knows silence from peace."""
+"""[s] Between two looks at whether there is news."""
 
 BAD_AT_MOST = 5
 """Requests that are none, until the socket is closed."""
@@ -133,9 +130,9 @@ class ControlSocket:
                 hub.set_speed(window, value)
 
     async def _send(self, window: Window) -> None:
-        """Notices at once, a status with news in it; what a slow line cannot take is left out."""
+        """Notices at once, and what is new of the status; a slow line is told less often."""
         told: dict[str, Any] = {}
-        told_at = looked_at = float("-inf")
+        looked_at = float("-inf")
         while True:
             with suppress(TimeoutError):
                 async with asyncio.timeout(PUSH_EVERY):
@@ -148,9 +145,10 @@ class ControlSocket:
                 continue
             looked_at = t
             now = status.common(self._hub) | status.of(self._hub, window)
-            if now != told or t - told_at >= PUSH_AT_LEAST:
-                told, told_at = now, t
-                await self._say(now)
+            news = {key: value for key, value in now.items() if told.get(key, self) != value}
+            if news:
+                told = now
+                await self._say({"is": "status", **news})
 
     async def _say(self, message: dict[str, Any]) -> None:
         await self._socket.send_text(msgspec.json.encode(message).decode())

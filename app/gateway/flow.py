@@ -17,7 +17,7 @@ OVERDUE = 0.3
 FORGET = 0.005
 """[s/s] What a line needs at its best may grow so fast."""
 
-LEAST, FIRST, MOST = 2_048, 24_576, 262_144
+LEAST, FIRST, MOST = 2_048, 8_192, 262_144
 """Bytes that may be on the way: at least, at first, at most. More while all is seen in time, half
 as many when not."""
 

@@ -55,7 +55,7 @@ class Gateway:
             self.viser: viser.ViserServer = open_server(key)
             self.port: int = self._listening.getsockname()[1]
             self.address = _address(settings, self._listening)
-            self._hub = Hub(time.monotonic)
+            self._hub = Hub(time.monotonic, settings.silence)
             door = Door(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
             app = application(self._hub, door, proxy, self.address)

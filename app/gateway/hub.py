@@ -10,12 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from app.control.lease import HOLD_AFTER, Lease, Person
+from app.control.lease import Lease, Person
 from app.control.state import State
 from app.errors import LeaseError
 from app.gateway.door import Visitor
 from app.gateway.motion import Rates
 from app.kinematics.velocity import JogFrame
+from app.settings import Settings
 
 log = logging.getLogger(__name__)
 
@@ -72,8 +73,10 @@ class Window:
 class Hub:
     """The one place where it is decided who may move the arm. Times are in seconds."""
 
-    def __init__(self, clock: Callable[[], float]) -> None:
+    def __init__(self, clock: Callable[[], float], hold_after: float = Settings.silence) -> None:
+        """``hold_after``: silence of whoever drives [s] that stops an arm that moves."""
         self.clock = clock
+        self._hold_after = hold_after
         self.lease = Lease()
         self.stopped: Stopped | None = None
         self.arm: Arm | None = None
@@ -198,7 +201,7 @@ class Hub:
     def tick(self) -> None:
         """Look whether whoever drives is still there; to be called every TICK."""
         t = self.clock()
-        late = t - self._looked > HOLD_AFTER / 2
+        late = t - self._looked > self._hold_after / 2
         self._looked = t
         # When this thread was held up itself, what came in the meantime is read first.
         if not late:
@@ -212,7 +215,7 @@ class Hub:
         if holder is None or self.arm is None:
             return
         moves = self.arm.state.moving or t - self._jogged < JOG_LASTS
-        if moves and self.stopped is None and self.lease.silence(t) >= HOLD_AFTER:
+        if moves and self.stopped is None and self.lease.silence(t) >= self._hold_after:
             self._halt(Stopped(None, f"The line to {holder.name} broke while the arm moved."))
         self._change(self.lease.expire(t))
 

@@ -23,7 +23,6 @@ def common(hub: Hub) -> dict[str, Any]:
         mood = "moving" if state.moving and state.status is Status.OK else state.status.value
     holder = hub.lease.holder
     return {
-        "is": "status",
         "mood": mood,
         "headline": "" if state is None else headline(state),
         "why": "" if state is None else sentence(state),

@@ -18,7 +18,10 @@ from types import TracebackType
 from typing import Self
 
 ROOT = Path(__file__).resolve().parents[2]
-APP = (sys.executable, "-m", "app", "serve", "--port", "{port}")
+# A machine that runs tests and draws their pictures without a graphics card starves its browsers;
+# what they have to say of being alive comes late then.
+APP = (sys.executable, "-m", "app", "serve", "--port", "{port}", "--silence", "1.5")
+ATTENTIVE_APP = APP[:-2]
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
 # Below the ports that systems hand to outgoing connections, so that none of those can take the

@@ -19,10 +19,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
+from app.control.lease import BEAT
 
-BEAT = 0.1
-"""[s] Between two signs of life, as the page gives them."""
+SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
 QUIET = 0.4
 """[s] Long enough for the server to have sent whatever a message makes it send."""
@@ -79,26 +78,21 @@ class Control:
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
         self.heard: list[dict[str, Any]] = []
+        self.status: dict[str, Any] = {}
+        """As it is known by now."""
         self.alive = True
         self.last_beat = 0.0
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
-
-    @property
-    def status(self) -> dict[str, Any]:
-        """The last one told."""
-        return next(each for each in reversed(self.heard) if each["is"] == "status")
 
     async def say(self, do: str, **request: Any) -> None:
         await self.socket.send(json.dumps({"do": do, **request}))
 
     async def wait(self, seconds: float = 5.0, **wanted: Any) -> dict[str, Any]:
-        """The first status from now on that has these values."""
+        """The status as soon as it has these values."""
         async with asyncio.timeout(seconds):
             while True:
-                with suppress(StopIteration):
-                    status = self.status
-                    if all(status[key] == value for key, value in wanted.items()):
-                        return status
+                if self.status and all(self.status[key] == wanted[key] for key in wanted):
+                    return self.status
                 await asyncio.sleep(0.01)
 
     async def notice(self, kind: str, seconds: float = 5.0) -> dict[str, Any]:
@@ -121,7 +115,9 @@ class Control:
         with suppress(ConnectionClosed):
             async for text in self.socket:
                 message = json.loads(text)
-                if message["is"] != "echo":
+                if message["is"] == "status":
+                    self.status = self.status | message
+                elif message["is"] != "echo":
                     self.heard.append(message)
 
     async def _beat(self) -> None:

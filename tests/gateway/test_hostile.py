@@ -22,7 +22,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.gateway.firewall import LARGEST
 from app.gateway.proxy import MOST
-from tests.browser.server import BARE_APP, AppServer
+from app.settings import Settings
+from tests.browser.server import ATTENTIVE_APP, BARE_APP, AppServer
 from tests.gateway.client import (
     QUIET,
     SUBPROTOCOL,
@@ -444,6 +445,31 @@ def test_who_never_reads_keeps_nobody_waiting(server: AppServer) -> None:
                 assert time.perf_counter() - started < 3.0 + QUIET
 
     asyncio.run(attack())
+
+
+def test_a_driver_whose_page_hangs_stops_the_arm_in_time() -> None:
+    async def hang(url: str) -> list[float]:
+        took = []
+        async with opened(url) as (peer, control):
+            await control.say("take")
+            await control.wait(mine=True)
+            for degrees in (165.0, -170.0, 165.0):
+                await peer.set("Axis 1", value=degrees)
+                await control.wait(mood="moving")
+                control.alive = False
+                await control.wait(mood="stopped")
+                took.append(time.perf_counter() - control.last_beat)
+                control.alive = True
+                await control.say("reset")
+                await control.wait(stopped=None)
+                assert await peer.listen()
+        return took
+
+    with AppServer(ATTENTIVE_APP) as server:
+        took = asyncio.run(hang(server.url))
+    # A status is told every tenth of a second.
+    assert min(took) >= Settings.silence
+    assert min(took) < Settings.silence + 0.2
 
 
 def test_there_is_room_for_many_and_no_more() -> None:

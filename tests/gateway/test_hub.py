@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.control.lease import HOLD_AFTER, LOST_AFTER, Lease, Role
+from app.control.lease import LOST_AFTER, Lease, Role
 from app.control.session import Session
 from app.control.state import Halt, State
 from app.errors import LeaseError
@@ -16,6 +16,7 @@ from app.gateway.door import Visitor
 from app.gateway.hub import TICK, Hub, Window, key_of
 from app.gateway.motion import Rates
 from app.kinematics.velocity import JogFrame
+from app.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
 
@@ -178,7 +179,7 @@ def test_a_driver_who_falls_silent_while_the_arm_moves_stops_it_in_time(table: T
     table.hub.drive(driver.person.key)
     table.wait(1.0, driver)
     table.arm.moves = True
-    table.wait(HOLD_AFTER - TICK)
+    table.wait(Settings.silence - TICK)
     assert moves(table)
     table.wait(2 * TICK)
     assert not moves(table)
@@ -285,7 +286,7 @@ def test_a_jog_that_is_let_go_says_so_to_the_arm(table: Table) -> None:
     table.hub.jog(driver, (0.0,) * 5, JogFrame.BASE)
     assert table.arm.jogs[-1] == ((0.0,) * 5, JogFrame.BASE)
     # A driver who jogged no more and falls silent stops nothing.
-    table.wait(2 * HOLD_AFTER)
+    table.wait(2 * Settings.silence)
     assert table.arm.stops == 0
 
 
