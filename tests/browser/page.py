@@ -32,6 +32,7 @@ READY_SECONDS = 60.0  # a software renderer compiles shaders for up to 22 s
 POLL_MILLISECONDS = 20.0
 THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
+COARSE = 0.5  # pixels drawn for one of the window: a software renderer is four times as fast
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,17 @@ class Camera:
     look_at: tuple[float, float, float] = (0.2, 0.0, 0.22)
     fov: float = 0.7
 
-    @property
-    def query(self) -> str:
-        """The camera as viser's page takes it in its address, with one pixel drawn per pixel."""
+    def query(self, pixels: float) -> str:
+        """The camera as viser's page takes it in its address.
+
+        `pixels` are drawn for each of the window's along either side.
+        """
         values = {
             "initialCameraPosition": ",".join(map(str, self.position)),
             "initialCameraLookAt": ",".join(map(str, self.look_at)),
             "initialCameraFov": str(self.fov),
             # Else viser draws in fewer pixels whenever the machine is slow.
-            "fixedDpr": "1",
+            "fixedDpr": str(pixels),
         }
         return urlencode(values, safe=",")
 
@@ -106,7 +109,7 @@ class ViserPage:
         page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
         try:
-            page.goto(f"{url}/?{camera.query}")
+            page.goto(f"{url}/?{camera.query(1.0 if full_quality else COARSE)}")
             viser_page = cls(page, _viser_frame(page), errors)
             viser_page.wait_ready(nodes)
         except BaseException:
