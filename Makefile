@@ -9,7 +9,7 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test check lint types contracts tests browser robot bench-collision bench-drag \
+.PHONY: run test test-long check lint types contracts tests browser robot bench-collision bench-drag \
         bench-kinematics bench-start pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -34,6 +34,9 @@ browser: $(dev_ok)            ## find a Chromium, or install one
 
 tests: $(dev_ok)
 	$(bin)/python -m pytest $(ARGS)
+
+test-long: $(dev_ok) browser  ## the front door in a real browser, under crowds and thin lines
+	KATANA450_LONG=1 $(bin)/python -m pytest tests/browser/test_gateway.py $(ARGS)
 
 robot: $(dev_ok)              ## rebuild all files of the robot from the numbers in robot_description/cad
 	$(bin)/python -m robot_description.cad

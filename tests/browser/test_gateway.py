@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -27,6 +28,11 @@ from tests.browser.test_app import Robot
 from tests.gateway.client import SUBPROTOCOL as VISER
 from tests.gateway.client import ask, enter, page_name, websocket
 from tests.gateway.slow_link import SlowLink
+
+pytestmark = pytest.mark.skipif(
+    "KATANA450_LONG" not in os.environ,
+    reason="takes a quarter of an hour in a software renderer: make test-long",
+)
 
 MOVE = "/target/move"
 READY = np.array(Settings().ready)
