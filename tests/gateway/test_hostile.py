@@ -481,13 +481,17 @@ def test_there_is_room_for_many_and_no_more() -> None:
                 path = f"/viser?page={page_name()}"
                 return websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL])
 
-            room = 0
+            found_room: list[object] = []
+
+            async def crowd_in() -> None:
+                while len(found_room) <= MOST:
+                    found_room.append(await stack.enter_async_context(another()))
+
             with pytest.raises(InvalidStatus) as refused:
-                for room in range(MOST + 1):  # noqa: B007
-                    await stack.enter_async_context(another())
+                await crowd_in()
             assert refused.value.response.status_code == 403
             # One that a slow machine has not finished closing may still have its place.
-            assert MOST - 3 <= room <= MOST - 1
+            assert MOST - 3 <= len(found_room) <= MOST - 1
             assert await moves_the_arm(good, 3.0)
 
     with AppServer() as server:
