@@ -72,15 +72,15 @@ def test_a_theme_is_of_one_window(open_page: OpenPage, artefacts: Path) -> None:
     with AppServer() as server:
         page, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
 
-        def corner(window: ViserPage) -> FloatArray:
-            patch = window.picture()[760:790, 20:60].reshape(-1, 3)
+        def sky(window: ViserPage) -> FloatArray:
+            patch = window.picture()[90:110, 500:540].reshape(-1, 3)
             return np.asarray(np.median(patch, axis=0), dtype=float)
 
         page.frame.get_by_text("Show", exact=True).click()
         page.click_button("Dark")
-        page.wait_until(lambda: corner(page).max() < max(DARK.floor) + 30, "the night")
+        page.wait_until(lambda: sky(page).max() < max(DARK.floor) + 30, "the night")
         page.screenshot(artefacts / "look-dark.png")
-        assert corner(other).min() > min(LIGHT.floor) - 40
+        assert sky(other).min() > min(LIGHT.floor) - 40
         page.click_button("Light")
-        page.wait_until(lambda: corner(page).min() > min(LIGHT.floor) - 40, "the day")
+        page.wait_until(lambda: sky(page).min() > min(LIGHT.floor) - 40, "the day")
         assert page.errors == other.errors == []
