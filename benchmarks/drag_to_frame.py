@@ -60,9 +60,7 @@ def open_side(
 ) -> Side:
     """Start an app, open a window on it and take its gizmo by an arrow."""
     server = stack.enter_context(AppServer(command))
-    page = stack.enter_context(
-        closing(ViserPage.open(browser, server.url, nodes=[GIZMO], stub_draws=True))
-    )
+    page = stack.enter_context(closing(ViserPage.open(browser, server.url, nodes=[GIZMO])))
     page.frame.evaluate(SCRIPT.read_text(encoding="utf-8"))
     if not page.frame.evaluate("(prefixes) => harness.watch(prefixes)", prefixes):
         raise SystemExit(f"`{shlex.join(command)}` shows no node under {' or '.join(prefixes)}")

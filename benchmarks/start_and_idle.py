@@ -24,7 +24,7 @@ from typing import NamedTuple
 from playwright.sync_api import Browser
 
 from tests.browser.chromium import launched
-from tests.browser.page import ViserPage
+from tests.browser.page import Drawing, ViserPage
 from tests.browser.server import APP, BARE_APP, AppServer
 
 SETTLE_SECONDS = 3.0
@@ -70,7 +70,7 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
         starting = starter.submit(server.start)
         wait_for_port(server.port)
         port = time.perf_counter() - started
-        page = ViserPage.open(browser, server.url, nodes=nodes)
+        page = ViserPage.open(browser, server.url, nodes=nodes, drawing=Drawing.ALWAYS)
         times = Times(port, time.perf_counter() - started)
         starting.result()
         share = None

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.browser.chromium import launched
-from tests.browser.page import Camera, ViserPage
+from tests.browser.page import Camera, Drawing, ViserPage
 from tests.browser.server import AppServer
 
 IMAGES = Path(__file__).with_name("images")
@@ -57,7 +57,7 @@ def main() -> None:
             print(f"{number}/{len(PICTURES)} {take.__name__}", flush=True)
             with AppServer() as server:
                 page = ViserPage.open(
-                    browser, server.url, camera=camera, full_quality=True, window=WINDOW
+                    browser, server.url, camera=camera, drawing=Drawing.BEST, window=WINDOW
                 )
                 take(page)
                 page.close()

@@ -13,6 +13,9 @@ from app.gateway.gateway import Gateway
 from app.settings import Settings
 from robot_description import URDF_PATH
 
+AWAKE = 0.2
+"""[s] How soon a signal is heeded."""
+
 
 def serve(
     settings: Settings,
@@ -45,7 +48,9 @@ def serve(
         assembly = Assembly(gateway, settings, urdf, tool, workspace)
         assembly.start()
         print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
-        stopping.wait()
+        # A signal that another thread is given does not wake this one from its wait.
+        while not stopping.wait(AWAKE):
+            pass
         gateway.stop()
         assembly.stop()
     finally:

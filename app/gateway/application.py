@@ -26,7 +26,7 @@ LARGEST_BODY = 1024
 """Bytes of what is sent by POST."""
 
 TRIES, AT_ONCE = 2.0, 20.0
-"""Links that are tried a second, and at once, by everybody together."""
+"""Bad links that are answered a second, and at once, of everybody together."""
 
 
 class _Entry(msgspec.Struct, forbid_unknown_fields=True):
@@ -65,10 +65,11 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
             raise HTTPException(400, "A token is asked for.") from error
         if not entry.token and door.visitor(request.cookies) is not None:
             return Response(status_code=204)
-        if entry.token and not tries.take(hub.clock()):
-            raise HTTPException(429, "Too many tries. Wait a moment.")
         cookie = door.welcome(entry.token)
         if cookie is None:
+            # Who has a good link is let in, however many others guess.
+            if entry.token and not tries.take(hub.clock()):
+                raise HTTPException(429, "Too many tries. Wait a moment.")
             log.warning("Somebody came with a link that is no good (any more).")
             raise HTTPException(401, "This link is no good, or no good any more. Ask for another.")
         return Response(status_code=204, headers={"Set-Cookie": cookie})

@@ -126,6 +126,8 @@ class _Line:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            # A farewell would wait behind pictures that nobody fetches any more.
+            self._upstream.transport.abort()
             self._hub.hide(self._flow)
 
     async def _down(self) -> None:

@@ -6,8 +6,10 @@ import base64
 import json
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal, Self
 from urllib.parse import urlencode
@@ -33,6 +35,16 @@ POLL_MILLISECONDS = 20.0
 THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
 COARSE = 0.5  # pixels drawn for one of the window: a software renderer is four times as fast
+
+
+class Drawing(StrEnum):
+    """When a window draws, which without a graphics card is most of what a browser does."""
+
+    PICTURES = "pictures"
+    """For pictures of it alone. Else all but the drawing is done, frame by frame."""
+    ALWAYS = "always"
+    BEST = "best"
+    """Always, with shadows, smooth edges and every pixel."""
 
 
 @dataclass(frozen=True)
@@ -88,20 +100,18 @@ class ViserPage:
         *,
         camera: Camera | None = None,
         nodes: Sequence[str] = (),
-        stub_draws: bool = False,
-        full_quality: bool = False,
+        drawing: Drawing = Drawing.PICTURES,
         window: tuple[int, int] = WINDOW,
     ) -> Self:
         """Open `url` in a window of its own and wait until the scene can be used.
 
-        `nodes` must be there besides whatever the server has sent by then. `stub_draws` leaves
-        out all WebGL drawing, for measuring. Shadows and smooth edges are slow, so they are there
-        in `full_quality` alone.
+        `nodes` must be there besides whatever the server has sent by then.
         """
         camera = camera or Camera()
         width, height = window
         context = browser.new_context(viewport={"width": width, "height": height})
-        options = json.dumps({"stubDraws": stub_draws, "fullQuality": full_quality})
+        best = drawing is Drawing.BEST
+        options = json.dumps({"draws": drawing is not Drawing.PICTURES, "fullQuality": best})
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
         context.add_init_script(f"window.harness = {options};\n{scripts}")
         page = context.new_page()
@@ -109,7 +119,7 @@ class ViserPage:
         page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
         try:
-            page.goto(f"{url}/?{camera.query(1.0 if full_quality else COARSE)}")
+            page.goto(f"{url}/?{camera.query(1.0 if best else COARSE)}")
             viser_page = cls(page, _viser_frame(page), errors)
             viser_page.wait_ready(nodes)
         except BaseException:
@@ -277,6 +287,20 @@ class ViserPage:
         thumb = self._labelled(label).get_by_role("slider")
         return float(thumb.get_attribute("aria-valuenow") or "nan")
 
+    def slider_values(self) -> dict[str, float]:
+        """What every slider shows, by its label."""
+        shown: dict[str, float] = self.frame.evaluate(
+            """() => {
+                const sliders = [...document.querySelectorAll("[role=slider]")];
+                return Object.fromEntries(sliders.map((each) => {
+                    const { id } = each.closest(".mantine-Slider-root");
+                    const label = document.querySelector(`label[for="${id}"]`);
+                    return [label?.innerText, Number(each.getAttribute("aria-valuenow"))];
+                }));
+            }"""
+        )
+        return shown
+
     def drag_slider(self, label: str, value: float, *, steps: int = DRAG_STEPS) -> float:
         """Drag a slider's thumb to a value as nearly as pixels allow; return what it then shows."""
         slider = self._labelled(label)
@@ -332,7 +356,6 @@ class ViserPage:
 
     def picture(self) -> NDArray[np.uint8]:
         """Colours of the window (height, width, 3), indexed by pixels as `project` gives them."""
-        self.wait_drawn()
         return np.asarray(imageio.imread(self._png(), extension=".png")[..., :3])
 
     def screenshot(self, path: Path) -> Path:
@@ -342,13 +365,24 @@ class ViserPage:
         return path
 
     def _png(self) -> bytes:
+        with self._drawing():
+            try:
+                # Given a path, Playwright would write it from a thread that it never ends.
+                return self.page.screenshot(timeout=20_000)
+            except PlaywrightTimeoutError:
+                # The browser waits for a frame in vain while shaders compile; the canvas does not.
+                data: str = self.frame.evaluate("__viserMutable.canvas.toDataURL('image/png')")
+                return base64.b64decode(data.partition(",")[2])
+
+    @contextmanager
+    def _drawing(self) -> Iterator[None]:
+        """What is shown meanwhile is drawn."""
+        before = self.frame.evaluate("() => harness.draw(true)")
+        self.wait_drawn()
         try:
-            # Given a path, Playwright would write it from a thread that it never ends.
-            return self.page.screenshot(timeout=20_000)
-        except PlaywrightTimeoutError:
-            # The browser waits for a frame in vain while shaders compile; the canvas does not.
-            data: str = self.frame.evaluate("() => __viserMutable.canvas.toDataURL('image/png')")
-            return base64.b64decode(data.partition(",")[2])
+            yield
+        finally:
+            self.frame.evaluate("(draws) => harness.draw(draws)", before)
 
 
 def _viser_frame(page: Page) -> Frame:

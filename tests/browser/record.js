@@ -39,7 +39,12 @@
     }
   };
 
-  // Software rendering is slow: no antialiasing, and no drawing at all where asked.
+  // Software rendering is slow: no antialiasing, and no drawing but where asked.
+  harness.draw = (draws) => {
+    const before = harness.draws;
+    harness.draws = draws;
+    return before;
+  };
   const DRAWS = ["drawArrays", "drawElements", "drawArraysInstanced", "drawElementsInstanced"];
   const UNMASKED_RENDERER_WEBGL = 0x9246;
   const getContext = HTMLCanvasElement.prototype.getContext;
@@ -51,7 +56,10 @@
     });
     if (gl === null || gl.recorded) return gl;
     gl.recorded = true;
-    if (harness.stubDraws) for (const name of DRAWS) gl[name] = () => {};
+    for (const name of DRAWS) {
+      const draw = gl[name];
+      gl[name] = (...args) => harness.draws && draw.apply(gl, args);
+    }
     // The name of a software renderer makes viser cover the scene with a warning.
     const getParameter = gl.getParameter;
     gl.getParameter = (name) =>

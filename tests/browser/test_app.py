@@ -45,7 +45,8 @@ class Robot:
     @property
     def q(self) -> FloatArray:
         """The joints [rad] that the sliders report."""
-        return np.radians([self.page.slider_value(label) for label in AXES])
+        shown = self.page.slider_values()
+        return np.radians([shown[label] for label in AXES])
 
     def reported(self, tool: str = "tcp") -> FloatArray:
         """The tool's pose in the base frame by the product of exponentials of those joints."""
@@ -175,17 +176,17 @@ def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artef
 
 
 def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot, model: RobotModel) -> None:
-    node = robot.path["pan_link"]
+    node, since = robot.path["pan_link"], time.time()
     robot.page.drag_slider("Axis 1", 120.0)
     robot.settle()
-    turns = robot.page.messages("SetOrientationMessage", node=node, last=20)
+    turns = robot.page.messages("SetOrientationMessage", node=node, since=since)
     # q and -q are one turn.
     halves = [math.atan2(m.body["wxyz"][3], m.body["wxyz"][0]) for m in turns]
     angles = 2.0 * np.unwrap(halves, period=math.pi)
     steps, whole = np.abs(np.diff(angles)), abs(angles[-1] - angles[0])
     speed = model.arm.chain.speed[0]
     took = turns[-1].time - turns[0].time
-    assert len(turns) == 20
+    assert len(turns) > 20
     # Frames jitter on their way; over all of them the speed is the joint's, and none is a leap.
     assert whole / took <= speed * 1.1
     assert steps.max() < 0.25 * whole
@@ -220,15 +221,13 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
     page = robot.page
     with page.grip_arrow(MOVE, "x") as grip:
         grip.sweep(0.4, 8)
-        page.wait_until(lambda: "out of reach" in robot.said(), "the reason")
-        held = robot.gizmo()
-        said = robot.said()
+
+        def told() -> bool:
+            gap = float(np.linalg.norm(robot.gizmo() - robot.drawn()[:3, 3]))
+            return f"{1e3 * gap:.0f} mm out of reach" in robot.said()
+
+        page.wait_until(told, "how far the arm ends from the handle")
         page.screenshot(artefacts / "app-out-of-reach.png")
-        robot.page.wait_until(
-            lambda: np.allclose(robot.sent(), robot.reported(), atol=1e-6), "the arm to arrive"
-        )
-        gap = float(np.linalg.norm(held - robot.drawn()[:3, 3]))
-        assert f"{1e3 * gap:.0f} mm out of reach" in said
     # Let go, the handle comes back to the tool, and the reason stays to be read.
     page.wait_until(
         lambda: np.allclose(robot.gizmo(), robot.drawn()[:3, 3], atol=1e-5), "the handle to return"
@@ -285,7 +284,7 @@ def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None
 
 
 def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(
-    robot: Robot, server: AppServer, open_page: OpenPage, model: RobotModel, artefacts: Path
+    robot: Robot, server: AppServer, open_page: OpenPage, model: RobotModel
 ) -> None:
     other = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
     robot.page.drag_slider("Axis 1", -50.0)
@@ -304,7 +303,6 @@ def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(
     robot.settle()
     other.page.press_in_bar("Let go")
     assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
-    other.page.screenshot(artefacts / "app-second-browser.png")
     assert other.page.errors == []
 
 
@@ -320,7 +318,7 @@ def come_back(robot: Robot, server: AppServer) -> None:
 
 
 def test_killed_and_restarted_the_app_comes_back_whole(
-    open_page: OpenPage, model: RobotModel, artefacts: Path
+    open_page: OpenPage, model: RobotModel
 ) -> None:
     with AppServer() as server:
         robot = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
@@ -331,7 +329,6 @@ def test_killed_and_restarted_the_app_comes_back_whole(
         assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 2
         robot.page.drag_arrow(MOVE, "z", 0.05)
         robot.settle()
-        robot.page.screenshot(artefacts / "app-restarted.png")
 
 
 def test_killed_in_mid_drag_the_app_comes_back_at_rest(

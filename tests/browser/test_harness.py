@@ -63,10 +63,13 @@ def _rotation_vector(T: Matrix) -> Matrix:
 @pytest.mark.parametrize(("axis", "metres"), [("x", -0.06), ("y", 0.05), ("z", 0.07)])
 def test_an_arrow_moves_the_box_along_its_axis(page: ViserPage, axis: Axis, metres: float) -> None:
     page.drag_arrow(MOVE, axis, metres)
-    moved = page.node_pose(BOX)[:3, 3] - START
     along = "xyz".index(axis)
-    assert moved[along] == pytest.approx(metres, abs=1e-5)
-    assert np.delete(moved, along) == pytest.approx([0.0, 0.0], abs=1e-6)
+
+    def moved() -> Matrix:
+        return page.node_pose(BOX)[:3, 3] - START
+
+    page.wait_until(lambda: moved()[along] == pytest.approx(metres, abs=1e-5), "the box")
+    assert np.delete(moved(), along) == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,9 @@ SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 QUIET = 0.4
 """[s] Long enough for the server to have sent whatever a message makes it send."""
 
+FAREWELL = 0.5
+"""[s] As long as is waited for the server's side of a goodbye."""
+
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
 
 
@@ -68,6 +71,8 @@ def websocket(url: str, path: str, cookie: str = "", **options: Any) -> connect:
         additional_headers=headers,
         max_size=None,
         compression=None,
+        # Who reads no more hears no farewell either.
+        close_timeout=FAREWELL,
         **options,
     )
 
