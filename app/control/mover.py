@@ -99,7 +99,8 @@ class Mover:
         """Where a brake begun now ends (n,) [rad], how far off the tool is then [m], and when."""
         limiter, motion = self._any, state.motion
         chain = self._arm.chain_to(state.tool)
-        end = limiter.halt(motion)
+        # A plan that ends at a limit may miss it by rounding, and nobody could go there.
+        end = chain.clamp(limiter.halt(motion))
         way = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
         return frozen(end), way, limiter.time_to_halt(motion)
 

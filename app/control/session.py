@@ -35,6 +35,9 @@ from app.motion.limiter import Motion
 TOOL_SPEED = 0.5
 """[m/s] The most of the tool point, unless somebody says otherwise: a person can follow it."""
 
+STILL = frozen(np.zeros(5))
+"""The rates of a jog that ends."""
+
 SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale)
 """What counts while a stop holds the arm."""
 
@@ -265,13 +268,17 @@ class Session:
         goal = self._mover.halt(state)[0]
         chain = self.arm.chain_to(state.tool)
         contact = tuple(f for f in state.findings if f.reason is Reason.CONTACT)
+        jogging: Jogging | None = state.jogging
+        if state.t >= state.jogging.until:
+            # Braked as a jog, in step, the tool stays on its way.
+            jogging = None if state.motion.at_rest else replace(state.jogging, rates=STILL)
         return replace(
             state,
             goal=goal,
             target=JointTarget(goal),
             branch=branch_of(chain, goal),
             findings=contact,
-            jogging=None if state.t >= state.jogging.until else state.jogging,
+            jogging=jogging,
         )
 
     @staticmethod

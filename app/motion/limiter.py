@@ -122,20 +122,22 @@ class Limiter:
     def at_rate(self, now: Motion, qd: FloatArray, dt: float, share: float = 1.0) -> Motion:
         """The motion ``dt`` [s] on, on its way to the joint rates ``qd`` (n,) [rad/s].
 
-        From rest the joints get up to them in step, so the direction is that of ``qd`` at once. A
-        joint that could then not stop before its limit brakes instead.
+        The joints get to them in step, so that the direction stays what it is. Where one could then
+        not stop before its limit it brakes as hard as it may, and the others go on by themselves.
         """
         if dt <= 0.0:
             return now
         wanted = np.clip(qd, -share * self.limits.speed, share * self.limits.speed)
+        synchronization = Synchronization.Phase
         for _ in range(len(wanted) + 1):
-            ahead = self._rates(now, wanted, dt, share, Synchronization.Phase)
+            ahead = self._rates(now, wanted, dt, share, synchronization)
             halt = self.halt(ahead)
             beyond = (halt < self.limits.lower) | (halt > self.limits.upper)
-            if not (beyond & (wanted != 0.0)).any():
+            if not beyond.any():
                 return ahead
             wanted = np.where(beyond, 0.0, wanted)
-        return ahead
+            synchronization = Synchronization.No
+        return self.stop(now, dt)
 
     def pause(self, now: Motion, goal: FloatArray, dt: float) -> Motion:
         """The motion ``dt`` [s] on when it brakes on its way to ``goal``, so that it can go on."""
