@@ -6,6 +6,11 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import imageio.v3 as imageio
+import numpy as np
+from numpy.typing import NDArray
+
+from app.view.cameras import Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
 from tests.browser.server import AppServer
@@ -43,8 +48,56 @@ def out_of_reach(page: ViserPage) -> None:
         page.screenshot(IMAGES / "out-of-reach.png")
 
 
+POSES = {
+    "ready": (0.0, -68.0, 85.0, 8.0, 0.0),
+    "reaching": (-30.0, -40.0, 45.0, 35.0, 0.0),
+    "upright": (40.0, -92.0, 12.0, 20.0, 60.0),
+    "folded": (110.0, -112.0, 112.0, 70.0, -90.0),
+}
+"""[degrees] Of the gallery."""
+
+BACK = Camera((-0.85, 0.75, 0.55), (0.1, 0.0, 0.28))
+"""The sixth view; the others are the panel's."""
+
+TILE = (480, 420)
+"""Pixels of each picture of the gallery."""
+
+
+def gallery(page: ViserPage) -> None:
+    """A sheet a theme: each pose a row, each camera a column."""
+    page.page.set_viewport_size({"width": 1300, "height": 900})
+    page.frame.get_by_text("Show", exact=True).click()
+    for theme in ("Light", "Dark"):
+        page.click_button(theme)
+        rows = []
+        for pose in POSES.values():
+            for number, angle in enumerate(pose, start=1):
+                page.type_number(f"Axis {number}", angle)
+            at_rest(page)
+            row = []
+            for preset in Preset:
+                page.click_button(preset.value)
+                page.page.wait_for_timeout(700)
+                row.append(tile(page))
+            page.look_from(BACK)
+            page.page.wait_for_timeout(700)
+            row.append(tile(page))
+            rows.append(np.hstack(row))
+        imageio.imwrite(IMAGES / f"gallery-{theme.lower()}.jpg", np.vstack(rows), quality=82)
+
+
+def tile(page: ViserPage) -> NDArray[np.uint8]:
+    """The middle of the scene."""
+    left, top, width, height = page.scene_rectangle()
+    picture = page.picture()
+    across, down = TILE
+    x, y = int(left + (width - across) / 2), int(top + (height - down) / 2)
+    return picture[y : y + down, x : x + across]
+
+
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera((0.98, -0.82, 0.62), (0.17, 0.0, 0.25), math.radians(40.0)),
+    gallery: Camera(),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
 

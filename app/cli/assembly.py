@@ -49,7 +49,15 @@ class Assembly:
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
         mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
-        self._view = View(gateway.viser, model, self._loop, mailbox, settings.frame_rate, stored)
+        self._view = View(
+            gateway.viser,
+            model,
+            self._loop,
+            mailbox,
+            session.choices,
+            settings.frame_rate,
+            stored,
+        )
         gateway.attach(self._loop, mailbox, self._view.let_go)
 
     def start(self) -> None:

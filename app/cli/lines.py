@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from app.control.choices import met
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
@@ -18,7 +19,9 @@ from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
 from app.kinematics.projection import project
+from app.robot.collision import standing_around, world_of
 from app.robot.model import load
+from app.robot.props import load_props
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
@@ -37,6 +40,10 @@ class Kinematics:
         self._badges = badges
         model = load(urdf, tool)
         self._arm = model.arm
+        self._world = None
+        if badges:
+            world, _ = world_of(model)
+            self._world = world and world.with_obstacles(standing_around(load_props()))
         self._T_frame_shoulder = model.T_base_shoulder if in_base_frame else np.eye(4)
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -50,8 +57,8 @@ class Kinematics:
 
         The residuals say how far that pose is from ``T``, limits of the joints left aside:
         ``within_limits`` tells of each solution whether the arm can go there. With badges there are
-        also its way from ``q`` ([n rad]; the zero posture if not given) and its smallest singular
-        value.
+        also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
+        value, and the two parts in contact there with the finger joint at 0, if any are.
         """
         chain = self._chain(request, {"T", "tool", "q"} if self._badges else {"T", "tool"})
         start = chain.check_q(request.get("q", [0.0] * chain.n))
@@ -68,11 +75,20 @@ class Kinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
-                | (_badge(Badge.of(chain, solution, start)) if self._badges else {})
+                | (self._badge(Badge.of(chain, solution, start)) if self._badges else {})
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
             "residual_rad": max(so3.angle(T_shoulder[:3, :3], T_q[:3, :3]) for T_q in reached),
+        }
+
+    def _badge(self, badge: Badge) -> dict[str, Any]:
+        contact = met(self._world, badge.q, 0.0)
+        return {
+            "distance_rad": badge.distance,
+            "time_s": badge.time,
+            "smallest_singular_value": badge.smallest_singular_value,
+            "contact": None if contact is None else contact.parts,
         }
 
     def _chain(self, request: Mapping[str, Any], keys: set[str]) -> Chain:
@@ -80,14 +96,6 @@ class Kinematics:
         if unknown:
             raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
         return self._arm.chain_to(request.get("tool", self._arm.default_tool))
-
-
-def _badge(badge: Badge) -> dict[str, float]:
-    return {
-        "distance_rad": badge.distance,
-        "time_s": badge.time,
-        "smallest_singular_value": badge.smallest_singular_value,
-    }
 
 
 def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> None:

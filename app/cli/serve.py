@@ -29,6 +29,7 @@ def serve(
     ``workspace``: file of a reachability map that can be shown.
     """
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
+    logging.getLogger("app").setLevel(logging.INFO)
     stopping = threading.Event()
 
     def stop(_signal: int, _frame: FrameType | None) -> None:

@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.collision.clearance import STOP
+from app.collision.contact import Contact
+from app.collision.world import World
 from app.control.arm import Arm
 from app.control.state import PoseTarget, State
+from app.geometry.arrays import FloatArray
 from app.kinematics.badge import Badge
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.projection import Projection, project
 from app.kinematics.tool import ToolTarget
 from app.kinematics.tracker import leap
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A branch to take. contact: what the arm would meet at its end; None when nothing."""
+
+    badge: Badge
+    contact: Contact | None
 
 
 def wish(arm: Arm, state: State) -> ToolTarget:
@@ -33,7 +49,17 @@ def choice(arm: Arm, state: State, branch: Branch) -> Projection:
     return leap(chain, state.goal, wish_on(arm, state, branch), branch, state.reading)
 
 
-def choices(arm: Arm, state: State) -> tuple[Badge, ...]:
-    """The choice on each of BRANCHES, seen from where the arm is."""
+def choices(arm: Arm, state: State, world: World | None = None) -> tuple[Choice, ...]:
+    """The choice on each of BRANCHES, seen from where the arm is.
+
+    world: what must not be touched; without one nothing is said of contacts.
+    """
     chain = arm.chain_to(state.tool)
-    return tuple(Badge.of(chain, choice(arm, state, branch), state.q) for branch in BRANCHES)
+    found = [Badge.of(chain, choice(arm, state, branch), state.q) for branch in BRANCHES]
+    return tuple(Choice(badge, met(world, badge.q, state.gripper)) for badge in found)
+
+
+def met(world: World | None, q: FloatArray, gripper: float) -> Contact | None:
+    """The two parts that are too near to each other with the joints at ``q`` (n,) [rad]."""
+    nearest = None if world is None else world.nearest(np.append(q, gripper))
+    return nearest if nearest is not None and nearest.distance < STOP else None

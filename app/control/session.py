@@ -11,7 +11,7 @@ from app import tolerances
 from app.collision.world import World
 from app.control import commands as cmd
 from app.control.arm import Arm
-from app.control.choices import choice, wish, wish_on
+from app.control.choices import Choice, choice, choices, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.mover import Mover
 from app.control.state import (
@@ -94,6 +94,10 @@ class Session:
                 raise InputError(f"This arm has {n} joints, the command {q.size}.")
             case cmd.SetTool(name=name):
                 self.arm.chain_to(name)
+
+    def choices(self, state: State) -> tuple[Choice, ...]:
+        """What there is to choose from on each branch."""
+        return choices(self.arm, state, self.world)
 
     def step(self, state: State, commands: Iterable[cmd.Command], t: float) -> State:
         """Take the commands in order, then move the setpoints on by the time that has passed.

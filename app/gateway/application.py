@@ -78,6 +78,11 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
         _known(door, request)
         return JSONResponse(status.common(hub))
 
+    async def ledger(request: Request) -> Response:
+        """What held the arm back, when, and who drove it."""
+        _known(door, request)
+        return JSONResponse(hub.journal.told())
+
     async def stop(request: Request) -> Response:
         """The same as the button, for programs and for a page whose socket is gone."""
         visitor = _known(door, request)
@@ -96,6 +101,7 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
         Route("/viser/", viser_index),
         Route("/enter", enter, methods=["POST"]),
         Route("/status", state),
+        Route("/ledger", ledger),
         Route("/stop", stop, methods=["POST"]),
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),

@@ -6,14 +6,16 @@ Lives in the gateway's one thread; what it decides reaches the arm through the m
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from app.control.lease import Lease, Person
+from app.control.ledger import Entry
 from app.control.state import State
 from app.errors import LeaseError
 from app.gateway.door import Visitor
+from app.gateway.journal import Journal
 from app.gateway.motion import Rates
 from app.kinematics.velocity import JogFrame
 from app.settings import Settings
@@ -35,6 +37,9 @@ class Arm(Protocol):
 
     @property
     def state(self) -> State: ...
+
+    @property
+    def ledger(self) -> Sequence[Entry]: ...
 
     def stop(self) -> None: ...
 
@@ -81,6 +86,7 @@ class Hub:
         self.stopped: Stopped | None = None
         self.arm: Arm | None = None
         """None until the arm is there."""
+        self.journal = Journal()
         self._windows: dict[str, Window] = {}
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
@@ -206,9 +212,17 @@ class Hub:
         # When this thread was held up itself, what came in the meantime is read first.
         if not late:
             self._listen_for_silence(t)
+        if self.arm is not None:
+            self.journal.follow(self.arm.ledger, self._who())
         if self.stopped is not None and self.arm is not None and self.arm.state.halted is None:
             # An arm that came after the stop, or an error that undid it.
             self.arm.stop()
+
+    def _who(self) -> str | None:
+        """Who has a hand in what the arm does now."""
+        if self.stopped is not None:
+            return self.stopped.by
+        return None if self.lease.holder is None else self.lease.holder.name
 
     def _listen_for_silence(self, t: float) -> None:
         holder = self.lease.holder

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from app.control import commands as cmd
+from app.control.ledger import Entry
 from app.control.state import State
 from app.errors import InputError
 from app.kinematics.velocity import JogFrame
@@ -30,6 +31,11 @@ class Motion:
     def state(self) -> State:
         """The newest."""
         return self._loop.snapshot.state
+
+    @property
+    def ledger(self) -> tuple[Entry, ...]:
+        """What held it back of late, oldest first."""
+        return self._loop.ledger
 
     def stop(self) -> None:
         """Rest as fast as the arm can; it obeys nothing until it is released."""

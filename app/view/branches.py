@@ -13,10 +13,9 @@ from typing import Any
 
 import viser
 
-from app.control.choices import choices
+from app.control.choices import Choice
 from app.control.commands import TakeBranch
 from app.control.state import State
-from app.kinematics.badge import Badge
 from app.kinematics.branch import BRANCHES
 from app.robot.model import RobotModel
 from app.view.scene import Colour, GhostNodes
@@ -27,6 +26,9 @@ COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (2
 
 OPACITY = 0.25
 
+Find = Callable[[State], tuple[Choice, ...]]
+"""The choice on each of BRANCHES."""
+
 Listen = Callable[[Any, Callable[[], TakeBranch]], None]
 """Makes a person's click on a button or a shape send what the function makes."""
 
@@ -35,16 +37,22 @@ class BranchList:
     """Looking at the branches changes nothing."""
 
     def __init__(
-        self, server: viser.ViserServer, model: RobotModel, listen: Listen, state: State
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        find: Find,
+        listen: Listen,
+        state: State,
     ) -> None:
         self._server = server
+        self._find = find
         self._model = model
         self._listen = listen
         self._seen = state
         self._ghosts: list[GhostNodes] = []
         # The box is ticked in a thread of viser's.
         self._lock = threading.Lock()
-        found = choices(model.arm, state)
+        found = find(state)
         self._table = server.gui.add_html(_rows(found))
         self._box = server.gui.add_checkbox(
             "Ghosts of the others",
@@ -69,7 +77,7 @@ class BranchList:
             self._draw(self._seen)
 
     def _draw(self, state: State) -> None:
-        found = choices(self._model.arm, state)
+        found = self._find(state)
         rows = _rows(found)
         if rows != self._table.content:
             self._table.content = rows
@@ -77,10 +85,10 @@ class BranchList:
             # Made when first wanted: three more arms are half of what a page loads.
             self._ghosts = [self._ghost(number) for number in range(len(BRANCHES))]
         for ghost, choice in zip(self._ghosts, found, strict=False):
-            visible = self._box.value and choice.branch != state.branch
+            visible = self._box.value and choice.badge.branch != state.branch
             ghost.root.visible = visible
             if visible:
-                ghost.move(self._model.joint_angles(choice.q, state.gripper))
+                ghost.move(self._model.joint_angles(choice.badge.q, state.gripper))
 
     def _ghost(self, number: int) -> GhostNodes:
         branch = BRANCHES[number]
@@ -91,11 +99,11 @@ class BranchList:
         return ghost
 
 
-def _rows(found: tuple[Badge, ...]) -> str:
+def _rows(found: tuple[Choice, ...]) -> str:
     head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
     rows = "".join(
-        f"<tr data-branch='{choice.branch}'><th><i style='background:rgb{colour}'></i>"
-        f"{choice.branch}</th>"
+        f"<tr data-branch='{choice.badge.branch}'><th><i style='background:rgb{colour}'></i>"
+        f"{choice.badge.branch}</th>"
         + "".join(f"<td>{escape(said)}</td>" for said in badge(choice))
         + "</tr>"
         for choice, colour in zip(found, COLOURS, strict=True)

@@ -1,20 +1,17 @@
-"""The ledger in the panel and in the log: what held the arm back, when, by how much, what to do."""
+"""The ledger in the panel: what held the arm back, when, by how much, what to do."""
 
 from __future__ import annotations
 
-import logging
 import time
 from html import escape
 
 import viser
 
 from app.control.ledger import Entry
-from app.view.texts import REASONS
-
-log = logging.getLogger(__name__)
+from app.view.texts import told
 
 SHOWN = 12
-"""Entries in the panel; the log has all."""
+"""Entries in the panel; the log has all, and who drove."""
 
 
 class LedgerList:
@@ -30,21 +27,13 @@ class LedgerList:
         """Show what has come since."""
         if not ledger or ledger[-1] is self._told:
             return
-        since = ledger.index(self._told) + 1 if self._told in ledger else 0
-        for entry in ledger[since:]:
-            if entry.began:
-                log.info("%s", _said(entry))
         self._told = ledger[-1]
         came = [entry for entry in ledger if entry.began][-SHOWN:]
-        self._list.content = _page([(self._clock(entry), _said(entry)) for entry in reversed(came)])
+        rows = [(self._clock(entry), told(entry.finding)) for entry in reversed(came)]
+        self._list.content = _page(rows)
 
     def _clock(self, entry: Entry) -> str:
         return time.strftime("%H:%M:%S", time.localtime(self._epoch + entry.t))
-
-
-def _said(entry: Entry) -> str:
-    said = REASONS[entry.finding.reason](entry.finding)
-    return said[0].upper() + said[1:]
 
 
 def _page(rows: list[tuple[str, str]]) -> str:

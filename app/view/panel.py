@@ -19,7 +19,7 @@ from app.kinematics.forward import forward
 from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
-from app.view.branches import BranchList
+from app.view.branches import BranchList, Find
 from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
 from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees
@@ -45,7 +45,7 @@ Clickable = (
 GESTURES: dict[str, cmd.Command] = {
     "Home": cmd.Home(),
     "Stretch": cmd.Stretch(),
-    "Reset": cmd.Reset(),
+    "Hold": cmd.Reset(),
 }
 
 ORDERS: dict[str, cmd.Command] = {
@@ -62,6 +62,7 @@ class Panel:
         server: viser.ViserServer,
         model: RobotModel,
         put: Callable[[cmd.Command], int],
+        find: Find,
         shows: Shows,
         state: State,
     ) -> None:
@@ -82,7 +83,7 @@ class Panel:
             "Drive",
             tuple(GESTURES),
             hint="Home: to the ready posture. Stretch: every joint to zero, the arm along x. "
-            "Reset: stop here and forget the target.",
+            "Hold: stop here and forget the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
         self._orders = self._gui.add_button_group(
@@ -103,7 +104,7 @@ class Panel:
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
         with self._gui.add_folder("Branches", expand_by_default=False):
-            self._branches = BranchList(server, model, self._on_person, state)
+            self._branches = BranchList(server, model, find, self._on_person, state)
         with self._gui.add_folder("Show", expand_by_default=False):
             add_shows(self._gui, shows)
         with self._gui.add_folder("Why", expand_by_default=False):

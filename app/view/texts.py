@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable
 
 from app.collision.clearance import STOP
+from app.control.choices import Choice
 from app.control.findings import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from app.control.state import Finding, Reason, State, Status
-from app.kinematics.badge import Badge
 from app.kinematics.reading import Reading
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
@@ -63,7 +63,7 @@ def _contact(finding: Finding) -> str:
 REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.HALTED: lambda f: (
         f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
-        "Release, then say afresh where to go"
+        "Reset in the bar, then say afresh where to go"
     ),
     Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
     Reason.CONTACT: _contact,
@@ -125,8 +125,12 @@ def sentence(state: State) -> str:
     """Why the arm does not do what was wished, in one sentence; empty when it does."""
     if not state.findings:
         return ""
-    said = "; ".join(REASONS[finding.reason](finding) for finding in state.findings)
-    return said[0].upper() + said[1:] + "."
+    return _capital("; ".join(REASONS[each.reason](each) for each in state.findings)) + "."
+
+
+def told(finding: Finding) -> str:
+    """One reason by itself."""
+    return _capital(REASONS[finding.reason](finding))
 
 
 def room(number: int, angle: float) -> str:
@@ -134,15 +138,23 @@ def room(number: int, angle: float) -> str:
     return f"{axis(number)}: {degrees(angle)} left"
 
 
-def badge(choice: Badge) -> tuple[str, str, str]:
+def badge(choice: Choice) -> tuple[str, str, str]:
     """What a branch gives up, how long the way to it is, and how far it is from a singularity."""
+    badge = choice.badge
     lost = []
-    if choice.position_error > POSITION_WORTH_TELLING:
-        lost.append(f"{_short(1e3 * choice.position_error)} mm")
-    if choice.rotation_error > ANGLE_WORTH_TELLING:
-        lost.append(f"{_short(math.degrees(choice.rotation_error))}°")
-    way = f"{degrees(choice.distance, 0)}, {choice.time:.1f} s"
-    return ", ".join(lost) or NOTHING_LOST, way, f"{choice.smallest_singular_value:.3f}"
+    if badge.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{_short(1e3 * badge.position_error)} mm")
+    if badge.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{_short(math.degrees(badge.rotation_error))}°")
+    if choice.contact is not None:
+        one, other = choice.contact.parts
+        lost.append(f"{part(one)} meets {part(other)}")
+    way = f"{degrees(badge.distance, 0)}, {badge.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, way, f"{badge.smallest_singular_value:.3f}"
+
+
+def _capital(said: str) -> str:
+    return said[0].upper() + said[1:]
 
 
 def _short(value: float) -> str:

@@ -20,6 +20,7 @@ from app.robot.model import RobotModel
 from app.robot.props import load_props
 from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
+from app.view.branches import Find
 from app.view.cameras import Cameras, Preset
 from app.view.conduit import Conduits
 from app.view.ellipsoid import Ellipsoid
@@ -57,10 +58,12 @@ class View:
         model: RobotModel,
         loop: ControlLoop,
         mailbox: Mailbox,
+        find: Find,
         frame_rate: float,
         stored: StoredMap | None = None,
     ) -> None:
-        """``frame_rate``: most updates a second [Hz]. ``stored``: a workspace that can be shown.
+        """``find``: the branches to choose from. ``frame_rate``: most updates a second [Hz].
+        ``stored``: a workspace that can be shown.
 
         Raises ConfigurationError for the map of another arm.
         """
@@ -84,7 +87,7 @@ class View:
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
         self._cameras = Cameras(server, model)
         shows = Shows(self._show_ellipsoid, self._look_from, cloud)
-        self._panel = Panel(server, model, mailbox.put, shows, state)
+        self._panel = Panel(server, model, mailbox.put, find, shows, state)
         self._show(loop.snapshot)
 
     def start(self) -> None:

@@ -42,9 +42,9 @@ class Drawing(StrEnum):
 
     PICTURES = "pictures"
     """For pictures of it alone. Else all but the drawing is done, frame by frame."""
-    ALWAYS = "always"
     BEST = "best"
-    """Always, with shadows, smooth edges and every pixel."""
+    """Likewise, with reflections, shadows, smooth edges and every pixel."""
+    ALWAYS = "always"
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class ViserPage:
         width, height = window
         context = browser.new_context(viewport={"width": width, "height": height})
         best = drawing is Drawing.BEST
-        options = json.dumps({"draws": drawing is not Drawing.PICTURES, "fullQuality": best})
+        options = json.dumps({"draws": drawing is Drawing.ALWAYS, "fullQuality": best})
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
         context.add_init_script(f"window.harness = {options};\n{scripts}")
         page = context.new_page()
@@ -233,6 +233,17 @@ class ViserPage:
     def project_three(self, point: ArrayLike) -> Pixel:
         """Pixel at which the browser draws a point (3,) of three.js's world, in metres."""
         return self._pixel(self.frame.evaluate("() => harness.view()"), np.append(point, 1.0))
+
+    def look_from(self, camera: Camera) -> None:
+        """Turn the window's camera."""
+        self.frame.evaluate(
+            "(look) => harness.lookFrom(...look)", [camera.position, camera.look_at]
+        )
+
+    def scene_rectangle(self) -> tuple[float, float, float, float]:
+        """Left, top, width and height of the scene in the window, in pixels."""
+        left, top, width, height = self.frame.evaluate("() => harness.view()")["rectangle"]
+        return (*self._in_window((left, top)), width, height)
 
     def _pixel(self, view: dict[str, Any], point: Matrix) -> Pixel:
         clip = _matrix(view["projection"]) @ _matrix(view["inverse"]) @ point

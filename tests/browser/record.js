@@ -56,9 +56,18 @@
     });
     if (gl === null || gl.recorded) return gl;
     gl.recorded = true;
+    // What lights the scene is drawn once, beside the canvas, and would be missed in a picture.
+    let beside = false;
+    const bindFramebuffer = gl.bindFramebuffer;
+    gl.bindFramebuffer = (target, framebuffer) => {
+      beside = framebuffer !== null;
+      bindFramebuffer.call(gl, target, framebuffer);
+    };
     for (const name of DRAWS) {
       const draw = gl[name];
-      gl[name] = (...args) => harness.draws && draw.apply(gl, args);
+      gl[name] = (...args) => {
+        if (harness.draws || (beside && harness.fullQuality)) draw.apply(gl, args);
+      };
     }
     // The name of a software renderer makes viser cover the scene with a warning.
     const getParameter = gl.getParameter;

@@ -64,6 +64,14 @@
     };
   };
 
+  // Both in viser's world.
+  harness.lookFrom = (position, target) => {
+    const { camera, cameraControl } = viewer();
+    const three = (point) =>
+      camera.position.clone().set(...point).applyMatrix4(node("").matrixWorld).toArray();
+    cameraControl.setLookAt(...three(position), ...three(target), false);
+  };
+
   function toPixel(point) {
     const { camera, canvas } = viewer();
     const { left, top, width, height } = canvas.getBoundingClientRect();

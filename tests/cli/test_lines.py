@@ -76,7 +76,7 @@ def test_ik_with_badges_says_what_each_solution_costs() -> None:
     q = [0.3, -0.9, 0.8, 0.4, 1.0]
     (pose,) = ask("fk", [{"q": q}])
     plain, badged = ask("ik", [pose])[0], ask("ik", [pose | {"q": q}], "--badges")[0]
-    costs = ("distance_rad", "time_s", "smallest_singular_value")
+    costs = ("distance_rad", "time_s", "smallest_singular_value", "contact")
     for solution, with_badge in zip(plain["solutions"], badged["solutions"], strict=True):
         assert set(with_badge) == {*solution, *costs}
         assert with_badge["distance_rad"] == pytest.approx(
@@ -85,6 +85,8 @@ def test_ik_with_badges_says_what_each_solution_costs() -> None:
         assert with_badge["time_s"] >= 0.0
         assert with_badge["smallest_singular_value"] > 0.0
     assert min(s["distance_rad"] for s in badged["solutions"]) == pytest.approx(0.0, abs=1e-9)
+    met = {s["branch"]: s["contact"] for s in badged["solutions"]}
+    assert met["front-up"] is None
     (from_zero,) = ask("ik", [pose], "--badges")
     assert from_zero["solutions"][0]["distance_rad"] == pytest.approx(
         np.abs(from_zero["solutions"][0]["q"]).max()

@@ -101,7 +101,7 @@ def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
     """From a place that all four branches reach: high over the base."""
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
     state = take(session, state, cmd.SetPose(T), cmd.Settle())
-    badge = choices(arm, state)[BRANCHES.index(branch)]
+    badge = choices(arm, state)[BRANCHES.index(branch)].badge
     taken = take(session, state, cmd.TakeBranch(branch))
     assert taken.branch == branch
     assert isinstance(taken.target, JointTarget)
@@ -153,7 +153,9 @@ def test_a_pose_keeps_its_wish_on_another_branch(arm: Arm, session: Session, sta
 
 def test_choices_are_what_taking_them_leads_to(arm: Arm, session: Session, state: State) -> None:
     state = take(session, state, cmd.MoveTool(point(arm, state.goal) + 0.05 * UP))
-    for branch, badge in zip(BRANCHES, choices(arm, state), strict=True):
+    for branch, found in zip(BRANCHES, choices(arm, state), strict=True):
+        badge = found.badge
+        assert found.contact is None
         taken = take(session, state, cmd.TakeBranch(branch))
         assert badge.branch == branch
         assert np.allclose(taken.goal, badge.q, atol=1e-12)

@@ -205,3 +205,19 @@ def test_far_from_everything_a_world_changes_nothing(session: Session, guarded: 
         assert free.gripper_setpoint == kept.gripper_setpoint
         commands = []
     assert kept.findings == ()
+
+
+def test_a_branch_that_ends_in_a_contact_is_told_before_it_is_taken(guarded: Session) -> None:
+    """Close to the base, where the other elbow has no room."""
+    state = standing(guarded, np.radians((10.5, -75.6, 94.5, 88.4, 47.8)))
+    told = {choice.badge.branch: choice for choice in guarded.choices(state)}
+    own = told[state.branch]
+    assert own.contact is None
+    met = [choice for choice in told.values() if choice.contact is not None]
+    assert met
+    for choice in met:
+        assert choice.contact is not None
+        assert choice.contact.distance < STOP
+        taken, near = run(guarded, state, [cmd.TakeBranch(choice.badge.branch)], 2000)
+        assert taken.status is Status.BLOCKED
+        assert min(near) > 0.0

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from app.control.lease import LOST_AFTER, Lease, Role
+from app.control.ledger import Entry
 from app.control.session import Session
-from app.control.state import Halt, State
+from app.control.state import Finding, Halt, Reason, State
 from app.errors import LeaseError
 from app.gateway.door import Visitor
 from app.gateway.hub import TICK, Hub, Window, key_of
@@ -32,6 +33,7 @@ class FakeArm:
         self.halted = False
         self.jogs: list[tuple[Rates, JogFrame]] = []
         self.share = 1.0
+        self.ledger: tuple[Entry, ...] = ()
 
     @property
     def state(self) -> State:
@@ -103,6 +105,35 @@ def test_who_touches_a_control_first_has_the_arm(table: Table) -> None:
     with pytest.raises(LeaseError, match="Window 2 holds the arm"):
         table.hub.drive(first.person.key)
     assert table.arm.holds == 0
+
+
+def test_the_journal_has_who_drove_and_who_stopped(table: Table) -> None:
+    driver, watcher = table.join(PAGES[0]), table.join(PAGES[1], Role.VIEWER, "Vera")
+    entries = [
+        Entry(table.t, Finding(Reason.AXIS_LIMIT, 0.5, axis=1), began=True),
+        Entry(table.t, Finding(Reason.CONTACT, 0.006, parts=("finger_left_link", "table")), True),
+        Entry(table.t, Finding(Reason.HALTED, 0.02, time=0.3), began=True),
+    ]
+    table.arm.ledger = tuple(entries[:1])
+    table.wait(TICK)
+    table.hub.drive(driver.person.key)
+    table.arm.ledger = tuple(entries[:2])
+    table.wait(TICK)
+    table.hub.stop(watcher.person.name)
+    table.arm.ledger = tuple(entries[1:])
+    table.wait(2 * TICK)
+    told = table.hub.journal.told()
+    assert [line["who"] for line in told] == [None, driver.person.name, "Vera"]
+    assert [line["reason"] for line in told] == ["axis limit", "contact", "halted"]
+    assert [(line["amount"], line["unit"]) for line in told] == [
+        (0.5, "rad"),
+        (0.006, "m"),
+        (0.02, "m"),
+    ]
+    assert told[0]["axis"] == 2
+    assert told[1]["parts"] == ("finger_left_link", "table")
+    assert told[2]["seconds"] == 0.3
+    assert "Reset in the bar" in told[2]["said"]
 
 
 def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:

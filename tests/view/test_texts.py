@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from app.collision.contact import Contact
+from app.control.choices import Choice
 from app.control.session import Session
 from app.control.state import Finding, Reason, State, Status
 from app.kinematics.badge import Badge
@@ -121,20 +124,27 @@ def test_the_nearest_limit_is_told_with_its_axis() -> None:
 
 
 @pytest.mark.parametrize(
-    ("position_error", "rotation_error", "said"),
+    ("position_error", "rotation_error", "parts", "said"),
     [
-        (0.0, 0.0, "nothing"),
-        (0.0123, 0.0, "12 mm"),
-        (0.0, math.radians(4.5), "4.5°"),
-        (0.0123, math.radians(4.5), "12 mm, 4.5°"),
+        (0.0, 0.0, None, "nothing"),
+        (0.0123, 0.0, None, "12 mm"),
+        (0.0, math.radians(4.5), None, "4.5°"),
+        (0.0123, math.radians(4.5), None, "12 mm, 4.5°"),
+        (0.0123, 0.0, ("pan_link", "basin"), "12 mm, shoulder meets basin"),
     ],
 )
 def test_a_badge_is_told_in_three_words(
-    state: State, position_error: float, rotation_error: float, said: str
+    state: State,
+    position_error: float,
+    rotation_error: float,
+    parts: tuple[str, str] | None,
+    said: str,
 ) -> None:
-    choice = Badge(
+    contact = None if parts is None else Contact(parts, 0.001, np.zeros((2, 3)), np.eye(3)[2])
+    cost = Badge(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
+    choice = Choice(cost, contact)
     assert badge(choice) == (said, "90°, 1.3 s", "0.151")
     assert len(BRANCH_HEADINGS) == 1 + len(badge(choice))
 

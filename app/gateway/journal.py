@@ -1,0 +1,89 @@
+"""Why the arm did not do what was wished, and who drove it then: for programs, and for the log."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from app.control.ledger import Entry
+from app.control.state import Reason
+from app.runtime.loop import KEPT
+from app.view.texts import told
+
+log = logging.getLogger(__name__)
+
+UNITS = {
+    Reason.HALTED: "m",
+    Reason.CONTACT: "m",
+    Reason.ACROSS_GAP: "rad",
+    Reason.OUT_OF_REACH: "m",
+    Reason.POSITION_CHANGED: "m",
+    Reason.AXIS_LIMIT: "rad",
+    Reason.GRIPPER_LIMIT: "rad",
+    Reason.YAW_FIXED: "rad",
+    Reason.PITCH_CHANGED: "rad",
+    Reason.ROLL_CHANGED: "rad",
+}
+"""Of the amounts; the other reasons have none."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """An entry of the ledger; ``who`` drove, or stopped the arm, if anybody did."""
+
+    entry: Entry
+    who: str | None
+
+
+class Journal:
+    """The newest lines."""
+
+    def __init__(self) -> None:
+        self._lines: deque[Line] = deque(maxlen=KEPT)
+        self._seen: Entry | None = None
+        # Entries are on the loop's clock; people have another.
+        self._epoch = time.time() - time.perf_counter()
+
+    def follow(self, ledger: Sequence[Entry], who: str | None) -> None:
+        """Take down what ``ledger`` has that it had not before; ``who`` had a hand in it."""
+        for entry in _newer(ledger, self._seen):
+            self._lines.append(Line(entry, who))
+            if entry.began:
+                log.info("%s%s", "" if who is None else f"{who}: ", told(entry.finding))
+        if ledger:
+            self._seen = ledger[-1]
+
+    def told(self) -> list[dict[str, Any]]:
+        """The lines as plain values, the oldest first; amounts in the unit that is named."""
+        return [self._told(line) for line in self._lines]
+
+    def _told(self, line: Line) -> dict[str, Any]:
+        finding = line.entry.finding
+        unit = UNITS.get(finding.reason)
+        when = datetime.fromtimestamp(self._epoch + line.entry.t, UTC)
+        return {
+            "when": when.isoformat(timespec="milliseconds"),
+            "who": line.who,
+            "began": line.entry.began,
+            "reason": finding.reason.value,
+            "said": told(finding),
+            "amount": None if unit is None else finding.amount,
+            "unit": unit,
+            "axis": None if finding.axis is None else finding.axis + 1,
+            "parts": finding.parts,
+            "seconds": finding.time if finding.reason is Reason.HALTED else None,
+        }
+
+
+def _newer(ledger: Sequence[Entry], seen: Entry | None) -> list[Entry]:
+    newer: list[Entry] = []
+    for entry in reversed(ledger):
+        if entry is seen:
+            break
+        newer.append(entry)
+    return newer[::-1]
