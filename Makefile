@@ -7,11 +7,12 @@ bin     := $(VENV)/bin
 run_ok  := $(VENV)/.run-ready
 dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
-live    := tests/browser tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
+browser := tests/browser
+servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 .PHONY: run test test-long check lint types contracts tests browser robot bench-collision bench-drag \
-        bench-kinematics bench-start pictures lock clean
+        bench-kinematics bench-start bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -33,12 +34,16 @@ contracts: $(dev_ok)
 browser: $(dev_ok)            ## find a Chromium, or install one
 	$(bin)/python tests/browser/chromium.py
 
-# Tests with servers and clocks come first; those that only compute run beside them, and give way.
+# Three at once: those that drive a browser, which mostly wait for it, those that run servers, and,
+# giving way to both, those that only compute.
 tests: $(dev_ok)
-	@nice $(bin)/python -m pytest $(live:%=--ignore=%) > $(VENV)/computed.log 2>&1 & computed=$$!; \
-	  $(bin)/python -m pytest $(live); live=$$?; \
-	  wait $$computed; computed=$$?; cat $(VENV)/computed.log; \
-	  exit $$((live > computed ? live : computed))
+	@nice $(bin)/python -m pytest $(browser:%=--ignore=%) $(servers:%=--ignore=%) \
+	    > $(VENV)/computed.log 2>&1 & computed=$$!; \
+	  $(bin)/python -m pytest $(servers) > $(VENV)/servers.log 2>&1 & servers=$$!; \
+	  $(bin)/python -m pytest $(browser); status=$$?; \
+	  wait $$servers || status=1; cat $(VENV)/servers.log; \
+	  wait $$computed || status=1; cat $(VENV)/computed.log; \
+	  exit $$status
 
 test-long: $(dev_ok) browser  ## 200 STOPs instead of 12
 	KATANA450_LONG=1 $(bin)/python -m pytest tests/browser/test_gateway.py $(ARGS)
@@ -48,6 +53,9 @@ robot: $(dev_ok)              ## rebuild all files of the robot from the numbers
 
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
 	$(bin)/python -m benchmarks.drag_to_frame $(ARGS)
+
+bench-view: $(dev_ok)         ## what one update of the view costs the server
+	$(bin)/python -m benchmarks.view_update
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)

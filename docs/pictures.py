@@ -1,8 +1,9 @@
-"""Takes the pictures of the documentation from the running app: ``python -m docs.pictures``."""
+"""Takes the pictures of the documentation from the app: ``python -m docs.pictures [NAME...]``."""
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,13 +60,13 @@ POSES = {
 BACK = Camera((-0.85, 0.75, 0.55), (0.1, 0.0, 0.28))
 """The sixth view; the others are the panel's."""
 
-TILE = (480, 420)
-"""Pixels of each picture of the gallery."""
+TILE = (880, 800)
+"""Pixels of the scene in each picture of the gallery, where they are half as many."""
 
 
 def gallery(page: ViserPage) -> None:
     """A sheet a theme: each pose a row, each camera a column."""
-    page.page.set_viewport_size({"width": 1300, "height": 900})
+    page.page.set_viewport_size({"width": 1300, "height": 920})
     page.frame.get_by_text("Show", exact=True).click()
     for theme in ("Light", "Dark"):
         page.click_button(theme)
@@ -76,12 +77,14 @@ def gallery(page: ViserPage) -> None:
             at_rest(page)
             row = []
             for preset in Preset:
+                if preset is Preset.TOOL:
+                    # Before this one, which does not let go of the camera.
+                    page.look_from(BACK)
+                    page.page.wait_for_timeout(700)
+                    row.append(tile(page))
                 page.click_button(preset.value)
                 page.page.wait_for_timeout(700)
                 row.append(tile(page))
-            page.look_from(BACK)
-            page.page.wait_for_timeout(700)
-            row.append(tile(page))
             rows.append(np.hstack(row))
         imageio.imwrite(IMAGES / f"gallery-{theme.lower()}.jpg", np.vstack(rows), quality=82)
 
@@ -92,7 +95,9 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
     picture = page.picture()
     across, down = TILE
     x, y = int(left + (width - across) / 2), int(top + (height - down) / 2)
-    return picture[y : y + down, x : x + across]
+    shown = picture[y : y + down, x : x + across].astype(np.uint16)
+    quarters = shown.reshape(down // 2, 2, across // 2, 2, 3)
+    return (quarters.sum(axis=(1, 3)) // 4).astype(np.uint8)
 
 
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
@@ -103,11 +108,15 @@ PICTURES: dict[Callable[[ViserPage], None], Camera] = {
 
 
 def main() -> None:
-    """Take them all."""
+    """Take those that are named, or all."""
+    names = sys.argv[1:] or [take.__name__ for take in PICTURES]
+    wanted = {take: camera for take, camera in PICTURES.items() if take.__name__ in names}
+    if len(wanted) < len(names):
+        sys.exit(f"There are: {', '.join(take.__name__ for take in PICTURES)}.")
     IMAGES.mkdir(exist_ok=True)
     with launched() as browser:
-        for number, (take, camera) in enumerate(PICTURES.items(), start=1):
-            print(f"{number}/{len(PICTURES)} {take.__name__}", flush=True)
+        for number, (take, camera) in enumerate(wanted.items(), start=1):
+            print(f"{number}/{len(wanted)} {take.__name__}", flush=True)
             with AppServer() as server:
                 page = ViserPage.open(
                     browser, server.url, camera=camera, drawing=Drawing.BEST, window=WINDOW

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
 from app.control.ledger import Entry
 from app.control.state import State
@@ -24,9 +25,6 @@ log = logging.getLogger(__name__)
 
 TICK = 0.02
 """[s] Between two looks at whether somebody has fallen silent."""
-
-JOG_LASTS = 0.2
-"""[s] A jog is over when no other follows within this time."""
 
 REMEMBERED = 256
 """Pages that are known again when they come back."""
@@ -91,7 +89,7 @@ class Hub:
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
-        self._jogged = -JOG_LASTS
+        self._jogged = -JOG_TIME
         self._looked = clock()
 
     # Coming and going
@@ -190,12 +188,12 @@ class Hub:
         self._grasp(window)
 
     def jog(self, window: Window, rates: Rates, frame: JogFrame) -> None:
-        """Go with ``rates`` until the next jog, at most for JOG_LASTS."""
+        """Go with ``rates`` until the next jog, at most for JOG_TIME."""
         self._check_runs()
         self._grasp(window)
         assert self.arm is not None
         self.arm.jog(rates, frame)
-        self._jogged = self.clock() if any(rates) else -JOG_LASTS
+        self._jogged = self.clock() if any(rates) else -JOG_TIME
 
     def set_speed(self, window: Window, speed: float) -> None:
         self._grasp(window)
@@ -228,7 +226,7 @@ class Hub:
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return
-        moves = self.arm.state.moving or t - self._jogged < JOG_LASTS
+        moves = self.arm.state.moving or t - self._jogged < JOG_TIME
         if moves and self.stopped is None and self.lease.silence(t) >= self._hold_after:
             self._halt(Stopped(None, f"The line to {holder.name} broke while the arm moved."))
         self._change(self.lease.expire(t))
@@ -250,7 +248,7 @@ class Hub:
     def _let_go(self) -> None:
         for _, drags in self._pictures.values():
             drags.clear()
-        self._jogged = -JOG_LASTS
+        self._jogged = -JOG_TIME
 
     def _hold(self) -> None:
         self._let_go()

@@ -88,7 +88,7 @@ class View:
         self._cameras = Cameras(server, model)
         shows = Shows(self._show_ellipsoid, self._look_from, cloud)
         self._panel = Panel(server, model, mailbox.put, find, shows, state)
-        self._show(loop.snapshot)
+        self.show(loop.snapshot)
 
     def start(self) -> None:
         """Follow the control loop in a thread of the view's own."""
@@ -129,11 +129,12 @@ class View:
             settled = snapshot is seen
             seen = snapshot
             due = time.perf_counter() + self._interval
-            self._show(snapshot)
+            self.show(snapshot)
             # Motion is shown at the frame rate, what a person does at once.
             self._loop.wait_for_command(snapshot, due - time.perf_counter())
 
-    def _show(self, snapshot: Snapshot) -> None:
+    def show(self, snapshot: Snapshot) -> None:
+        """Send every browser what has changed."""
         state = snapshot.state
         with self._server.atomic():
             angles = self._model.joint_angles(state.q, state.gripper)

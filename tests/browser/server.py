@@ -39,7 +39,7 @@ def free_port() -> int:
     """A port of PORTS on which nobody listens. Raises ServerError if all are taken."""
     for attempt in range(len(PORTS)):
         # Each process begins at a place of its own, so that parallel runs seldom meet.
-        port = PORTS[(os.getpid() + attempt) % len(PORTS)]
+        port = PORTS[(37 * os.getpid() + attempt) % len(PORTS)]
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:

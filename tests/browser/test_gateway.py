@@ -422,12 +422,15 @@ def test_a_held_key_moves_the_tool_along_one_axis(
     wait_moved(page, start, axis, sign)
     page.page.keyboard.up(key)
     truth.wait(mood="ok")
-    page.page.wait_for_timeout(200)
+
+    def rests() -> bool:
+        before = tool_point(page)
+        page.page.wait_for_timeout(300)
+        return np.array_equal(tool_point(page), before)
+
+    page.wait_until(rests, "the tool to rest")
     # viser has the same keys for its camera.
     assert np.allclose(camera(page), looked, atol=1e-6)
-    rest = tool_point(page)
-    page.page.wait_for_timeout(300)
-    assert np.allclose(tool_point(page), rest, atol=1e-6)
 
 
 def test_pads_and_buttons_move_while_they_are_held(
