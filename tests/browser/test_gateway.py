@@ -180,17 +180,21 @@ def test_stop_stops_every_time_whatever_else_goes_on(
     def stopped() -> None:
         took.append(truth.wait(2.0, mood="stopped"))
 
-    with SlowLink(server.port, 1e9) as line, crowd(server, 8):
-        far = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
+    def while_jogging(presser: ViserPage) -> None:
         page.page.click("#jog-button")
         for number in range(STOPS):
-            page.page.keyboard.down("KeyA" if number % 2 else "KeyD")
+            key = "KeyA" if number % 2 else "KeyD"
+            page.page.keyboard.down(key)
             page.page.wait_for_timeout(60)
-            page.page.click("#stop")
+            presser.page.click("#stop")
             stopped()
-            page.page.keyboard.up("KeyA" if number % 2 else "KeyD")
+            page.page.keyboard.up(key)
             reset(page, truth)
         page.page.click("#jog-button")
+
+    with SlowLink(server.port, 1e9) as line, crowd(server, 8):
+        far = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
+        while_jogging(page)
         go_home(page, truth)
         for number in range(STOPS):
             with page.grip_arrow(MOVE, "z") as grip:
@@ -205,15 +209,7 @@ def test_stop_stops_every_time_whatever_else_goes_on(
             stopped()
             reset(page, truth)
         line.rate = THIN
-        page.page.click("#jog-button")
-        for number in range(STOPS):
-            page.page.keyboard.down("KeyA" if number % 2 else "KeyD")
-            page.page.wait_for_timeout(60)
-            far.page.click("#stop")
-            stopped()
-            page.page.keyboard.up("KeyA" if number % 2 else "KeyD")
-            reset(page, truth)
-        page.page.click("#jog-button")
+        while_jogging(far)
         line.rate = 1e9
     assert len(took) == 4 * STOPS
     print(
