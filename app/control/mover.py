@@ -165,11 +165,12 @@ class Mover:
         """``state`` with the distance of the contact it brakes for as it is now."""
         assert self._world is not None
         here = self._world.nearest(np.append(state.setpoint, state.gripper_setpoint))
-        known = any(
-            finding.reason is Reason.CONTACT and (here is None or finding.parts != here.parts)
+        same = here is not None and any(
+            finding.reason is Reason.CONTACT and finding.parts == here.parts
             for finding in state.findings
         )
-        return state if known else _told(state, here)
+        # Others may be nearer that are not in the way.
+        return _told(state, here) if same else state
 
     def _may_go_on(self, state: State) -> bool:
         """Whether the way of an arm that waits is clear again, at its beginning."""

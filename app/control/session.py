@@ -170,6 +170,7 @@ class Session:
                 return self._aim(state, JointTarget(frozen(np.zeros(self.arm.chain.n))))
             case cmd.Reset():
                 held = replace(state, gripper_goal=state.gripper_setpoint)
+                held = self._without(held, Reason.CONTACT)
                 return self._aim(held, JointTarget(self._mover.halt(state)[0]))
             case cmd.MoveTool(position=position):
                 return self._drag(state, replace(wish(self.arm, state), position=position))
@@ -238,11 +239,13 @@ class Session:
         """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
         kept = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
         paused = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
+        # What the arm brakes for stays the reason, however often it is told anew meanwhile.
+        met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
         return replace(
             state,
             target=target,
             goal=goal,
-            findings=paused + findings + kept,
+            findings=paused + met + findings + kept,
             since=None,
             let_go=False,
             jogging=None,

@@ -339,7 +339,7 @@ def test_a_thin_line_shows_few_pictures_but_no_old_ones(
             return [(m.time, 2.0 * np.arctan2(m.body["wxyz"][3], m.body["wxyz"][0])) for m in told]
 
         since = time.time()
-        for degrees in (150.0, -150.0):
+        for degrees in (150.0, -150.0, 150.0, -150.0):
             page.type_number("Axis 1", degrees)
             page.page.wait_for_timeout(1000)
             truth.wait(20.0, mood="ok")
@@ -363,7 +363,7 @@ def test_a_thin_line_shows_few_pictures_but_no_old_ones(
         f"{len(near)} pictures near, {len(seen)} far; age p50 {np.median(ages):.2f} s, "
         f"worst {max(ages):.2f} s"
     )
-    assert np.median(ages) < 3.5
+    assert np.median(ages) < 2.5
     assert max(ages) < 5.0
     assert rested < 5.0
 

@@ -221,3 +221,19 @@ def test_a_branch_that_ends_in_a_contact_is_told_before_it_is_taken(guarded: Ses
         taken, near = run(guarded, state, [cmd.TakeBranch(choice.badge.branch)], 2000)
         assert taken.status is Status.BLOCKED
         assert min(near) > 0.0
+
+
+def test_told_anew_while_it_brakes_the_arm_still_names_what_it_brakes_for(guarded: Session) -> None:
+    """A slider tells a new angle many times on its way; other parts are nearer at first."""
+    state = standing(guarded, guarded.ready)
+    named = set()
+    for tick, angle in enumerate(np.radians(np.linspace(-60.0, 5.0, 150))):
+        told = [] if tick % 4 else [cmd.SetJoint(1, float(angle))]
+        state = guarded.step(state, told, state.t + TICK)
+        named |= {f.parts for f in state.findings if f.reason is Reason.CONTACT}
+    state, _ = run(guarded, state, [])
+    (finding,) = (f for f in state.findings if f.reason is Reason.CONTACT)
+    assert state.status is Status.BLOCKED
+    assert finding.parts is not None
+    assert all(parts is not None and "table" in parts for parts in named), named
+    assert finding.amount == pytest.approx(clearance(guarded.world, state), abs=1e-3)  # type: ignore[arg-type]
