@@ -11,13 +11,13 @@ browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test test-long check lint types contracts tests browser robot bench-collision bench-drag \
+.PHONY: run test test-long check lint types contracts tests browser octave robot bench-collision bench-drag \
         bench-kinematics bench-start bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
 
-test: check browser tests     ## set up and pass every check and test
+test: check browser octave tests ## set up and pass every check and test
 
 check: lint types contracts
 
@@ -33,6 +33,9 @@ contracts: $(dev_ok)
 
 browser: $(dev_ok)            ## find a Chromium, or install one
 	$(bin)/python tests/browser/chromium.py
+
+octave: $(dev_ok)             ## find GNU Octave, or install it where that can be done
+	$(bin)/python tests/gateway/octave.py
 
 # Three at once: those that drive a browser, which mostly wait for it, those that run servers, and,
 # giving way to both, those that only compute.

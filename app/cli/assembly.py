@@ -9,6 +9,7 @@ from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
 from app.exchange.reachability_file import load_map
 from app.gateway.gateway import Gateway
+from app.gateway.motion import Motion
 from app.robot.collision import standing_around, world_of
 from app.robot.model import load
 from app.robot.props import load_props
@@ -58,7 +59,7 @@ class Assembly:
             settings.frame_rate,
             stored,
         )
-        gateway.attach(self._loop, mailbox, self._view.let_go)
+        gateway.attach(Motion(model, session, self._loop, mailbox, self._view.let_go))
 
     def start(self) -> None:
         """Run the control loop and the view in threads of their own."""

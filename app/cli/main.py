@@ -37,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 tls_cert=options.tls_cert,
                 tls_key=options.tls_key,
                 public_url=options.public_url,
+                lines=options.lines,
             )
             return serve(settings, options.urdf, options.tool, options.workspace)
         if options.command == "access":
@@ -117,6 +118,12 @@ def _parser() -> argparse.ArgumentParser:
         "--public-url",
         metavar="URL",
         help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
+    )
+    serve.add_argument(
+        "--lines",
+        type=_port,
+        metavar="PORT",
+        help="a TCP port of this machine for programs that speak a line of JSON at a time",
     )
     for name, what in (
         ("fk", 'joints to poses: {"q": [5 angles, rad], "tool": "tcp"} a line'),

@@ -48,6 +48,8 @@ def serve(
 
         assembly = Assembly(gateway, settings, urdf, tool, workspace)
         assembly.start()
+        if gateway.lines_port is not None:
+            print(f"Programs: JSON lines on 127.0.0.1:{gateway.lines_port}.", flush=True)
         print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
         # A signal that another thread is given does not wake this one from its wait.
         while not stopping.wait(AWAKE):

@@ -9,12 +9,13 @@ import msgspec
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
-from app.gateway import control_socket, files, headers, status, viser_page
+from app.gateway import control_socket, files, headers, viser_page
+from app.gateway.api import Api, body_of
 from app.gateway.bucket import Bucket
 from app.gateway.door import Address, Door, Visitor
 from app.gateway.hub import Hub
@@ -60,7 +61,7 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
     async def enter(request: Request) -> Response:
         """Come in: with the token of a link where the door asks for one."""
         try:
-            entry = msgspec.json.decode(await _body(request), type=_Entry)
+            entry = msgspec.json.decode(await body_of(request, LARGEST_BODY), type=_Entry)
         except msgspec.MsgspecError as error:
             raise HTTPException(400, "A token is asked for.") from error
         if not entry.token and door.visitor(request.cookies) is not None:
@@ -74,17 +75,8 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
             raise HTTPException(401, "This link is no good, or no good any more. Ask for another.")
         return Response(status_code=204, headers={"Set-Cookie": cookie})
 
-    async def state(request: Request) -> Response:
-        _known(door, request)
-        return JSONResponse(status.common(hub))
-
-    async def ledger(request: Request) -> Response:
-        """What held the arm back, when, and who drove it."""
-        _known(door, request)
-        return JSONResponse(hub.journal.told())
-
     async def stop(request: Request) -> Response:
-        """The same as the button, for programs and for a page whose socket is gone."""
+        """The same as the button, for a page whose socket is gone."""
         visitor = _known(door, request)
         hub.stop(visitor.name or "Somebody")
         return Response(status_code=204)
@@ -100,12 +92,11 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
         Route("/static/{name}", file),
         Route("/viser/", viser_index),
         Route("/enter", enter, methods=["POST"]),
-        Route("/status", state),
-        Route("/ledger", ledger),
         Route("/stop", stop, methods=["POST"]),
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
+        *Api(hub, door).routes(),
     ]
     return headers.Threshold(Starlette(routes=routes), address)
 
@@ -126,12 +117,3 @@ def _check_query(request: Request, address: Address) -> None:
         parts = urlsplit(url)
         if f"{parts.scheme}:" != scheme or parts.netloc != request.headers["host"]:
             raise HTTPException(400, "The page may speak to this server alone.")
-
-
-async def _body(request: Request) -> bytes:
-    body = b""
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > LARGEST_BODY:
-            raise HTTPException(413, "That is too long.")
-    return body

@@ -5,18 +5,16 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
-from collections.abc import Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from ipaddress import ip_address
 from typing import Any
 from urllib.parse import urlsplit
 
-from starlette.websockets import WebSocket
-
 from app.control.lease import Role
 from app.errors import ConfigurationError
-from app.gateway.access import AccessFile
+from app.gateway.access import LONGEST_NAME, AccessFile
 
 SESSION_SIZE = 22
 """Characters of a session's name: 16 random bytes."""
@@ -119,22 +117,41 @@ class Door:
             return None
         return Visitor(value, None, Role.ADMIN)
 
-    async def while_welcome(self, socket: WebSocket, work: Coroutine[Any, Any, None]) -> None:
-        """Do ``work`` on ``socket``, which is closed when its visitor is not welcome any more."""
+    def program(
+        self, name: str, authorization: str = "", cookies: Mapping[str, str] | None = None
+    ) -> Visitor | None:
+        """Who sends this Authorization header or these cookies, if they may come in.
+
+        ``name``: what the program calls itself; behind that of the link where one is asked for.
+        """
+        name = name if name.isprintable() and 0 < len(name) <= LONGEST_NAME else "Program"
+        if self._access is None:
+            return Visitor(secrets.token_urlsafe(16), name, Role.ADMIN)
+        scheme, _, token = authorization.partition(" ")
+        if scheme.lower() == "bearer":
+            known = self._access.check(token.strip(), time.time())
+            found = None if known is None else Visitor(known[0], known[1].name, known[1].role)
+        else:
+            found = self.visitor(cookies or {})
+        return None if found is None else replace(found, name=f"{found.name}, {name}")
+
+    async def while_welcome(
+        self, visitor: Callable[[], Visitor | None], work: Coroutine[Any, Any, None]
+    ) -> bool:
+        """Do ``work`` as long as there is a ``visitor``; whether it came to its own end."""
         task = asyncio.create_task(work)
         try:
             while True:
                 done, _ = await asyncio.wait([task], timeout=CHECK_EVERY)
                 if done:
-                    return await task
-                if self.visitor(socket.cookies) is None:
-                    break
+                    await task
+                    return True
+                if visitor() is None:
+                    return False
         finally:
             task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
-        await socket.close(NOT_YOU, "Your link is no good any more.")
-        return None
 
     def welcome(self, token: str) -> str | None:
         """A Set-Cookie header for the bearer of ``token``, or None for who is not let in."""

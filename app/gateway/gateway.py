@@ -10,7 +10,6 @@ import ssl
 import threading
 import time
 from asyncio import BaseTransport, Transport
-from collections.abc import Callable
 from contextlib import suppress
 from typing import cast
 
@@ -26,9 +25,8 @@ from app.gateway.firewall import LARGEST
 from app.gateway.hub import TICK, Hub
 from app.gateway.listen import listen, reaches_beyond
 from app.gateway.motion import Motion
+from app.gateway.program import Lines
 from app.gateway.proxy import Proxy
-from app.runtime.loop import ControlLoop
-from app.runtime.mailbox import Mailbox
 from app.settings import Settings
 from app.view.guard import Guard
 from app.view.server import open_server
@@ -37,6 +35,8 @@ log = logging.getLogger(__name__)
 
 UNSENT = 16_384
 """Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
+
+HERE = "127.0.0.1"
 
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
@@ -59,6 +59,9 @@ class Gateway:
             door = Door(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
             app = application(self._hub, door, proxy, self.address)
+            self._lines = Lines(self._hub, door)
+            # For programs of this machine alone: what is said there can be read on the way.
+            self._lines_at = None if settings.lines is None else listen(HERE, settings.lines)
         except BaseException:
             self._listening.close()
             raise
@@ -88,9 +91,14 @@ class Gateway:
         if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
-    def attach(self, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]) -> None:
-        """From now on the arm can be driven. ``let_go``: see ``Motion``."""
-        self._hub.arm = Motion(loop, mailbox, let_go)
+    def attach(self, arm: Motion) -> None:
+        """From now on the arm can be driven."""
+        self._hub.arm = arm
+
+    @property
+    def lines_port(self) -> int | None:
+        """Where programs may speak JSON lines."""
+        return None if self._lines_at is None else int(self._lines_at.getsockname()[1])
 
     def stop(self) -> None:
         """Close every socket and the port; viser is left to its view."""
@@ -105,7 +113,8 @@ class Gateway:
     async def _serve(self) -> None:
         watch = asyncio.create_task(self._watch())
         try:
-            await self._server.serve(sockets=[self._listening])
+            async with self._lines.open(self._lines_at):
+                await self._server.serve(sockets=[self._listening])
         finally:
             watch.cancel()
             with suppress(asyncio.CancelledError):

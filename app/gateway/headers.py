@@ -21,6 +21,9 @@ EVERYWHERE = {
     "payment=(), usb=(), serial=()",
 }
 
+FOR_PROGRAMS = "/api/"
+"""Programs are no pages and have no origin to name. Whatever a browser sends there names one."""
+
 TLS_ONLY = "max-age=31536000"
 
 
@@ -87,7 +90,10 @@ class Threshold:
         # Every browser names the page that opens a socket or sends something; what does not is
         # asked to.
         if origin is None:
-            return None if asks else "Say where this comes from: a header Origin is missing."
+            program = scope["path"].startswith(FOR_PROGRAMS)
+            if asks or program:
+                return None
+            return "Say where this comes from: a header Origin is missing."
         if not self._address.is_our_page(origin, host):
             return "Another site's page may not ask this."
         return None

@@ -10,6 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from app.api.requests import Rates
+from app.control import commands as cmd
+from app.control.choices import Choice
 from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
 from app.control.ledger import Entry
@@ -17,8 +20,11 @@ from app.control.state import State
 from app.errors import LeaseError
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
-from app.gateway.motion import Rates
+from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
+from app.robot.model import RobotModel
+from app.runtime.lateness import Lateness
+from app.runtime.loop import Snapshot
 from app.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -31,10 +37,22 @@ REMEMBERED = 256
 
 
 class Arm(Protocol):
-    """What the hub asks of the arm; ``Motion`` is one."""
+    """What the gateway asks of the arm; ``Motion`` is one."""
+
+    @property
+    def model(self) -> RobotModel: ...
+
+    @property
+    def snapshot(self) -> Snapshot: ...
 
     @property
     def state(self) -> State: ...
+
+    @property
+    def ready(self) -> FloatArray: ...
+
+    @property
+    def lateness(self) -> Lateness: ...
 
     @property
     def ledger(self) -> Sequence[Entry]: ...
@@ -48,6 +66,10 @@ class Arm(Protocol):
     def jog(self, rates: Rates, frame: JogFrame) -> None: ...
 
     def limit(self, share: float) -> None: ...
+
+    def put(self, command: cmd.Command) -> int: ...
+
+    def choices(self) -> tuple[Choice, ...]: ...
 
 
 class Behind(Protocol):
@@ -90,6 +112,7 @@ class Hub:
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
         self._jogged = -JOG_TIME
+        self._servoed: float | None = None
         self._looked = clock()
 
     # Coming and going
@@ -107,11 +130,26 @@ class Hub:
         self.beat(window)
         return window
 
-    def leave(self, window: Window) -> None:
-        """Its control socket is closed."""
-        if self._windows.get(window.person.key) is window:
-            del self._windows[window.person.key]
-            self.lease = self.lease.leave(window.person)
+    def leave(self, window: Window, *, for_good: bool = False) -> None:
+        """Its control socket is closed. ``for_good``: a program, which does not come back."""
+        person = window.person
+        if self._windows.get(person.key) is not window:
+            return
+        del self._windows[person.key]
+        self.lease = self.lease.leave(person)
+        if not for_good:
+            return
+        self._remembered.pop(person.key, None)
+        if self.lease.holder == person:
+            if self.stopped is None and self._moves(self.clock()):
+                self._halt(Stopped(None, f"{person.name} left while the arm moved."))
+            self._change(self.lease.give_up(person))
+
+    def present(self) -> Arm:
+        """The arm. Raises LeaseError while there is none yet."""
+        if self.arm is None:
+            raise LeaseError("The arm is not there yet.")
+        return self.arm
 
     def window(self, key: str) -> Window | None:
         """The window of that key, if its control socket is open."""
@@ -189,11 +227,25 @@ class Hub:
 
     def jog(self, window: Window, rates: Rates, frame: JogFrame) -> None:
         """Go with ``rates`` until the next jog, at most for JOG_TIME."""
-        self._check_runs()
+        arm = self._check_runs()
         self._grasp(window)
-        assert self.arm is not None
-        self.arm.jog(rates, frame)
+        arm.jog(rates, frame)
+        self._servoed = None
         self._jogged = self.clock() if any(rates) else -JOG_TIME
+
+    def move(self, window: Window, command: cmd.Command) -> int:
+        """Any other command of whoever drives; its ticket."""
+        arm = self._check_runs()
+        self._grasp(window)
+        ticket = arm.put(command)
+        self._servoed = None
+        return ticket
+
+    def servo(self, window: Window, command: cmd.Command) -> int:
+        """One of a stream of commands: when no other comes for JOG_TIME the arm comes to rest."""
+        ticket = self.move(window, command)
+        self._servoed = self.clock()
+        return ticket
 
     def set_speed(self, window: Window, speed: float) -> None:
         self._grasp(window)
@@ -210,6 +262,8 @@ class Hub:
         # When this thread was held up itself, what came in the meantime is read first.
         if not late:
             self._listen_for_silence(t)
+        if self._servoed is not None and t - self._servoed > JOG_TIME:
+            self._hold()
         if self.arm is not None:
             self.journal.follow(self.arm.ledger, self._who())
         if self.stopped is not None and self.arm is not None and self.arm.state.halted is None:
@@ -226,10 +280,13 @@ class Hub:
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return
-        moves = self.arm.state.moving or t - self._jogged < JOG_TIME
-        if moves and self.stopped is None and self.lease.silence(t) >= self._hold_after:
+        silent = self.lease.silence(t) >= self._hold_after
+        if silent and self.stopped is None and self._moves(t):
             self._halt(Stopped(None, f"The line to {holder.name} broke while the arm moved."))
         self._change(self.lease.expire(t))
+
+    def _moves(self, t: float) -> bool:
+        return self.arm is not None and (self.arm.state.moving or t - self._jogged < JOG_TIME)
 
     def _change(self, lease: Lease) -> None:
         """Another holder finds an arm that stands and wants nothing."""
@@ -249,17 +306,18 @@ class Hub:
         for _, drags in self._pictures.values():
             drags.clear()
         self._jogged = -JOG_TIME
+        self._servoed = None
 
     def _hold(self) -> None:
         self._let_go()
         if self.arm is not None:
             self.arm.hold()
 
-    def _check_runs(self) -> None:
-        if self.arm is None:
-            raise LeaseError("The arm is not there yet.")
+    def _check_runs(self) -> Arm:
+        arm = self.present()
         if self.stopped is not None:
             raise LeaseError("The arm is stopped: reset it first.")
+        return arm
 
     def _grasp(self, window: Window) -> None:
         if self.lease.holder != window.person:
@@ -269,7 +327,8 @@ class Hub:
         self._numbers += 1
         number = self._numbers
         name = visitor.name or f"Window {number}"
-        if any(person.name == name for person, _ in self._remembered.values()):
+        known = [person for person, _ in self._remembered.values()]
+        if any(person.name == name for person in known):
             name = f"{name} ({number})"
         return Person(key, name, visitor.role), number
 

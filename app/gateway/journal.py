@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
 
 from app.control.ledger import Entry
 from app.control.state import Reason
@@ -34,10 +33,11 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Line:
-    """An entry of the ledger; ``who`` drove, or stopped the arm, if anybody did."""
+    """An entry of the ledger. who: drove then, or stopped the arm, if anybody did. when: in UTC."""
 
     entry: Entry
     who: str | None
+    when: datetime
 
 
 class Journal:
@@ -52,32 +52,17 @@ class Journal:
     def follow(self, ledger: Sequence[Entry], who: str | None) -> None:
         """Take down what ``ledger`` has that it had not before; ``who`` had a hand in it."""
         for entry in _newer(ledger, self._seen):
-            self._lines.append(Line(entry, who))
+            when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
+            self._lines.append(Line(entry, who, when))
             if entry.began:
                 log.info("%s%s", "" if who is None else f"{who}: ", told(entry.finding))
         if ledger:
             self._seen = ledger[-1]
 
-    def told(self) -> list[dict[str, Any]]:
-        """The lines as plain values, the oldest first; amounts in the unit that is named."""
-        return [self._told(line) for line in self._lines]
-
-    def _told(self, line: Line) -> dict[str, Any]:
-        finding = line.entry.finding
-        unit = UNITS.get(finding.reason)
-        when = datetime.fromtimestamp(self._epoch + line.entry.t, UTC)
-        return {
-            "when": when.isoformat(timespec="milliseconds"),
-            "who": line.who,
-            "began": line.entry.began,
-            "reason": finding.reason.value,
-            "said": told(finding),
-            "amount": None if unit is None else finding.amount,
-            "unit": unit,
-            "axis": None if finding.axis is None else finding.axis + 1,
-            "parts": finding.parts,
-            "seconds": finding.time if finding.reason is Reason.HALTED else None,
-        }
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """The oldest first."""
+        return tuple(self._lines)
 
 
 def _newer(ledger: Sequence[Entry], seen: Entry | None) -> list[Entry]:

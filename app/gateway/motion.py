@@ -1,4 +1,4 @@
-"""What the front door itself asks of the arm: stop, hold, jog. Everything else comes by viser."""
+"""The arm as the gateway sees it: what it asks of it, and what it can tell of it."""
 
 from __future__ import annotations
 
@@ -6,26 +6,61 @@ from collections.abc import Callable
 
 import numpy as np
 
+from app.api.requests import Rates
 from app.control import commands as cmd
+from app.control.choices import Choice
 from app.control.ledger import Entry
+from app.control.session import Session
 from app.control.state import State
 from app.errors import InputError
+from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
-from app.runtime.loop import ControlLoop
+from app.robot.model import RobotModel
+from app.runtime.lateness import Lateness
+from app.runtime.loop import ControlLoop, Snapshot
 from app.runtime.mailbox import Mailbox
-
-Rates = tuple[float, float, float, float, float]
-"""Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
 
 
 class Motion:
-    """The arm as the gateway sees it."""
+    """One arm."""
 
-    def __init__(self, loop: ControlLoop, mailbox: Mailbox, let_go: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        session: Session,
+        loop: ControlLoop,
+        mailbox: Mailbox,
+        let_go: Callable[[], None],
+    ) -> None:
         """``let_go`` takes the handles of the view out of every hand."""
+        self.model = model
+        self._session = session
         self._loop = loop
         self._mailbox = mailbox
         self._let_go = let_go
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest."""
+        return self._loop.snapshot
+
+    @property
+    def ready(self) -> FloatArray:
+        """(n,) the posture that Home drives to [rad]."""
+        return self._session.ready
+
+    @property
+    def lateness(self) -> Lateness:
+        """How well the control loop keeps its period."""
+        return self._loop.lateness
+
+    def choices(self) -> tuple[Choice, ...]:
+        """The branches there are to choose from."""
+        return self._session.choices(self.state)
+
+    def put(self, command: cmd.Command) -> int:
+        """Any command; its ticket. Raises InputError for one that cannot be."""
+        return self._mailbox.put(command)
 
     @property
     def state(self) -> State:

@@ -19,7 +19,7 @@ from websockets.typing import Subprotocol
 
 from app.errors import LeaseError
 from app.gateway.control_socket import PAGE
-from app.gateway.door import Door
+from app.gateway.door import NOT_YOU, Door
 from app.gateway.firewall import Firewall, Ruling, Verdict
 from app.gateway.flow import Flow
 from app.gateway.hub import Hub, key_of
@@ -86,7 +86,10 @@ class Proxy:
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
                 line = _Line(self._hub, self._guard, browser, upstream, key)
-                await self._door.while_welcome(browser, line.run())
+                if not await self._door.while_welcome(
+                    lambda: self._door.visitor(browser.cookies), line.run()
+                ):
+                    await browser.close(NOT_YOU, "Your link is no good any more.")
         except OSError as error:
             log.warning("viser is not there: %s", error)
             await browser.close(1013)

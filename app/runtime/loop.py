@@ -12,6 +12,7 @@ from app.control.session import Session
 from app.control.state import State
 from app.drivers.driver import Driver
 from app.runtime.clock import Clock
+from app.runtime.lateness import Lateness, Punctuality
 from app.runtime.mailbox import Mailbox
 
 KEPT = 500
@@ -48,8 +49,7 @@ class ControlLoop:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._ledger: deque[Entry] = deque(maxlen=KEPT)
-        self.late_ticks = 0
-        """Ticks that came more than a whole period late, since the start."""
+        self._punctuality = Punctuality(self._period)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -60,6 +60,11 @@ class ControlLoop:
     def ledger(self) -> tuple[Entry, ...]:
         """The last reasons why the arm did not do what was wished, oldest first."""
         return tuple(self._ledger)
+
+    @property
+    def lateness(self) -> Lateness:
+        """How well the ticks come when they are due."""
+        return self._punctuality.lateness
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
         """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""
@@ -108,13 +113,13 @@ class ControlLoop:
     def _run(self) -> None:
         due = self._clock.now()
         while not self._stopping.is_set():
-            self.tick()
-            due += self._period
             late = self._clock.now() - due
+            self._punctuality.note(late)
             if late > self._period:
                 # Do not run after lost ticks: the session moves by the time that passed.
-                self.late_ticks += 1
                 due += late
+            self.tick()
+            due += self._period
             self._clock.sleep_until(due)
 
 

@@ -43,10 +43,11 @@ class Truth:
         self._cookie = enter(server.url)
 
     def status(self) -> dict[str, Any]:
-        code, _, body = ask(f"{self._url}/status", Cookie=self._cookie)
+        code, _, body = ask(f"{self._url}/api/v1/state", Cookie=self._cookie)
         assert code == 200
         told: dict[str, Any] = json.loads(body)
-        return told
+        mood = "moving" if told["moving"] and told["status"] == "ok" else told["status"]
+        return told | {"mood": mood if told["stopped"] is None else "stopped"}
 
     def wait(self, seconds: float = 5.0, **wanted: Any) -> float:
         """Until the status has these values; how long that took [s]."""

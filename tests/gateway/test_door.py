@@ -196,7 +196,7 @@ def test_without_a_link_one_sees_a_page_that_says_so(guarded: tuple[AppServer, P
         status, headers, _ = ask(f"{server.url}/enter", data=body, Origin=server.url)
         assert status == 401
         assert "set-cookie" not in headers
-    for path in ("/viser/", "/status", "/ledger"):
+    for path in ("/viser/", "/api/v1/state", "/api/v1/ledger"):
         assert ask(server.url + path, Cookie=f"katana450-{server.port}={'a' * 22}")[0] == 401
 
 
@@ -244,9 +244,9 @@ def test_each_may_do_what_their_role_says(guarded: tuple[AppServer, Path]) -> No
             await watcher.wait(holder="Operator")
             await watcher.say("stop")
             assert "Viewer pressed STOP" in (await driver.wait(mood="stopped"))["stopped"]
-            status, _, body = ask(f"{server.url}/ledger", Cookie=enter(server.url, viewer))
-            last = json.loads(body)[-1]
-            assert (status, last["reason"], last["who"]) == (200, "halted", "Viewer")
+            status, _, body = ask(f"{server.url}/api/v1/ledger", Cookie=enter(server.url, viewer))
+            last = json.loads(body)["lines"][-1]
+            assert (status, last["finding"]["reason"], last["who"]) == (200, "halted", "Viewer")
             await watcher.say("reset")
             await watcher.notice("refused")
             await driver.say("reset")

@@ -262,8 +262,7 @@ def test_a_name_that_was_pointed_here_is_not_ours(server: AppServer, host: str) 
 def test_without_a_session_there_is_nothing_to_see(server: AppServer) -> None:
     opening = websocket(server.url, f"/viser?page={page_name()}", subprotocols=[SUBPROTOCOL])
     assert refusal(opening) == 403
-    for path in ("/status", "/viser/"):
-        assert ask(server.url + path)[0] == 401
+    assert ask(f"{server.url}/viser/")[0] == 401
     assert ask(f"{server.url}/stop", data=b"", Origin=server.url)[0] == 401
 
     async def knock() -> int | None:
@@ -366,7 +365,7 @@ def test_a_large_message_is_not_taken(server: AppServer) -> None:
                 await control.socket.wait_closed()
 
     asyncio.run(attack())
-    assert json.loads(ask(f"{server.url}/status", Cookie=enter(server.url))[2])["stopped"] is None
+    assert json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None
 
 
 @pytest.mark.parametrize(
@@ -517,7 +516,7 @@ def test_visers_page_is_not_sent_elsewhere(server: AppServer, query: str) -> Non
 
 def test_every_answer_tells_the_browser_what_it_may_do(server: AppServer) -> None:
     cookie = enter(server.url)
-    for path in ("/", "/viser/", "/static/page.js", "/nowhere", "/status"):
+    for path in ("/", "/viser/", "/static/page.js", "/nowhere", "/api/v1/state"):
         _, headers, _ = ask(server.url + path, Cookie=cookie)
         assert headers["x-content-type-options"] == "nosniff"
         assert headers["referrer-policy"] == "no-referrer"

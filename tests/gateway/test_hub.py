@@ -8,15 +8,22 @@ from typing import Any
 
 import pytest
 
+from app.api.requests import Rates
+from app.control import commands as cmd
+from app.control.choices import Choice
 from app.control.lease import LOST_AFTER, Lease, Role
 from app.control.ledger import Entry
 from app.control.session import Session
 from app.control.state import Finding, Halt, Reason, State
 from app.errors import LeaseError
+from app.gateway import tell
 from app.gateway.door import Visitor
 from app.gateway.hub import TICK, Hub, Window, key_of
-from app.gateway.motion import Rates
+from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
+from app.robot.model import RobotModel
+from app.runtime.lateness import Lateness
+from app.runtime.loop import Snapshot
 from app.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
@@ -24,6 +31,12 @@ PAGES = ("first-page-of-all", "second-page-of-all")
 
 class FakeArm:
     """Remembers what it was told; moves when the test says so."""
+
+    # What a hub does not ask for.
+    model: RobotModel
+    snapshot: Snapshot
+    ready: FloatArray
+    lateness: Lateness
 
     def __init__(self, state: State) -> None:
         self.rest = state
@@ -33,6 +46,7 @@ class FakeArm:
         self.halted = False
         self.jogs: list[tuple[Rates, JogFrame]] = []
         self.share = 1.0
+        self.commands: list[cmd.Command] = []
         self.ledger: tuple[Entry, ...] = ()
 
     @property
@@ -59,6 +73,13 @@ class FakeArm:
 
     def limit(self, share: float) -> None:
         self.share = share
+
+    def choices(self) -> tuple[Choice, ...]:
+        return ()
+
+    def put(self, command: cmd.Command) -> int:
+        self.commands.append(command)
+        return len(self.commands)
 
 
 class Table:
@@ -122,18 +143,15 @@ def test_the_journal_has_who_drove_and_who_stopped(table: Table) -> None:
     table.hub.stop(watcher.person.name)
     table.arm.ledger = tuple(entries[1:])
     table.wait(2 * TICK)
-    told = table.hub.journal.told()
-    assert [line["who"] for line in told] == [None, driver.person.name, "Vera"]
-    assert [line["reason"] for line in told] == ["axis limit", "contact", "halted"]
-    assert [(line["amount"], line["unit"]) for line in told] == [
-        (0.5, "rad"),
-        (0.006, "m"),
-        (0.02, "m"),
-    ]
-    assert told[0]["axis"] == 2
-    assert told[1]["parts"] == ("finger_left_link", "table")
-    assert told[2]["seconds"] == 0.3
-    assert "Reset in the bar" in told[2]["said"]
+    lines = [tell.line(line) for line in table.hub.journal.lines]
+    assert [line.who for line in lines] == [None, driver.person.name, "Vera"]
+    told = [line.finding for line in lines]
+    assert [each.reason for each in told] == ["axis limit", "contact", "halted"]
+    assert [(each.amount, each.unit) for each in told] == [(0.5, "rad"), (0.006, "m"), (0.02, "m")]
+    assert told[0].axis == 2
+    assert told[1].parts == ("finger_left_link", "table")
+    assert told[2].seconds == 0.3
+    assert "Reset in the bar" in told[2].said
 
 
 def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:

@@ -1,0 +1,212 @@
+"""What the server says: JSON objects whose ``is`` names what they are. Lengths in m, angles in rad,
+times in s."""
+
+from __future__ import annotations
+
+import msgspec
+
+from app.api.requests import VERSION, Id
+
+Numbers = list[float]
+
+
+class Answer(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    tag_field="is",
+    tag=str.lower,
+):
+    """Any of them; ``is`` is the name of the class in small letters, ``id`` that of the request."""
+
+    id: Id = None
+
+
+class Welcome(Answer, frozen=True, kw_only=True):
+    """The first thing said: who you are here, and what you may do.
+
+    ``name`` is as others see it. ``role``: viewer, operator or admin. ``beat``: signs of life are
+    to come so many seconds apart from whoever holds the arm.
+    """
+
+    name: str
+    number: int
+    role: str
+    beat: float
+    api: int = VERSION
+
+
+class Done(Answer, frozen=True, kw_only=True):
+    """The request of that id is accepted.
+
+    ``ticket``: for one that moves the arm; it is heeded in states whose ticket is no smaller.
+    """
+
+    ticket: int | None = None
+
+
+class Refused(Answer, frozen=True, kw_only=True):
+    """It is not, and nothing has changed; ``why`` says the reason and what to do."""
+
+    why: str
+
+
+class Echo(Answer, frozen=True, kw_only=True):
+    """To a sign of life."""
+
+    n: int
+
+
+class Finding(msgspec.Struct, frozen=True, kw_only=True):
+    """One reason why the arm does not do what was wished.
+
+    ``said`` in words; ``amount`` in ``unit``, both null when there is none; ``axis`` counts from 1;
+    ``parts``: the two that are about to meet; ``seconds``: how long a stop takes.
+    """
+
+    reason: str
+    said: str
+    amount: float | None = None
+    unit: str | None = None
+    axis: int | None = None
+    parts: tuple[str, str] | None = None
+    seconds: float | None = None
+
+
+class State(Answer, frozen=True, kw_only=True):
+    """What the arm does.
+
+    Attributes:
+        t: when, on the server's clock, which only goes forwards.
+        ticket: of the last command that is heeded in it.
+        q, qd: (n,) where the arm is, and how fast its setpoints move.
+        goal: (n,) where it goes, the nearest to what was wished.
+        gripper, gripper_goal: the finger joint.
+        tool: the frame that ``T`` (4, 4), ``pitch`` and ``roll`` are of; T in the frame {S}.
+        branch: shoulder and elbow. reading: which numbers of a target count.
+        status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
+        speed: share of full speed.
+        holder: name of who holds the arm. stopped: why nothing moves after a STOP.
+        windows: how many pages and programs are open.
+    """
+
+    t: float
+    ticket: int
+    q: Numbers
+    qd: Numbers
+    goal: Numbers
+    gripper: float
+    gripper_goal: float
+    tool: str
+    T: list[Numbers]
+    pitch: float
+    roll: float
+    branch: tuple[str, str]
+    reading: str
+    status: str
+    moving: bool
+    why: str
+    findings: list[Finding]
+    speed: float
+    holder: str | None
+    stopped: str | None
+    windows: int
+
+
+class Arm(Answer, frozen=True, kw_only=True):
+    """What arm it is.
+
+    Attributes:
+        joints: their names, in the order of every joint vector.
+        lower, upper, speed, acceleration, jerk: (n,) their limits.
+        ready: (n,) the posture that Home drives to.
+        tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one of
+            them.
+        gripper: closed and open [rad], and its speed [rad/s]; null without fingers.
+        T_base_shoulder: (4, 4) the frame {S} in the base frame.
+    """
+
+    name: str
+    joints: list[str]
+    lower: Numbers
+    upper: Numbers
+    speed: Numbers
+    acceleration: Numbers
+    jerk: Numbers
+    ready: Numbers
+    tools: dict[str, list[Numbers]]
+    default_tool: str
+    gripper: tuple[float, float, float] | None
+    T_base_shoulder: list[Numbers]
+
+
+class Line(msgspec.Struct, frozen=True, kw_only=True):
+    """One line of the ledger: a reason that began or ended, and who drove then."""
+
+    when: str
+    who: str | None
+    began: bool
+    finding: Finding
+
+
+class Ledger(Answer, frozen=True, kw_only=True):
+    """What held the arm back of late, the oldest first."""
+
+    lines: list[Line]
+
+
+class Choice(msgspec.Struct, frozen=True, kw_only=True):
+    """A branch that could be taken, and what it costs.
+
+    ``position_error``, ``rotation_error``: what it misses the wished pose by. ``distance``: the
+    farthest any joint has to go; ``time``: at its full speed. ``contact``: the two parts that would
+    meet there.
+    """
+
+    shoulder: str
+    elbow: str
+    q: Numbers
+    within_limits: bool
+    position_error: float
+    rotation_error: float
+    distance: float
+    time: float
+    smallest_singular_value: float
+    contact: tuple[str, str] | None
+
+
+class Branches(Answer, frozen=True, kw_only=True):
+    """The ways to stand at the wished pose."""
+
+    choices: list[Choice]
+
+
+class Loop(Answer, frozen=True, kw_only=True):
+    """How well the control loop has kept its period of late.
+
+    ``ticks``: how many are looked at; ``late_p50``, ``late_p99``, ``late_most``: how much later
+    than due they came; ``lost``: that came more than a period late, since the start.
+    """
+
+    period: float
+    ticks: int
+    late_p50: float
+    late_p99: float
+    late_most: float
+    lost: int
+
+
+AnyAnswer = Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop
+
+_decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
+
+
+def decoded(text: str | bytes) -> AnyAnswer:
+    """The answer that ``text`` is; msgspec.MsgspecError for one that it is not."""
+    return _decoder.decode(text)
+
+
+def encoded(answer: Answer) -> str:
+    """As it is sent."""
+    return msgspec.json.encode(answer).decode()

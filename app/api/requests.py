@@ -1,0 +1,305 @@
+"""What may be asked of the server: JSON objects of exactly these shapes.
+
+``do`` names the request. One with an ``id`` is answered; without one only a refusal is told.
+Lengths in m, angles in rad, times in s. A pose is of the tool, in the paper's frame {S} at the
+shoulder or in the base frame on the table.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from app.errors import InputError
+from app.kinematics.reading import Reading
+from app.kinematics.velocity import JogFrame
+
+VERSION = 1
+
+LARGEST = 1024
+"""Bytes of a request."""
+
+FASTEST_LINEAR = 0.5
+"""[m/s] More than the arm can do; anything beyond is nobody's wish."""
+
+FASTEST_ANGULAR = 3.0
+"""[rad/s] Likewise."""
+
+SLOWEST, FASTEST = 0.05, 1.0
+"""Share of full speed."""
+
+MOST_STATES = 100
+"""States a second that one can be told: as many as there are."""
+
+Rates = tuple[float, float, float, float, float]
+"""Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
+
+Vector3 = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+Matrix4 = tuple[Row, Row, Row, Row]
+
+Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
+Name = Annotated[str, Meta(min_length=1, max_length=40)]
+
+
+class Frame(Enum):
+    """Whose coordinates a pose is in."""
+
+    SHOULDER = "shoulder"
+    """The paper's frame {S}, where axes 1 and 2 cross."""
+    BASE = "base"
+    """On the table under the control box."""
+
+
+class Request(
+    msgspec.Struct,
+    frozen=True,
+    forbid_unknown_fields=True,
+    kw_only=True,
+    tag_field="do",
+    tag=str.lower,
+):
+    """Any of them; ``do`` is the name of the class in small letters."""
+
+    id: Id = None
+
+
+class Hello(Request, frozen=True, kw_only=True):
+    """The first line on the TCP port: who speaks, and a link's token where one is asked for."""
+
+    name: Name
+    token: Annotated[str, Meta(max_length=400)] = ""
+
+
+class Beat(Request, frozen=True, kw_only=True):
+    """A sign of life; the number comes back, which gives the round trip.
+
+    Whoever holds the arm gives ten a second. Without them a moving arm is stopped.
+    """
+
+    n: int = 0
+
+
+class Stop(Request, frozen=True):
+    """STOP: the arm comes to rest as fast as it can. Everybody may, at any time."""
+
+
+class Reset(Request, frozen=True):
+    """End a stop. Nothing moves by it; old targets are gone."""
+
+
+class Acquire(Request, frozen=True):
+    """Have the arm if nobody has it. A command by whoever holds nothing asks for this by itself."""
+
+
+class Take(Request, frozen=True):
+    """Have it even so: for admins."""
+
+
+class Ask(Request, frozen=True):
+    """Ask whoever has it."""
+
+
+class Withdraw(Request, frozen=True):
+    """Ask no more."""
+
+
+class Release(Request, frozen=True):
+    """Give it up."""
+
+
+class Give(Request, frozen=True, kw_only=True):
+    """Give it to the window or program of that number."""
+
+    to: int
+
+
+class Jog(Request, frozen=True, kw_only=True):
+    """Move for 0.2 s: (x, y, z) [m/s], pitch and roll [rad/s], along the axes of a frame.
+
+    To be said again while the motion shall last.
+    """
+
+    rates: Rates
+    frame: JogFrame = JogFrame.BASE
+
+    def __post_init__(self) -> None:
+        limits = (FASTEST_LINEAR,) * 3 + (FASTEST_ANGULAR,) * 2
+        for rate, limit in zip(self.rates, limits, strict=True):
+            if not math.isfinite(rate) or abs(rate) > limit:
+                raise ValueError(f"{rate} is no rate between {-limit:g} and {limit:g}")
+
+
+class Speed(Request, frozen=True, kw_only=True):
+    """How fast the arm is at most, as a share of full speed."""
+
+    value: Annotated[float, Meta(ge=SLOWEST, le=FASTEST)]
+
+
+class Joint(Request, frozen=True, kw_only=True):
+    """Drive one joint; ``axis`` counts from 1."""
+
+    axis: Annotated[int, Meta(ge=1, le=5)]
+    value: float
+
+
+class Joints(Request, frozen=True, kw_only=True):
+    """Drive all joints to ``q``; they arrive together, on a straight line in joint space."""
+
+    q: Annotated[list[float], Meta(min_length=1, max_length=16)]
+
+
+class Servo(Request, frozen=True, kw_only=True):
+    """One of a stream of joint angles, followed under the limits of speed, acceleration and jerk.
+
+    When no other comes for 0.2 s the arm comes to rest.
+    """
+
+    q: Annotated[list[float], Meta(min_length=1, max_length=16)]
+
+
+class Pose(Request, frozen=True, kw_only=True):
+    """Bring the tool to a pose, as near as five axes can; what gives way is the ``reading``'s."""
+
+    T: Matrix4
+    frame: Frame = Frame.SHOULDER
+
+
+class Position(Request, frozen=True, kw_only=True):
+    """Bring the tool point somewhere; pitch and roll stay as wished."""
+
+    p: Vector3
+    frame: Frame = Frame.SHOULDER
+
+
+class Turn(Request, frozen=True, kw_only=True):
+    """Give the tool a pitch (positive downwards) and a roll; its point stays as wished."""
+
+    pitch: float
+    roll: float
+
+
+class Gripper(Request, frozen=True, kw_only=True):
+    """Drive the finger joint; the arm's description says between which angles."""
+
+    angle: float
+
+
+class Tool(Request, frozen=True, kw_only=True):
+    """From now on targets and read-outs are of this tool frame. Nothing moves."""
+
+    name: Name
+
+
+class Read(Request, frozen=True, kw_only=True):
+    """From now on this says which numbers of a target count when not all can be had."""
+
+    reading: Reading
+
+
+class Branch(Request, frozen=True, kw_only=True):
+    """Go to the wished pose with another shoulder or elbow."""
+
+    shoulder: Literal["front", "back"]
+    elbow: Literal["up", "down"]
+
+
+class Settle(Request, frozen=True):
+    """What the arm can do becomes what is wished."""
+
+
+class Home(Request, frozen=True):
+    """Drive to the ready posture."""
+
+
+class Stretch(Request, frozen=True):
+    """Drive to the zero posture, the arm stretched along x."""
+
+
+class Hold(Request, frozen=True):
+    """Come to rest and forget the target."""
+
+
+class Pause(Request, frozen=True):
+    """Come to rest on the way, and keep the target."""
+
+
+class Resume(Request, frozen=True):
+    """Go on."""
+
+
+class Watch(Request, frozen=True, kw_only=True):
+    """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less."""
+
+    hz: Annotated[float, Meta(ge=0.0, le=MOST_STATES)]
+
+
+class Look(Request, frozen=True, kw_only=True):
+    """Tell something once: the state, what arm it is, what held it back, its branches, the loop."""
+
+    at: Literal["state", "arm", "ledger", "branches", "loop"] = "state"
+
+
+AnyRequest = (
+    Hello
+    | Beat
+    | Stop
+    | Reset
+    | Acquire
+    | Take
+    | Ask
+    | Withdraw
+    | Release
+    | Give
+    | Jog
+    | Speed
+    | Joint
+    | Joints
+    | Servo
+    | Pose
+    | Position
+    | Turn
+    | Gripper
+    | Tool
+    | Read
+    | Branch
+    | Settle
+    | Home
+    | Stretch
+    | Hold
+    | Pause
+    | Resume
+    | Watch
+    | Look
+)
+
+_decoder: msgspec.json.Decoder[AnyRequest] = msgspec.json.Decoder(AnyRequest)
+
+
+class _Named(msgspec.Struct):
+    id: Id = None
+
+
+_names = msgspec.json.Decoder(_Named)
+
+
+def decoded(text: str | bytes) -> AnyRequest:
+    """The request that ``text`` is. Raises InputError for one that it is not."""
+    if len(text) > LARGEST:
+        raise InputError(f"A request has at most {LARGEST} bytes.")
+    try:
+        return _decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise InputError(f"That is no request: {error}.") from error
+
+
+def id_of(text: str | bytes) -> Id:
+    """The id in ``text``, which may be no request otherwise."""
+    try:
+        return _names.decode(text[:LARGEST]).id
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None

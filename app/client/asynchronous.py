@@ -1,0 +1,199 @@
+"""A program's hand on the arm, for asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any, TypeVar
+from urllib.parse import quote
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+from websockets.asyncio.client import ClientConnection
+from websockets.asyncio.client import connect as open_websocket
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from app.api import answers, requests
+from app.errors import KatanaError
+
+SOCKET = f"/api/v{requests.VERSION}/socket"
+
+ASKED_FOR = 5.0
+"""[s] An answer that takes longer does not come."""
+
+FOLLOWED = 30.0
+"""[Hz] States while a motion is waited for."""
+
+A = TypeVar("A", bound=answers.Answer)
+
+
+class RefusedError(KatanaError):
+    """The server did not do what was asked; the message says why, and what to do."""
+
+
+class LostError(KatanaError):
+    """The line to the server is gone. A moving arm is stopped then."""
+
+
+class AsyncClient:
+    """One connection; made by ``aconnect``, which also gives signs of life."""
+
+    def __init__(self, socket: ClientConnection, welcome: answers.Welcome) -> None:
+        self._socket = socket
+        self.welcome = welcome
+        self._asked = 0
+        self._waiting: dict[requests.Id, asyncio.Future[answers.Answer]] = {}
+        self._states: list[asyncio.Queue[answers.State | None]] = []
+        self._lost: str | None = None
+        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
+
+    async def close(self) -> None:
+        """Hang up."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._socket.close()
+
+    async def ask(self, request: requests.Request) -> answers.Answer:
+        """The answer to any request. Raises RefusedError with the reason, LostError."""
+        self._asked += 1
+        request = msgspec.structs.replace(request, id=self._asked)
+        future: asyncio.Future[answers.Answer] = asyncio.get_running_loop().create_future()
+        self._waiting[self._asked] = future
+        await self._say(request)
+        try:
+            async with asyncio.timeout(ASKED_FOR):
+                return await future
+        finally:
+            self._waiting.pop(request.id, None)
+
+    async def tell(self, request: requests.Request) -> None:
+        """Say ``request`` and wait for no answer: for streams, Servo and Jog."""
+        await self._say(request)
+
+    async def look(self, kind: type[A]) -> A:
+        """One of answers.State, Arm, Ledger, Branches, Loop."""
+        answer = await self.ask(requests.Look(at=kind.__name__.lower()))  # type: ignore[arg-type]
+        if not isinstance(answer, kind):
+            raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
+        return answer
+
+    async def states(self, hz: float = FOLLOWED) -> AsyncIterator[answers.State]:
+        """The state, so many times a second; the newest, when it is asked for more slowly."""
+        queue: asyncio.Queue[answers.State | None] = asyncio.Queue(1)
+        self._states.append(queue)
+        try:
+            await self.ask(requests.Watch(hz=hz))
+            while (state := await queue.get()) is not None:
+                yield state
+            raise LostError(self._lost or "The server has hung up.")
+        finally:
+            self._states.remove(queue)
+            if self._lost is None and not self._states:
+                await self.tell(requests.Watch(hz=0.0))
+
+    async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
+        """Ask for a motion and wait until the arm is at rest; how it stands then.
+
+        Its ``why`` is empty when all went as wished. Raises RefusedError when it was not begun or
+        was stopped, TimeoutError.
+        """
+        done = await self.ask(request)
+        ticket = done.ticket if isinstance(done, answers.Done) else None
+        async with asyncio.timeout(seconds):
+            async for state in self.states():
+                if state.stopped is not None:
+                    raise RefusedError(state.stopped)
+                if state.ticket >= (ticket or 0) and not state.moving:
+                    return state
+        raise LostError("The server has hung up.")
+
+    async def joints(self, q: npt.ArrayLike) -> answers.State:
+        """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
+        return await self.go(requests.Joints(q=np.asarray(q, dtype=float).tolist()))
+
+    async def _say(self, request: requests.Request) -> None:
+        if self._lost is not None:
+            raise LostError(self._lost)
+        try:
+            await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
+        except ConnectionClosed as error:
+            raise LostError(f"The server has hung up: {error}.") from error
+
+    async def _beat(self) -> None:
+        while True:
+            await self._say(requests.Beat())
+            await asyncio.sleep(self.welcome.beat)
+
+    async def _listen(self) -> None:
+        try:
+            async for text in self._socket:
+                self._take(answers.decoded(text))
+            self._lose("The server has hung up.")
+        except ConnectionClosed as error:
+            self._lose(f"The server has hung up: {error}.")
+
+    def _take(self, answer: answers.AnyAnswer) -> None:
+        future = self._waiting.get(answer.id)
+        if future is not None and not future.done():
+            if isinstance(answer, answers.Refused):
+                future.set_exception(RefusedError(answer.why))
+            else:
+                future.set_result(answer)
+        elif isinstance(answer, answers.State):
+            self._pass_on(answer)
+
+    def _pass_on(self, state: answers.State | None) -> None:
+        """To all who watch; what one has not read yet gives way to what is newer."""
+        for queue in self._states:
+            if queue.full():
+                queue.get_nowait()
+            queue.put_nowait(state)
+
+    def _lose(self, why: str) -> None:
+        self._lost = why
+        self._pass_on(None)
+        for future in self._waiting.values():
+            if not future.done():
+                future.set_exception(LostError(why))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers and arrays of numpy's, as JSON has them."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise NotImplementedError
+
+
+@asynccontextmanager
+async def aconnect(
+    url: str = "http://127.0.0.1:8080", name: str = "Program", token: str = ""
+) -> AsyncIterator[AsyncClient]:
+    """A connection to the server at ``url``, for as long as the context lasts.
+
+    name: how others see it. token: of an access link, where the server asks for one; what stands
+    behind the ``#`` of the link. Raises LostError when there is no server, RefusedError when it
+    does not let us in.
+    """
+    address = url.rstrip("/").replace("http", "ws", 1) + f"{SOCKET}?name={quote(name)}"
+    headers = {"Authorization": f"Bearer {token}"} if token else {}
+    try:
+        socket = await open_websocket(
+            address, additional_headers=headers, compression=None, close_timeout=1.0
+        )
+        welcome = answers.decoded(await socket.recv())
+    except (OSError, InvalidStatus) as error:
+        raise LostError(f"There is no katana450 server at {url}: {error}.") from error
+    except ConnectionClosed as error:
+        why = error.rcvd.reason if error.rcvd is not None else str(error)
+        raise RefusedError(why) from error
+    if not isinstance(welcome, answers.Welcome):
+        await socket.close()
+        raise LostError(f"The server at {url} speaks another language: {welcome}.")
+    client = AsyncClient(socket, welcome)
+    try:
+        yield client
+    finally:
+        await client.close()

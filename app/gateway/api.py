@@ -1,0 +1,140 @@
+"""The API over HTTP: what can be read, STOP, and single requests of a program that keeps asking."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+from collections.abc import Awaitable, Callable
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from app.api import answers, requests, schema
+from app.control.lease import LOST_AFTER
+from app.errors import InputError, LeaseError
+from app.gateway import program
+from app.gateway.desk import Desk
+from app.gateway.door import Door, Visitor
+from app.gateway.hub import Hub, Window, key_of
+
+log = logging.getLogger(__name__)
+
+ROOT = f"/api/v{requests.VERSION}"
+
+QUESTIONS = ("state", "arm", "ledger", "branches", "loop")
+"""Each is a path of its own."""
+
+PROGRAM = re.compile(r"[A-Za-z0-9_-]{8,64}")
+"""The name of a program that asks by POST; who knows it speaks for the program."""
+
+REFUSED, NOT_UNDERSTOOD, TOO_SOON = 409, 422, 503
+
+
+class Api:
+    """Its routes."""
+
+    def __init__(self, hub: Hub, door: Door) -> None:
+        self._hub = hub
+        self._door = door
+        self._desk = Desk(hub)
+        self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
+
+    def routes(self) -> list[BaseRoute]:
+        """All of them."""
+
+        async def described(_request: Request) -> Response:
+            return Response(schema.openapi_json(), media_type="application/json")
+
+        async def socket(socket: WebSocket) -> None:
+            await program.serve_socket(self._hub, self._door, socket)
+
+        return [
+            *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
+            Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
+            Route(f"{ROOT}/do", self._do, methods=["POST"]),
+            Route(f"{ROOT}/openapi.json", described),
+            WebSocketRoute(f"{ROOT}/socket", socket),
+        ]
+
+    def _read(self, at: str) -> Callable[[Request], Awaitable[Response]]:
+        async def read(request: Request) -> Response:
+            visitor = self._visitor(request)
+            if PROGRAM.fullmatch(request.headers.get("x-program", "")):
+                # Whoever looks is alive.
+                self._hub.beat(self._window(request, visitor))
+            try:
+                return _json(self._desk.look(at))
+            except LeaseError as error:
+                raise HTTPException(TOO_SOON, str(error)) from error
+
+        return read
+
+    async def _stop(self, request: Request) -> Response:
+        self._hub.stop(self._visitor(request).name or "Somebody")
+        return Response(status_code=204)
+
+    async def _do(self, request: Request) -> Response:
+        visitor = self._visitor(request)
+        if not PROGRAM.fullmatch(request.headers.get("x-program", "")):
+            why = "A header X-Program of 8 to 64 letters and digits tells you apart."
+            return _json(answers.Refused(why=why), NOT_UNDERSTOOD)
+        body = await body_of(request, requests.LARGEST)
+        try:
+            asked = requests.decoded(body)
+            if isinstance(asked, requests.Hello | requests.Watch):
+                raise InputError("That is for a connection that lasts: the socket or the TCP port.")
+            window = self._window(request, visitor)
+            return _json(self._desk.do(window, asked))
+        except InputError as error:
+            refused = answers.Refused(why=str(error), id=requests.id_of(body))
+            return _json(refused, NOT_UNDERSTOOD)
+        except LeaseError as error:
+            return _json(answers.Refused(why=str(error), id=requests.id_of(body)), REFUSED)
+
+    def _visitor(self, request: Request) -> Visitor:
+        headers = request.headers
+        visitor = self._door.program(
+            headers.get("x-program", ""), headers.get("authorization", ""), request.cookies
+        )
+        if visitor is None:
+            raise HTTPException(401, "A token is asked for; `katana450 access give` makes one.")
+        return visitor
+
+    def _window(self, request: Request, visitor: Visitor) -> Window:
+        """That of the program that asks; it closes when nothing is heard of it for a while."""
+        name = request.headers["x-program"]
+        session = visitor.session if self._door.asks else "programs"
+        key = f"{session}/{name}"
+        known = self._posting.pop(key, None)
+        if known is None:
+            visitor = Visitor(session, visitor.name, visitor.role)
+            window = self._hub.join(visitor, name, lambda _notice: None)
+            assert window.person.key == key_of(visitor, name)
+        else:
+            window, timer = known
+            timer.cancel()
+        timer = asyncio.get_running_loop().call_later(LOST_AFTER, self._forget, key)
+        self._posting[key] = (window, timer)
+        return window
+
+    def _forget(self, key: str) -> None:
+        window, _ = self._posting.pop(key)
+        self._hub.leave(window, for_good=True)
+
+
+async def body_of(request: Request, largest: int) -> bytes:
+    """What is sent by POST, at most ``largest`` bytes."""
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > largest:
+            raise HTTPException(413, "That is too long.")
+    return body
+
+
+def _json(answer: answers.Answer, status: int = 200) -> Response:
+    return Response(answers.encoded(answer), status, media_type="application/json")

@@ -1,0 +1,157 @@
+"""Requests up, answers down.
+
+The line shares nothing with viser's, which holds back what is sent and forgets all but the newest.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from abc import ABC, abstractmethod
+from collections import deque
+from contextlib import suppress
+from typing import Any, Protocol
+
+import msgspec
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from app.api import requests
+from app.errors import InputError, LeaseError
+from app.gateway.bucket import Bucket
+from app.gateway.desk import Desk
+from app.gateway.hub import Hub, Window
+
+log = logging.getLogger(__name__)
+
+NOTICES = 64
+"""Answers that may wait for a slow line; of more, the oldest are forgotten."""
+
+TOO_MUCH = 4429
+"""Close code for who asks too much at once."""
+
+NONSENSE = 1008
+"""Close code for who says what is no request, again and again."""
+
+
+class GoneError(Exception):
+    """The other side has hung up."""
+
+
+class Line(Protocol):
+    """Texts both ways. Each method raises GoneError once the other side is."""
+
+    async def receive(self) -> str | bytes: ...
+
+    async def send(self, text: str) -> None: ...
+
+    async def close(self, code: int, why: str, /) -> None: ...
+
+
+class SocketLine:
+    """A websocket, accepted."""
+
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+
+    async def receive(self) -> str | bytes:
+        message = await self._socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise GoneError
+        # Binary messages are no requests, which is said of an empty text too.
+        return message.get("text") or ""
+
+    async def send(self, text: str) -> None:
+        try:
+            await self._socket.send_text(text)
+        except (WebSocketDisconnect, RuntimeError) as error:
+            raise GoneError from error
+
+    async def close(self, code: int, why: str) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError):
+            await self._socket.close(code, why)
+
+
+class Conversation(ABC):
+    """One window's; what is told unasked is its kind's."""
+
+    def __init__(self, hub: Hub, line: Line, *, often: Bucket, bad: Bucket) -> None:
+        """``often``: how much may be asked. ``bad``: how much of it may be nonsense."""
+        self.hub = hub
+        self._desk = Desk(hub)
+        self._line = line
+        self._often = often
+        self._bad = bad
+        self._notices: deque[Any] = deque(maxlen=NOTICES)
+        self._news = asyncio.Event()
+
+    def tell(self, notice: Any) -> None:
+        """Send ``notice``, anything that is JSON, as soon as the line allows."""
+        self._notices.append(notice)
+        self._news.set()
+
+    @abstractmethod
+    def unasked(self) -> tuple[Any, float | None]:
+        """What is to be told now, None for nothing; and in how long there may be more [s]."""
+
+    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+        """Do it and tell the answer, if the request has an id or is a question."""
+        answer = self._desk.do(window, request)
+        if request.id is not None or isinstance(request, requests.Beat | requests.Look):
+            self.tell(answer)
+
+    async def run(self, window: Window) -> None:
+        """Until one side hangs up."""
+        tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(window))]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            for ended in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(ended, Exception) and not isinstance(ended, GoneError):
+                    log.error("A conversation met an error.", exc_info=ended)
+
+    async def _receive(self, window: Window) -> None:
+        while True:
+            text = await self._line.receive()
+            try:
+                request = requests.decoded(text)
+            except InputError as error:
+                log.warning("A bad request of %s: %s", window.person.name, error)
+                if not self._bad.take(self.hub.clock()):
+                    await self._line.close(NONSENSE, "Too many bad requests.")
+                    return
+                self.refuse(str(error), requests.id_of(text))
+                continue
+            # A hand that hammers on STOP is never too fast.
+            if not self._often.take(self.hub.clock()) and not isinstance(request, requests.Stop):
+                log.warning("%s asks too much at once and is sent away.", window.person.name)
+                await self._line.close(TOO_MUCH, "Too many requests.")
+                return
+            try:
+                self.answer(window, request)
+            except (LeaseError, InputError) as error:
+                self.refuse(str(error), request.id)
+
+    def refuse(self, why: str, named: requests.Id) -> None:
+        """Say that what was asked is not done."""
+        self.tell({"is": "refused", "why": why, "id": named})
+
+    def wake(self) -> None:
+        """There may be something to tell now."""
+        self._news.set()
+
+    async def _send(self) -> None:
+        while True:
+            self._news.clear()
+            while self._notices:
+                await self._say(self._notices.popleft())
+            notice, again = self.unasked()
+            if notice is not None:
+                await self._say(notice)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(again):
+                    await self._news.wait()
+
+    async def _say(self, notice: Any) -> None:
+        await self._line.send(msgspec.json.encode(notice).decode())

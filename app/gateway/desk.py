@@ -1,0 +1,124 @@
+"""Where requests are done, whichever way they come."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from app.api import answers, requests
+from app.control import commands as cmd
+from app.gateway import tell
+from app.gateway.hub import Hub, Window
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import Branch
+
+BARE: dict[type[requests.AnyRequest], cmd.Command] = {
+    requests.Settle: cmd.Settle(),
+    requests.Home: cmd.Home(),
+    requests.Stretch: cmd.Stretch(),
+    requests.Hold: cmd.Reset(),
+    requests.Pause: cmd.Pause(),
+    requests.Resume: cmd.Resume(),
+}
+"""What says all there is to say by its name."""
+
+
+class Desk:
+    """Does what a window asks, or raises the LeaseError or InputError that says why not."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+
+    def do(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
+        """The answer, once it is done. Whatever is asked is a sign of life."""
+        return msgspec.structs.replace(self._done(window, request), id=request.id)
+
+    def _done(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
+        hub = self._hub
+        hub.beat(window)
+        match request:
+            case requests.Beat(n=n):
+                return answers.Echo(n=n)
+            case requests.Look(at=at):
+                return self.look(at)
+            case requests.Servo(q=q):
+                ticket = hub.servo(window, cmd.SetJoints(np.array(q)))
+                return answers.Done(ticket=ticket)
+        command = self._command(request)
+        if command is None:
+            self._arrange(window, request)
+            return answers.Done()
+        return answers.Done(ticket=hub.move(window, command))
+
+    def _arrange(self, window: Window, request: requests.AnyRequest) -> None:
+        """What is about who drives, and how."""
+        hub = self._hub
+        match request:
+            case requests.Stop():
+                hub.stop(window.person.name)
+            case requests.Reset():
+                hub.reset(window)
+            case requests.Acquire():
+                hub.acquire(window)
+            case requests.Take():
+                hub.take(window)
+            case requests.Ask():
+                hub.request(window)
+            case requests.Withdraw():
+                hub.withdraw(window)
+            case requests.Release():
+                hub.give_up(window)
+            case requests.Give(to=number):
+                hub.hand_over(window, number)
+            case requests.Jog(rates=rates, frame=frame):
+                hub.jog(window, rates, frame)
+            case requests.Speed(value=value):
+                hub.set_speed(window, value)
+
+    def _command(self, request: requests.AnyRequest) -> cmd.Command | None:
+        """What the arm is told, where the request is one for the arm."""
+        if type(request) in BARE:
+            return BARE[type(request)]
+        match request:
+            case requests.Joint(axis=axis, value=value):
+                return cmd.SetJoint(axis - 1, value)
+            case requests.Joints(q=q):
+                return cmd.SetJoints(np.array(q))
+            case requests.Pose(T=T, frame=frame):
+                return cmd.SetPose(self._in_shoulder(frame) @ se3.validated(T))
+            case requests.Position(p=p, frame=frame):
+                return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
+            case requests.Turn(pitch=pitch, roll=roll):
+                return cmd.TurnTool(pitch, roll)
+            case requests.Gripper(angle=angle):
+                return cmd.SetGripper(angle)
+            case requests.Tool(name=name):
+                return cmd.SetTool(name)
+            case requests.Read(reading=reading):
+                return cmd.SetReading(reading)
+            case requests.Branch(shoulder=shoulder, elbow=elbow):
+                return cmd.TakeBranch(Branch(shoulder, elbow))
+        return None
+
+    def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
+        """(4, 4) from ``frame`` into {S}."""
+        if frame is requests.Frame.SHOULDER:
+            return np.eye(4)
+        return se3.inverse(self._hub.present().model.T_base_shoulder)
+
+    def look(self, at: str) -> answers.Answer:
+        """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
+        hub = self._hub
+        match at:
+            case "arm":
+                arm = hub.present()
+                return tell.arm(arm.model, arm.ready.tolist())
+            case "ledger":
+                return answers.Ledger(lines=[tell.line(line) for line in hub.journal.lines])
+            case "branches":
+                choices = hub.present().choices()
+                return answers.Branches(choices=[tell.choice(each) for each in choices])
+            case "loop":
+                return tell.loop(hub.present().lateness)
+        return tell.state(hub)

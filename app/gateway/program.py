@@ -1,0 +1,194 @@
+"""Programs that speak to the server: on a websocket, or a line of JSON at a time on a TCP port."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+from starlette.websockets import WebSocket
+
+from app.api import answers, requests
+from app.control.lease import BEAT
+from app.errors import InputError
+from app.gateway import tell
+from app.gateway.bucket import Bucket
+from app.gateway.conversation import NONSENSE, Conversation, GoneError, Line, SocketLine
+from app.gateway.door import NOT_YOU, Door, Visitor
+from app.gateway.hub import Hub, Window
+
+log = logging.getLogger(__name__)
+
+RATE, BURST = 1000.0, 2000.0
+"""Requests a second, and at once: a stream of joint angles may come quicker than the arm ticks."""
+
+MISTAKES, FORGIVEN = 20, 1.0
+"""Requests that are none: so many at once, and so many more a second."""
+
+HELLO_SECONDS = 5.0
+"""[s] A line that says nothing for so long is closed."""
+
+UNSENT = 4096
+"""Bytes that may wait to be sent: a state or two, so that what is told is new."""
+
+MOST_LINES = 16
+"""TCP connections at a time."""
+
+
+class Program(Conversation):
+    """One program's: it is told the state as often as it wants."""
+
+    def __init__(self, hub: Hub, line: Line) -> None:
+        t = hub.clock()
+        super().__init__(hub, line, often=Bucket(RATE, BURST, t), bad=Bucket(FORGIVEN, MISTAKES, t))
+        self._period: float | None = None
+        self._due = 0.0
+
+    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+        if isinstance(request, requests.Watch):
+            self._period = 1.0 / request.hz if request.hz > 0.0 else None
+            self._due = self.hub.clock()
+        super().answer(window, request)
+        self.wake()
+
+    def unasked(self) -> tuple[Any, float | None]:
+        if self._period is None or self.hub.arm is None:
+            return None, self._period
+        t = self.hub.clock()
+        if t < self._due:
+            return None, self._due - t
+        self._due = max(self._due + self._period, t)
+        return tell.state(self.hub), self._due - t
+
+    def greet(self, window: Window) -> None:
+        """Say who they are here."""
+        person = window.person
+        self.tell(
+            answers.Welcome(
+                name=person.name, number=window.number, role=person.role.value, beat=BEAT
+            )
+        )
+
+
+async def serve_socket(hub: Hub, door: Door, socket: WebSocket) -> None:
+    """Answer a program that asks for a websocket."""
+    name = socket.query_params.get("name", "")
+
+    def visitor() -> Visitor | None:
+        return door.program(name, socket.headers.get("authorization", ""), socket.cookies)
+
+    await socket.accept()
+    await _serve(hub, door, SocketLine(socket), visitor)
+
+
+class Lines:
+    """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
+    the connection, so that a page's request, which begins otherwise, gets nowhere."""
+
+    def __init__(self, hub: Hub, door: Door) -> None:
+        self._hub = hub
+        self._door = door
+        self._writers: set[asyncio.StreamWriter] = set()
+
+    @asynccontextmanager
+    async def open(self, listening: socket.socket | None) -> AsyncIterator[None]:
+        """Serve whoever connects to ``listening``, if there is one, until this ends."""
+        if listening is None:
+            yield
+            return
+        server = await asyncio.start_server(self.serve, sock=listening, limit=requests.LARGEST)
+        try:
+            yield
+        finally:
+            server.close()
+            for writer in self._writers:
+                writer.close()
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One connection, to its end."""
+        writer.transport.set_write_buffer_limits(high=UNSENT)
+        line = _TcpLine(reader, writer)
+        self._writers.add(writer)
+        try:
+            if len(self._writers) > MOST_LINES:
+                await line.close(0, f"No more than {MOST_LINES} programs at a time.")
+                return
+            hello = await self._hello(line)
+            if hello is not None:
+                token = f"Bearer {hello.token}"
+                await _serve(
+                    self._hub, self._door, line, lambda: self._door.program(hello.name, token)
+                )
+        except GoneError:
+            return
+        finally:
+            self._writers.discard(writer)
+            writer.close()
+            with suppress(ConnectionError):
+                await writer.wait_closed()
+
+    async def _hello(self, line: _TcpLine) -> requests.Hello | None:
+        try:
+            async with asyncio.timeout(HELLO_SECONDS):
+                request = requests.decoded(await line.receive())
+        except TimeoutError:
+            await line.close(0, 'Nothing was said. Begin with {"do": "hello", "name": "..."}.')
+        except InputError as error:
+            await line.close(0, f'{error} Begin with {{"do": "hello", "name": "..."}}.')
+        else:
+            if isinstance(request, requests.Hello):
+                return request
+            await line.close(0, 'Begin with {"do": "hello", "name": "..."}.')
+        return None
+
+
+async def _serve(hub: Hub, door: Door, line: Line, visitor: Callable[[], Visitor | None]) -> None:
+    found = visitor()
+    if found is None:
+        await line.close(NOT_YOU, "A token is asked for; `katana450 access give` makes one.")
+        return
+    program = Program(hub, line)
+    window = hub.join(found, secrets.token_hex(16), program.tell)
+    program.greet(window)
+    try:
+        if not await door.while_welcome(visitor, program.run(window)):
+            await line.close(NOT_YOU, "The token is no good any more.")
+    finally:
+        hub.leave(window, for_good=True)
+
+
+class _TcpLine:
+    """A line of JSON each way, ended by a line feed."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+
+    async def receive(self) -> str | bytes:
+        try:
+            line = await self._reader.readline()
+        except ConnectionError as error:
+            raise GoneError from error
+        except ValueError as error:
+            # The reader's word for a line that does not end.
+            await self.close(NONSENSE, f"A request has at most {requests.LARGEST} bytes.")
+            raise GoneError from error
+        if not line:
+            raise GoneError
+        return line
+
+    async def send(self, text: str) -> None:
+        try:
+            self._writer.write(text.encode() + b"\n")
+            await self._writer.drain()
+        except ConnectionError as error:
+            raise GoneError from error
+
+    async def close(self, _code: int, why: str) -> None:
+        with suppress(GoneError):
+            await self.send(answers.encoded(answers.Refused(why=why)))
+        self._writer.close()

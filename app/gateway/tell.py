@@ -1,0 +1,118 @@
+"""What programs are told of the arm: its state, what it is, what held it back, its branches."""
+
+from __future__ import annotations
+
+from app.api import answers
+from app.control import state as control
+from app.control.choices import Choice
+from app.gateway.hub import Hub
+from app.gateway.journal import UNITS, Line
+from app.kinematics.forward import forward
+from app.kinematics.tool import ToolTarget
+from app.robot.model import RobotModel
+from app.runtime.lateness import Lateness
+from app.view.texts import sentence, told
+
+
+def finding(found: control.Finding) -> answers.Finding:
+    """A reason with its number, in SI units."""
+    unit = UNITS.get(found.reason)
+    return answers.Finding(
+        reason=found.reason.value,
+        said=told(found),
+        amount=None if unit is None else found.amount,
+        unit=unit,
+        axis=None if found.axis is None else found.axis + 1,
+        parts=found.parts,
+        seconds=found.time if found.reason is control.Reason.HALTED else None,
+    )
+
+
+def state(hub: Hub) -> answers.State:
+    """The newest. Raises LeaseError while there is no arm yet."""
+    arm = hub.present()
+    snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
+    now = snapshot.state
+    chain = arm.model.arm.chain_to(now.tool)
+    five = ToolTarget.at(chain, now.q)
+    return answers.State(
+        t=now.t,
+        ticket=snapshot.ticket,
+        q=now.q.tolist(),
+        qd=now.motion.qd.tolist(),
+        goal=now.goal.tolist(),
+        gripper=now.gripper,
+        gripper_goal=now.gripper_goal,
+        tool=now.tool,
+        T=forward(chain, now.q).tolist(),
+        pitch=five.pitch,
+        roll=five.roll,
+        branch=(now.branch.shoulder, now.branch.elbow),
+        reading=now.reading.value,
+        status=now.status.value,
+        moving=now.moving,
+        why=sentence(now),
+        findings=[finding(each) for each in now.findings],
+        speed=now.speed,
+        holder=None if holder is None else holder.name,
+        stopped=None if stopped is None else stopped.why,
+        windows=len(hub.windows),
+    )
+
+
+def arm(model: RobotModel, ready: list[float]) -> answers.Arm:
+    """``ready``: the posture that Home drives to."""
+    chain, limits, gripper = model.arm.chain, model.arm.limits, model.arm.gripper
+    return answers.Arm(
+        name=model.name,
+        joints=list(chain.names),
+        lower=chain.lower.tolist(),
+        upper=chain.upper.tolist(),
+        speed=limits.speed.tolist(),
+        acceleration=limits.acceleration.tolist(),
+        jerk=limits.jerk.tolist(),
+        ready=ready,
+        tools={name: M.tolist() for name, M in model.arm.tools.items()},
+        default_tool=model.arm.default_tool,
+        gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
+        T_base_shoulder=model.T_base_shoulder.tolist(),
+    )
+
+
+def line(line: Line) -> answers.Line:
+    """One of the journal's."""
+    return answers.Line(
+        when=line.when.isoformat(timespec="milliseconds"),
+        who=line.who,
+        began=line.entry.began,
+        finding=finding(line.entry.finding),
+    )
+
+
+def choice(choice: Choice) -> answers.Choice:
+    """One that a person could take."""
+    badge, contact = choice.badge, choice.contact
+    return answers.Choice(
+        shoulder=badge.branch.shoulder,
+        elbow=badge.branch.elbow,
+        q=badge.q.tolist(),
+        within_limits=badge.within_limits,
+        position_error=badge.position_error,
+        rotation_error=badge.rotation_error,
+        distance=badge.distance,
+        time=badge.time,
+        smallest_singular_value=badge.smallest_singular_value,
+        contact=None if contact is None else contact.parts,
+    )
+
+
+def loop(lateness: Lateness) -> answers.Loop:
+    """How well the loop keeps its period."""
+    return answers.Loop(
+        period=lateness.period,
+        ticks=lateness.count,
+        late_p50=lateness.p50,
+        late_p99=lateness.p99,
+        late_most=lateness.most,
+        lost=lateness.lost,
+    )

@@ -1,0 +1,145 @@
+"""Writes ``docs/api.md``: every message of the API, from the shapes themselves.
+
+``python -m docs.api``
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from app.api import answers, requests, schema
+
+PAGE = Path(__file__).with_name("api.md")
+
+PREFACE = """\
+# The API, version {version}
+
+<!-- Written by `python -m docs.api` from app/api/requests.py and app/api/answers.py. -->
+
+What the page can ask of the arm a program can ask too, by the same rules: one holds the arm at a
+time, everybody may stop it, and whoever holds it gives ten signs of life a second. Each message is a
+JSON object. A request says what to `do`; with an `id`, a number or a text of your own, it is answered
+by a message that bears it. Lengths are in m, angles in rad, times in s.
+
+## Ways in
+
+| | |
+|---|---|
+| **websocket** `/api/v{version}/socket?name=NAME` | requests up, answers and states down |
+| **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
+| **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` of 8 to 64 letters and digits tells programs apart |
+| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop` | what `look` tells |
+| **HTTP** `POST /api/v{version}/stop` | STOP |
+| **HTTP** `GET /api/v{version}/openapi.json` | all this as OpenAPI |
+
+Every request is a sign of life. Where the server asks for a link ([access](access.md)) the token
+behind its `#` comes as `Authorization: Bearer TOKEN`, or in the `hello`. A moving arm is stopped when
+whoever holds it falls silent or hangs up; after a stop nothing moves before a `reset` and a new
+command.
+
+## From Python
+
+```python
+from app.api import answers, requests
+from app.client import connect
+
+with connect("http://127.0.0.1:8080", name="My script") as arm:
+    print(arm.look(answers.State).q)
+    there = arm.joints([0.3, -1.0, 1.4, 0.3, 0.0])  # waits until it is there
+    there = arm.go(requests.Position(p=(0.45, 0.1, 0.0)))  # the tool point, pitch and roll kept
+    print(there.why or "all as wished")
+```
+
+`connect` gives the signs of life by itself. `aconnect` is the same for asyncio. What is refused
+raises `RefusedError`, whose text says why and what to do.
+
+## From GNU Octave
+
+[examples/octave](../examples/octave) has the few functions it takes (`katana_open`, `katana_say`,
+`katana_hear`, `katana_go`), kinematics in m-code, and the paper's circle streamed as joint angles.
+LabVIEW and Simulink connect alike: a TCP client block to the port of `--lines`, a JSON object and a
+line feed each way.
+
+## By hand
+
+```
+curl -H 'X-Program: by-hand-1' -d '{{"do": "joint", "axis": 1, "value": 0.4}}' http://127.0.0.1:8080/api/v{version}/do
+curl http://127.0.0.1:8080/api/v{version}/state
+```
+
+An arm that moves is stopped a quarter of a second after the last word of its program, so a single
+`curl` begins a motion and does not finish a long one.
+"""
+
+
+def page() -> str:
+    """The page as it has to be."""
+    parts = [PREFACE.format(version=requests.VERSION)]
+    for title, union, tag in (
+        ("Requests", requests.AnyRequest, "do"),
+        ("Answers", answers.AnyAnswer, "is"),
+    ):
+        parts.append(f"## {title}\n")
+        parts += [_kind(kind, tag) for kind in schema.kinds(union)]
+    parts.append("### In answers\n")
+    parts += [_kind(kind, None) for kind in (answers.Finding, answers.Line, answers.Choice)]
+    return "\n".join(parts)
+
+
+def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
+    heading = kind.__name__ if tag is None else f'`"{tag}": "{kind.__name__.lower()}"`'
+    lines = [f"### {heading}\n", _said(kind), ""]
+    described = msgspec.json.schema_components([kind])[1][kind.__name__]
+    for field in msgspec.structs.fields(kind):
+        if field.name == "id":
+            continue
+        shape = _shape(described["properties"][field.name])
+        default = "" if field.required else f", default `{_json(field.default)}`"
+        lines.append(f"- `{field.encode_name}`: {shape}{default}")
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _said(kind: type) -> str:
+    """What is said of it in the code, as Markdown."""
+    said = (inspect.getdoc(kind) or "").replace("``", "`")
+    return re.sub(r"^ {4}(?=\S)", "- ", said.replace("Attributes:\n", ""), flags=re.MULTILINE)
+
+
+def _json(value: Any) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def _shape(schema: dict[str, Any]) -> str:
+    if "$ref" in schema:
+        name = schema["$ref"].rpartition("/")[2]
+        kind = getattr(requests, name, None) or getattr(answers, name, None)
+        if kind is not None and hasattr(kind, "__members__"):
+            return " or ".join(f'`"{each.value}"`' for each in kind)
+        return name
+    if "anyOf" in schema:
+        return " or ".join(_shape(each) for each in schema["anyOf"])
+    if "enum" in schema:
+        return " or ".join(f'`"{each}"`' for each in schema["enum"])
+    if schema.get("type") == "array":
+        if "prefixItems" in schema:
+            items = [_shape(each) for each in schema["prefixItems"]]
+            return f"{len(items)} of {items[0]}"
+        return f"list of {_shape(schema['items'])}"
+    if schema.get("type") == "object":
+        return f"by name, {_shape(schema['additionalProperties'])}"
+    low, high = schema.get("minimum"), schema.get("maximum")
+    within = (
+        ""
+        if low is None and high is None
+        else f" from {low:g}" + ("" if high is None else f" to {high:g}")
+    )
+    return f"{schema.get('type')}{within}"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

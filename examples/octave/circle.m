@@ -1,0 +1,50 @@
+% The circle of the 2013 paper, driven from GNU Octave with kinematics of its own:
+%
+%   katana450 serve --lines 5560
+%   octave-cli --path examples/octave --eval "port = 5560; circle"
+%
+% y^2 + (z + 110 mm)^2 = (100 mm)^2 at x = 150 mm in the frame {S}. With the gripper on, its tip goes
+% round, and the pitch follows, so that every joint stays inside its limits: 62 degrees at the top
+% and 88 at the bottom. The angles are streamed; what the arm did is read back.
+if ! exist ("port", "var")
+  port = 5560;
+end
+seconds = 12;
+tip = 0.3028;
+on_circle = @(t) [0.150, 0.100 * sin(t), -0.110 + 0.100 * cos(t)];
+joints = @(t) katana_ik (on_circle (t), deg2rad (75 - 13 * cos (t)), 0, tip);
+
+arm = katana_open (port, "Octave");
+katana_say (arm, struct ("do", "acquire"));
+katana_say (arm, struct ("do", "tool", "name", "tcp"));
+state = katana_go (arm, joints (0));
+
+% Where Octave's kinematics and the server's say the tip is.
+start_error_mm = 1e3 * norm (state.T(1:3, 4)' - on_circle (0));
+
+katana_say (arm, struct ("do", "watch", "hz", 50));
+angles = zeros (0, 1);
+asked = zeros (0, 5);
+traced = zeros (0, 3);
+begun = tic ();
+while (t = toc (begun)) < seconds
+  % Slow at both ends, so that the arm has no corner to turn.
+  share = t / seconds;
+  angle = 2 * pi * (share - sin (2 * pi * share) / (2 * pi));
+  angles(end + 1, 1) = angle;
+  asked(end + 1, :) = joints (angle);
+  katana_say (arm, struct ("do", "servo", "q", asked(end, :)));
+  state = katana_hear (arm, "state");
+  traced(end + 1, :) = state.T(1:3, 4)';
+end
+katana_say (arm, struct ("do", "watch", "hz", 0));
+state = katana_go (arm, joints (2 * pi));
+katana_say (arm, struct ("do", "release", "id", 2));
+katana_hear (arm, "done");
+clear arm
+
+% How far the tip was from the circle on its way, the arm's lag behind the stream left aside.
+off_mm = 1e3 * hypot (traced(:, 1) - 0.150, hypot (traced(:, 2), traced(:, 3) + 0.110) - 0.100);
+result = struct ("start_error_mm", start_error_mm, "largest_error_mm", max (off_mm), ...
+                 "states", rows (traced), "angles", angles, "asked", asked);
+printf ("%s\n", jsonencode (result));

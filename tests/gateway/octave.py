@@ -1,0 +1,43 @@
+"""Find GNU Octave, and install it where that can be done without asking.
+
+``python tests/gateway/octave.py`` does so; where it is not there its tests are skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+
+PACKAGES = ("octave", "octave-instrument-control")
+"""Debian's names. The second brings TCP connections."""
+
+MISSING = (
+    "GNU Octave with its package instrument-control is not here; on Debian and Ubuntu: "
+    f"apt-get install {' '.join(PACKAGES)}"
+)
+
+
+def find() -> str | None:
+    """Octave's command line, if it is there and can open connections."""
+    path = shutil.which("octave-cli")
+    if path is None:
+        return None
+    load = [path, "--quiet", "--eval", "pkg load instrument-control"]
+    return path if subprocess.run(load, capture_output=True, check=False).returncode == 0 else None
+
+
+def main() -> None:
+    """Say which Octave the tests use; install it first if root can."""
+    if find() is None and shutil.which("apt-get") and os.geteuid() == 0:
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        install = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends", *PACKAGES]
+        for command in (["apt-get", "update", "--quiet=2"], install):
+            print("Running:", *command, flush=True)
+            subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)
+    path = find()
+    print(MISSING if path is None else f"Octave for the tests: {path}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,376 @@
+"""Programs at the door of a real server: over a websocket, over HTTP, over a TCP port."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import re
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.api import answers, requests, schema
+from app.cli.main import main
+from app.client import AsyncClient, Client, RefusedError, aconnect, connect
+from app.client.asynchronous import LostError
+from app.kinematics.forward import forward
+from app.kinematics.reading import Reading
+from app.robot.model import RobotModel
+from tests.browser.server import APP, AppServer, free_port
+from tests.gateway.client import ask, websocket
+
+AT = re.compile(r"JSON lines on 127\.0\.0\.1:(\d+)")
+READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
+THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer((*APP, "--lines", "0")) as server:
+        yield server
+
+
+@pytest.fixture
+def arm(server: AppServer) -> Iterator[Client]:
+    """A program that holds the arm; what it was told to do is forgotten afterwards."""
+    with connect(server.url, "Test") as arm:
+        arm.ask(requests.Reset())
+        arm.ask(requests.Speed(value=1.0))
+        yield arm
+        arm.ask(requests.Reset())
+        arm.go(requests.Home())
+        arm.ask(requests.Release())
+
+
+class Lines:
+    """A program on the TCP port."""
+
+    def __init__(self, server: AppServer) -> None:
+        found = AT.search(server.output)
+        assert found is not None
+        self.socket = socket.create_connection(("127.0.0.1", int(found[1])), timeout=5.0)
+        self.reader = self.socket.makefile("rb")
+
+    def say(self, **request: Any) -> None:
+        self.raw(json.dumps(request).encode() + b"\n")
+
+    def raw(self, data: bytes) -> None:
+        self.socket.sendall(data)
+
+    def hear(self) -> dict[str, Any]:
+        line = self.reader.readline()
+        assert line, "the line was closed"
+        heard: dict[str, Any] = json.loads(line)
+        return heard
+
+    def answer(self, **request: Any) -> dict[str, Any]:
+        self.say(**request, id="x")
+        while (heard := self.hear()).get("id") != "x":
+            pass
+        return heard
+
+    def ends(self) -> bool:
+        with suppress(ConnectionError):
+            while self.reader.readline():
+                pass
+        return True
+
+
+@contextmanager
+def speaking(server: AppServer, name: str = "Lines") -> Iterator[Lines]:
+    lines = Lines(server)
+    with lines.socket, lines.reader:
+        lines.say(do="hello", name=name)
+        assert lines.hear()["is"] == "welcome"
+        yield lines
+
+
+def post(server: AppServer, program: str = "a-test-that-posts", **request: Any) -> tuple[int, Any]:
+    status, _, body = ask(
+        f"{server.url}/api/v1/do", data=json.dumps(request).encode(), X_Program=program
+    )
+    return status, json.loads(body)
+
+
+def test_a_program_drives_the_joints_and_knows_when_they_are_there(
+    arm: Client, model: RobotModel
+) -> None:
+    there = arm.joints(THERE)
+    assert there.status == "ok"
+    assert there.why == ""
+    np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(there.T, forward(model.arm.chain, THERE), rtol=0, atol=1e-12)
+    assert there.holder == arm.welcome.name == "Test"
+    described = arm.look(answers.Arm)
+    assert described.joints == list(model.arm.chain.names)
+    np.testing.assert_array_equal(described.ready, READY)
+    np.testing.assert_array_equal(described.T_base_shoulder, model.T_base_shoulder)
+
+
+@pytest.mark.parametrize("frame", list(requests.Frame))
+def test_a_pose_may_be_in_either_frame(
+    arm: Client, model: RobotModel, frame: requests.Frame
+) -> None:
+    T = forward(model.arm.chain, THERE)
+    asked = T if frame is requests.Frame.SHOULDER else model.T_base_shoulder @ T
+    there = arm.go(requests.Pose(T=asked.tolist(), frame=frame))
+    np.testing.assert_allclose(there.T, T, rtol=0, atol=1e-9)
+    p = asked[:3, 3] + [0.0, 0.0, 0.02]
+    there = arm.go(requests.Position(p=tuple(p), frame=frame))
+    np.testing.assert_allclose(np.array(there.T)[:3, 3], T[:3, 3] + [0, 0, 0.02], rtol=0, atol=1e-9)
+    there = arm.go(requests.Turn(pitch=there.pitch, roll=0.25))
+    assert there.roll == pytest.approx(0.25, abs=1e-12)
+
+
+def test_what_the_arm_cannot_do_comes_with_its_reason(arm: Client) -> None:
+    there = arm.go(requests.Position(p=(0.9, 0.0, 0.0)))
+    assert there.status == "limited"
+    assert there.findings[0].reason == "out of reach"
+    assert there.findings[0].unit == "m"
+    assert there.findings[0].amount == pytest.approx(
+        0.9 - math.hypot(*np.array(there.T)[:3, 3]), abs=0.02
+    )
+    with pytest.raises(RefusedError, match="There is no tool 'spoon'; this arm has"):
+        arm.ask(requests.Tool(name="spoon"))
+    with pytest.raises(RefusedError, match="5 joints, the command 3"):
+        arm.ask(requests.Joints(q=[0.0, 0.0, 0.0]))
+    skewed = ((1.0, 0.0, 0.0, 0.3), (0.0, 1.0, 0.5, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
+    with pytest.raises(RefusedError, match=r"[Rr]otation"):
+        arm.ask(requests.Pose(T=skewed))
+
+
+def test_everything_there_is_to_ask_for_has_an_answer(arm: Client) -> None:
+    asked: list[requests.Request] = [
+        requests.Beat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),
+        requests.Tool(name="tcp"), requests.Joint(axis=5, value=0.1), requests.Pause(),
+        requests.Resume(), requests.Settle(), requests.Hold(), requests.Stretch(),
+        requests.Home(), requests.Jog(rates=(0.0, 0.0, 0.05, 0.0, 0.0)),
+        requests.Servo(q=READY.tolist()), requests.Look(at="loop"),
+        requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
+        *(requests.Read(reading=each) for each in reversed(Reading)),
+    ]  # fmt: skip
+    for request in asked:
+        answer = arm.ask(request)
+        assert not isinstance(answer, answers.Refused), request
+    for kind in (answers.State, answers.Arm, answers.Ledger, answers.Branches, answers.Loop):
+        assert isinstance(arm.look(kind), kind)
+    refusals = (requests.Acquire(), requests.Take(), requests.Ask(), requests.Withdraw())
+    for request in refusals:
+        with pytest.raises(RefusedError):
+            arm.ask(request)
+
+
+def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(arm: Client) -> None:
+    began = time.monotonic()
+    while (t := time.monotonic() - began) < 1.5:
+        wave = READY + math.sin(2.0 * t) * np.array((0.2, 0.0, 0.0, 0.0, 0.4))
+        arm.tell(requests.Servo(q=wave.tolist()))
+        time.sleep(0.02)
+    moving = arm.look(answers.State)
+    assert abs(np.array(moving.qd)[0]) > 0.05
+    time.sleep(1.2)
+    rest = arm.look(answers.State)
+    assert not rest.moving
+    # It braked at once and did not go on to where the stream had wanted it.
+    assert abs(rest.q[0] - 0.2 * math.sin(2.0 * 1.5)) < 0.1
+    # A target of another kind stays until it is reached.
+    there = arm.joints(THERE)
+    np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
+
+
+def test_states_come_as_often_as_they_are_wanted(arm: Client) -> None:
+    times = []
+    for state in arm.states(hz=50.0):
+        times.append(time.monotonic())
+        assert len(state.q) == 5
+        if len(times) == 60:
+            break
+    # A busy machine may tell fewer, never more.
+    assert 0.019 < np.mean(np.diff(times)) < 0.04
+
+
+def test_stop_is_anybodys_and_ends_what_a_program_does(server: AppServer, arm: Client) -> None:
+    arm.ask(requests.Speed(value=0.2))
+    arm.ask(requests.Joints(q=THERE.tolist()))
+    with connect(server.url, "Watcher") as other, pytest.raises(RefusedError, match="Test holds"):
+        other.ask(requests.Home())
+    status, _, _ = ask(f"{server.url}/api/v1/stop", data=b"", X_Program="bystander")
+    assert status == 204
+    assert arm.look(answers.State).stopped == "bystander pressed STOP."
+    with pytest.raises(RefusedError, match="reset it first"):
+        arm.joints(READY)
+    while (rest := arm.look(answers.State)).moving:
+        time.sleep(0.02)
+    arm.ask(requests.Reset())
+    time.sleep(0.3)
+    assert arm.look(answers.State).q == rest.q
+    ledger = arm.look(answers.Ledger)
+    assert any(line.who == "bystander" and line.began for line in ledger.lines)
+
+
+def test_a_program_that_falls_silent_stops_the_arm(server: AppServer) -> None:
+    async def act() -> None:
+        async with (
+            websocket(server.url, "/api/v1/socket?name=Frozen") as silent,
+            aconnect(server.url, "Watcher") as watcher,
+        ):
+            await silent.send('{"do": "speed", "value": 0.1}')
+            await silent.send(json.dumps({"do": "joints", "q": THERE.tolist()}))
+            async with asyncio.timeout(5.0):
+                while (await watcher.look(answers.State)).stopped is None:
+                    await asyncio.sleep(0.02)
+            state = await watcher.look(answers.State)
+            assert state.stopped == "The line to Frozen broke while the arm moved."
+            await _freed(watcher)
+            await watcher.ask(requests.Reset())
+            await watcher.go(requests.Home())
+
+    asyncio.run(act())
+
+
+async def _freed(client: AsyncClient) -> None:
+    async with asyncio.timeout(10.0):
+        while (await client.look(answers.State)).holder is not None:
+            await asyncio.sleep(0.05)
+
+
+def test_a_line_of_json_at_a_time_does_the_same(server: AppServer) -> None:
+    with speaking(server, "Octave") as lines:
+        lines.answer(do="reset")
+        done = lines.answer(do="joints", q=THERE.tolist())
+        assert done["is"] == "done"
+        lines.say(do="watch", hz=20)
+        state: dict[str, Any] = {"ticket": -1}
+        while state["ticket"] < done["ticket"] or state["moving"]:
+            # Whatever is asked is a sign of life.
+            lines.say(do="beat")
+            while (state := lines.hear())["is"] != "state":
+                pass
+        np.testing.assert_allclose(state["q"], THERE, rtol=0, atol=1e-12)
+        assert state["holder"] == "Octave"
+        lines.say(do="watch", hz=0)
+        assert "5 joints" in lines.answer(do="joints", q=[0])["why"]
+        assert lines.answer(do="release")["is"] == "done"
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
+        b'POST / HTTP/1.1\r\n\r\n{"do":"stop"}\n',
+        b'{"do": "stop"}\n',
+        b'{"do": "hello"}\n',
+        b"\xff\xfe\n",
+        b"\n",
+        b"x" * 100_000,
+    ],
+)
+def test_who_does_not_say_hello_on_the_tcp_port_is_sent_away(
+    server: AppServer, first: bytes
+) -> None:
+    lines = Lines(server)
+    with lines.socket, lines.reader:
+        with suppress(ConnectionError):
+            lines.raw(first)
+        assert lines.ends()
+    with connect(server.url) as arm:
+        assert arm.look(answers.State).stopped is None
+
+
+def test_requests_that_are_none_change_nothing_and_end_the_line_after_a_while(
+    server: AppServer,
+) -> None:
+    with connect(server.url) as watcher:
+        before = watcher.look(answers.State)
+        with speaking(server) as lines:
+            for text in ("{", "[]", '{"do":"fly"}', '{"do":"joints","q":[NaN,0,0,0,0]}',
+                         '{"do":"joints","q":[1e999,0,0,0,0],"id":4}', '{"do":"watch","hz":-1}',
+                         '{"do":"joints"}', '{"do":"stop","now":true}'):  # fmt: skip
+                lines.raw(text.encode() + b"\n")
+                assert lines.hear()["is"] == "refused"
+            lines.raw(b"{\n" * 60)
+            assert lines.ends()
+        after = watcher.look(answers.State)
+        assert (after.q, after.holder, after.stopped) == (before.q, before.holder, before.stopped)
+
+
+def test_single_requests_may_be_posted(server: AppServer) -> None:
+    assert post(server, do="reset", id=1) == (200, {"is": "done", "id": 1})
+    status, done = post(server, do="joint", axis=5, value=0.3)
+    assert status == 200
+    state: dict[str, Any] = {"ticket": 0}
+    while state["ticket"] < done["ticket"] or state["moving"]:
+        status, _, body = ask(f"{server.url}/api/v1/state", X_Program="a-test-that-posts")
+        assert status == 200
+        state = json.loads(body)
+        assert state["stopped"] is None
+        time.sleep(0.05)
+    assert state["q"][4] == pytest.approx(0.3, abs=1e-12)
+    status, said = post(server, "another-program", do="home", id="h")
+    assert (status, said["is"], said["id"]) == (409, "refused", "h")
+    assert "holds the arm" in said["why"]
+    assert post(server, do="fly")[0] == 422
+    assert post(server, do="watch", hz=3)[0] == 422
+    assert post(server, "short", do="home")[0] == 422
+    assert ask(f"{server.url}/api/v1/do", data=b"x" * 5000, X_Program="a-test-that-posts")[0] == 413
+    assert post(server, do="release")[0] == 200
+
+
+def test_another_sites_page_cannot_speak_for_a_program(server: AppServer) -> None:
+    for headers in ({"Origin": "https://evil.example"}, {"Origin": "null"}):
+        status, _, _ = ask(
+            f"{server.url}/api/v1/stop", data=b"", X_Program="a-test-that-posts", **headers
+        )
+        assert status == 403
+    assert json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None
+
+
+def test_the_description_names_all_that_is_there(server: AppServer) -> None:
+    described = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
+    for path in described["paths"]:
+        (method,) = described["paths"][path]
+        data = b"{}" if method == "post" and path.endswith("do") else None
+        status, _, _ = ask(server.url + path, data=data, X_Program="a-test-that-posts")
+        assert status in (200, 405, 422), path
+    shapes = described["components"]["schemas"]
+    for kind in (*schema.kinds(requests.AnyRequest), *schema.kinds(answers.AnyAnswer)):
+        assert kind.__name__ in shapes
+
+
+def test_where_a_link_is_asked_for_a_program_needs_a_token(tmp_path: Path, capsys: Any) -> None:
+    file = tmp_path / "access.json"
+    tokens = {}
+    for role in ("viewer", "operator"):
+        assert main(["access", "give", "--file", str(file), "--name", role, "--role", role]) == 0
+        tokens[role] = capsys.readouterr().out.partition("#")[2].strip()
+    port = free_port()
+    with AppServer((*APP, "--access", str(file), "--lines", "0"), port=port) as server:
+        for token in ("", "guess"):
+            with pytest.raises((RefusedError, LostError)), connect(server.url, token=token):
+                pass
+        assert ask(f"{server.url}/api/v1/state")[0] == 401
+        assert ask(f"{server.url}/api/v1/stop", data=b"", Authorization="Bearer x")[0] == 401
+        with connect(server.url, "script", token=tokens["viewer"]) as watcher:
+            assert (watcher.welcome.name, watcher.welcome.role) == ("viewer, script", "viewer")
+            with pytest.raises(RefusedError, match="may only watch"):
+                watcher.ask(requests.Home())
+            with connect(server.url, "script", token=tokens["operator"]) as driver:
+                assert driver.joints(THERE).status == "ok"
+                with pytest.raises(RefusedError):
+                    driver.ask(requests.Take())
+        lines = Lines(server)
+        with lines.socket, lines.reader:
+            lines.say(do="hello", name="x")
+            assert lines.hear()["is"] == "refused"
+            assert lines.ends()
+        lines = Lines(server)
+        with lines.socket, lines.reader:
+            lines.say(do="hello", name="x", token=tokens["operator"])
+            assert lines.hear()["name"] == "operator, x"
