@@ -12,7 +12,7 @@ servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 .PHONY: run test test-long check lint types contracts tests browser octave robot bench-collision bench-drag \
-        bench-kinematics bench-start bench-view pictures lock clean
+        bench-kinematics bench-load bench-start bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -59,6 +59,9 @@ bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser
 
 bench-view: $(dev_ok)         ## what one update of the view costs the server
 	$(bin)/python -m benchmarks.view_update
+
+bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
+	$(bin)/python -m benchmarks.load $(ARGS)
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)

@@ -67,7 +67,7 @@ def main() -> None:
     settings, model = Settings(), load()
     loop, session, mailbox, clock = loop_of(model, settings)
     server, bare = quiet_server(), quiet_server()
-    view = View(server, model, loop, mailbox, session.choices, settings.frame_rate)
+    view = View(server, model, loop.board, mailbox, session.choices, settings.frame_rate)
     arm = ArmNodes(bare, model)
     ours, floor = [], []
     for tick in range(TICKS):
@@ -76,12 +76,12 @@ def main() -> None:
             mailbox.put(cmd.SetJoints(session.ready + side * np.array([0.8, 0.2, -0.4, 0.5, 0.9])))
         clock.t += 1.0 / settings.rate
         loop.tick()
-        if tick % EVERY or not loop.snapshot.state.moving:
+        if tick % EVERY or not loop.board.snapshot.state.moving:
             continue
         started = time.perf_counter()
-        view.show(loop.snapshot)
+        view.show(loop.board.snapshot)
         ours.append(time.perf_counter() - started)
-        state = loop.snapshot.state
+        state = loop.board.snapshot.state
         started = time.perf_counter()
         arm.move(model.joint_angles(state.q, state.gripper))
         floor.append(time.perf_counter() - started)

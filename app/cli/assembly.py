@@ -1,72 +1,95 @@
-"""The parts of a running app, put together."""
+"""The parts of a running app, put together: the arm in one process, what people see in another."""
 
 from __future__ import annotations
 
-import sys
+import gc
+import logging
+import os
+from contextlib import suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import NamedTuple
 
 from app.control.session import Session
 from app.drivers.simulated import SimulatedDriver
-from app.exchange.reachability_file import load_map
-from app.gateway.gateway import Gateway
-from app.gateway.motion import Motion
 from app.robot.collision import standing_around, world_of
-from app.robot.model import load
+from app.robot.model import RobotModel, load
 from app.robot.props import load_props
 from app.runtime.clock import MonotonicClock
+from app.runtime.link import ArmEnd
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
 from app.settings import Settings
 from app.view.texts import UNCHECKED
-from app.view.view import View
+
+log = logging.getLogger(__name__)
+
+PROMPT = -10
+"""Niceness of the process that moves the arm, where the system allows it."""
 
 
-class Assembly:
-    """A simulated arm, its control loop, and the view of it behind a gateway that is open."""
+class Described(NamedTuple):
+    """A robot as its files tell it, the rules for it, and sentences on what they leave open."""
 
-    def __init__(
-        self,
-        gateway: Gateway,
-        settings: Settings,
-        urdf: Path,
-        tool: str | None,
-        workspace: Path | None,
-    ) -> None:
-        """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``.
+    model: RobotModel
+    session: Session
+    notes: tuple[str, ...]
 
-        ``workspace``: file of a reachability map that can be shown.
-        """
-        stored = None if workspace is None else load_map(workspace)
-        model = load(urdf, tool)
-        world, left_out = world_of(model)
-        notes = [*model.notes, *left_out]
-        if world is None:
-            notes.append(UNCHECKED)
-        else:
-            world = world.with_obstacles(standing_around(load_props()))
-        for note in notes:
-            print(f"katana450: {note}", file=sys.stderr)
-        session = Session(model.arm, model.ready(settings.ready), world)
+
+def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
+    """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``."""
+    model = load(urdf, tool)
+    world, left_out = world_of(model)
+    notes = [*model.notes, *left_out]
+    if world is None:
+        notes.append(UNCHECKED)
+    else:
+        world = world.with_obstacles(standing_around(load_props()))
+    session = Session(model.arm, model.ready(settings.ready), world)
+    return Described(model, session, tuple(notes))
+
+
+class RunningArm:
+    """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
+
+    def __init__(self, settings: Settings, urdf: Path, tool: str | None) -> None:
+        model, session, self.notes = described(settings, urdf, tool)
         driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
-        mailbox = Mailbox(session.check)
-        self._loop = ControlLoop(session, driver, mailbox, MonotonicClock(), settings.rate)
-        self._view = View(
-            gateway.viser,
-            model,
-            self._loop,
-            mailbox,
-            session.choices,
-            settings.frame_rate,
-            stored,
-        )
-        gateway.attach(Motion(model, session, self._loop, mailbox, self._view.let_go))
+        self._mailbox = Mailbox(session.check)
+        self._loop = ControlLoop(session, driver, self._mailbox, MonotonicClock(), settings.rate)
+        self._silence = settings.silence
+        self._link: ArmEnd | None = None
 
     def start(self) -> None:
-        """Run the control loop and the view in threads of their own."""
+        """Run the control loop in a thread of its own."""
+        _be_prompt()
         self._loop.start()
-        self._view.start()
+
+    def attach(self, pipe: Connection) -> None:
+        """Obey who is at the other end of ``pipe``, in place of anybody before."""
+        if self._link is not None:
+            self._link.close()
+        self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence)
+        self._link.start()
+
+    @property
+    def unheard(self) -> float:
+        """[s] Since whoever it obeys was heard of."""
+        return 0.0 if self._link is None else self._link.unheard
 
     def stop(self) -> None:
-        """End both; the server closes with the view."""
-        self._view.stop()
+        """Cut the pipe, and end the loop."""
+        if self._link is not None:
+            self._link.close()
         self._loop.stop()
+
+
+def _be_prompt() -> None:
+    """Let nothing that can wait come between the ticks."""
+    # What is there by now stays: looking through it for garbage takes longer than a tick may be
+    # late.
+    gc.collect()
+    gc.freeze()
+    if hasattr(os, "setpriority"):
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, PROMPT)

@@ -1,4 +1,4 @@
-"""``katana450 serve``: open the port, put the parts together, run until told to stop."""
+"""``katana450 serve``: open the port, run the arm, and see to it that people can reach it."""
 
 from __future__ import annotations
 
@@ -6,15 +6,28 @@ import logging
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 from types import FrameType
 
-from app.gateway.gateway import Gateway
+from app.cli.front import OPEN, READY, Front, start_log
+from app.gateway.listen import HERE, listen
 from app.settings import Settings
 from robot_description import URDF_PATH
 
 AWAKE = 0.2
-"""[s] How soon a signal is heeded."""
+"""[s] How soon a signal is heeded, and a front that ended."""
+
+AGAIN = (0.0, 1.0, 5.0, 15.0)
+"""[s] Until it is started again, the longer the more often it ended at once."""
+
+SETTLED = 30.0
+"""[s] A front that ran for so long did not end at once."""
+
+HUNG = 10.0
+"""[s] A front that says nothing for so long has hung."""
+
+log = logging.getLogger(__name__)
 
 
 def serve(
@@ -28,8 +41,7 @@ def serve(
     ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
     ``workspace``: file of a reachability map that can be shown.
     """
-    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
-    logging.getLogger("app").setLevel(logging.INFO)
+    start_log()
     stopping = threading.Event()
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
@@ -37,27 +49,53 @@ def serve(
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
-    gateway = Gateway(settings)
-    gateway.start()
+    # Held here, so that nobody else takes it while the front is started again.
+    listening = listen(settings.host, settings.port)
+    lines = None if settings.lines is None else listen(HERE, settings.lines)
     scheme = "https" if settings.tls_cert is not None else "http"
-    url = settings.public_url or f"{scheme}://{_shown(settings.host)}:{gateway.port}"
-    print(f"Open {url} in a browser.", flush=True)
-    try:
-        # The libraries that read the robot take most of a second: the page loads in the meantime.
-        from app.cli.assembly import Assembly
+    port = listening.getsockname()[1]
+    url = settings.public_url or f"{scheme}://{_shown(settings.host)}:{port}"
 
-        assembly = Assembly(gateway, settings, urdf, tool, workspace)
-        assembly.start()
-        if gateway.lines_port is not None:
-            print(f"Programs: JSON lines on 127.0.0.1:{gateway.lines_port}.", flush=True)
+    def front() -> Front:
+        return Front(settings, (urdf, tool), workspace, (listening, lines))
+
+    current = front()
+    try:
+        # The libraries that read the robot take most of a second; so does the front meanwhile.
+        from app.cli.assembly import RunningArm
+
+        arm = RunningArm(settings, urdf, tool)
+        for note in arm.notes:
+            print(f"katana450: {note}", file=sys.stderr)
+        current.wait_for(OPEN)
+        print(f"Open {url} in a browser.", flush=True)
+        arm.start()
+        arm.attach(current.pipe)
+        current.wait_for(READY)
+        if lines is not None:
+            print(f"Programs: JSON lines on {HERE}:{lines.getsockname()[1]}.", flush=True)
         print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
+        ended, began = 0, time.monotonic()
         # A signal that another thread is given does not wake this one from its wait.
         while not stopping.wait(AWAKE):
-            pass
-        gateway.stop()
-        assembly.stop()
+            if current.running:
+                if time.monotonic() - began > SETTLED and arm.unheard > HUNG:
+                    log.error("The page's server has not been heard of for %g s.", HUNG)
+                    current.kill()
+                continue
+            log.error(
+                "The page's server ended with status %s; the arm holds. It is started again.",
+                current.exit_code,
+            )
+            ended = 0 if time.monotonic() - began > SETTLED else ended + 1
+            stopping.wait(AGAIN[min(ended, len(AGAIN) - 1)])
+            current.stop()
+            current, began = front(), time.monotonic()
+            arm.attach(current.pipe)
+        arm.stop()
     finally:
-        gateway.stop()
+        current.stop()
+        listening.close()
     return 0
 
 

@@ -23,7 +23,7 @@ from app.gateway.application import application
 from app.gateway.door import LOOPBACK_NAMES, Address, Door, public_origin
 from app.gateway.firewall import LARGEST
 from app.gateway.hub import TICK, Hub
-from app.gateway.listen import listen, reaches_beyond
+from app.gateway.listen import reaches_beyond
 from app.gateway.motion import Motion
 from app.gateway.program import Lines
 from app.gateway.proxy import Proxy
@@ -36,8 +36,6 @@ log = logging.getLogger(__name__)
 UNSENT = 16_384
 """Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
 
-HERE = "127.0.0.1"
-
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
 
@@ -45,10 +43,16 @@ GOODBYE_SECONDS = 1
 class Gateway:
     """Owns the port, and viser behind it."""
 
-    def __init__(self, settings: Settings) -> None:
-        """Opens both. Raises ConfigurationError when that cannot be, or must not: see ``open``."""
+    def __init__(
+        self, settings: Settings, listening: socket.socket, lines: socket.socket | None = None
+    ) -> None:
+        """``listening``: the port; ``lines``: that for programs which speak JSON lines.
+
+        Raises ConfigurationError when it must not be served there as ``settings`` say.
+        """
         _check_tls(settings)
-        self._listening = listen(settings.host, settings.port)
+        self._listening = listening
+        self._lines_at = lines
         try:
             access = _access(settings, self._listening)
             key = secrets.token_urlsafe(32)
@@ -60,8 +64,6 @@ class Gateway:
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
             app = application(self._hub, door, proxy, self.address)
             self._lines = Lines(self._hub, door)
-            # For programs of this machine alone: what is said there can be read on the way.
-            self._lines_at = None if settings.lines is None else listen(HERE, settings.lines)
         except BaseException:
             self._listening.close()
             raise
@@ -94,11 +96,6 @@ class Gateway:
     def attach(self, arm: Motion) -> None:
         """From now on the arm can be driven."""
         self._hub.arm = arm
-
-    @property
-    def lines_port(self) -> int | None:
-        """Where programs may speak JSON lines."""
-        return None if self._lines_at is None else int(self._lines_at.getsockname()[1])
 
     def stop(self) -> None:
         """Close every socket and the port; viser is left to its view."""

@@ -23,8 +23,8 @@ from app.gateway.journal import Journal
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.robot.model import RobotModel
+from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
-from app.runtime.loop import Snapshot
 from app.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -56,6 +56,11 @@ class Arm(Protocol):
 
     @property
     def ledger(self) -> Sequence[Entry]: ...
+
+    @property
+    def caught_up(self) -> bool: ...
+
+    def beat(self) -> None: ...
 
     def stop(self) -> None: ...
 
@@ -265,10 +270,18 @@ class Hub:
         if self._servoed is not None and t - self._servoed > JOG_TIME:
             self._hold()
         if self.arm is not None:
+            self.arm.beat()
             self.journal.follow(self.arm.ledger, self._who())
-        if self.stopped is not None and self.arm is not None and self.arm.state.halted is None:
+            self._agree_with(self.arm)
+
+    def _agree_with(self, arm: Arm) -> None:
+        """What is stopped here is stopped there, and the other way round."""
+        halted = arm.state.halted is not None
+        if self.stopped is not None and not halted:
             # An arm that came after the stop, or an error that undid it.
-            self.arm.stop()
+            arm.stop()
+        elif self.stopped is None and halted and arm.caught_up:
+            self._halt(Stopped(None, "The arm lost the server and stopped."))
 
     def _who(self) -> str | None:
         """Who has a hand in what the arm does now."""

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 from app.control.ledger import Entry
 from app.control.state import Reason
-from app.runtime.loop import KEPT
+from app.runtime.board import KEPT
 from app.view.texts import told
 
 log = logging.getLogger(__name__)

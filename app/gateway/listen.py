@@ -10,6 +10,9 @@ from app.errors import ConfigurationError
 
 BACKLOG = 128
 
+HERE = "127.0.0.1"
+"""This machine alone."""
+
 
 def listen(host: str, port: int) -> socket.socket:
     """A socket that listens on ``host``:``port``; port 0 takes a free one.

@@ -16,9 +16,9 @@ from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.robot.model import RobotModel
+from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
-from app.runtime.loop import ControlLoop, Snapshot
-from app.runtime.mailbox import Mailbox
+from app.runtime.link import FrontEnd
 
 
 class Motion:
@@ -28,21 +28,21 @@ class Motion:
         self,
         model: RobotModel,
         session: Session,
-        loop: ControlLoop,
-        mailbox: Mailbox,
+        link: FrontEnd,
         let_go: Callable[[], None],
     ) -> None:
         """``let_go`` takes the handles of the view out of every hand."""
         self.model = model
         self._session = session
-        self._loop = loop
-        self._mailbox = mailbox
+        self._link = link
+        self._board = link.board
+        self._mailbox = link
         self._let_go = let_go
 
     @property
     def snapshot(self) -> Snapshot:
         """The newest."""
-        return self._loop.snapshot
+        return self._board.snapshot
 
     @property
     def ready(self) -> FloatArray:
@@ -52,7 +52,7 @@ class Motion:
     @property
     def lateness(self) -> Lateness:
         """How well the control loop keeps its period."""
-        return self._loop.lateness
+        return self._board.lateness
 
     def choices(self) -> tuple[Choice, ...]:
         """The branches there are to choose from."""
@@ -65,12 +65,21 @@ class Motion:
     @property
     def state(self) -> State:
         """The newest."""
-        return self._loop.snapshot.state
+        return self._board.snapshot.state
 
     @property
     def ledger(self) -> tuple[Entry, ...]:
         """What held it back of late, oldest first."""
-        return self._loop.ledger
+        return self._board.ledger
+
+    @property
+    def caught_up(self) -> bool:
+        """Whether the newest state has every command in it."""
+        return self.snapshot.ticket == self._link.last_ticket
+
+    def beat(self) -> None:
+        """Tell the arm that somebody watches over it."""
+        self._link.beat()
 
     def stop(self) -> None:
         """Rest as fast as the arm can; it obeys nothing until it is released."""

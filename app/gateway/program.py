@@ -23,7 +23,7 @@ from app.gateway.hub import Hub, Window
 
 log = logging.getLogger(__name__)
 
-RATE, BURST = 1000.0, 2000.0
+RATE, BURST = 400.0, 800.0
 """Requests a second, and at once: a stream of joint angles may come quicker than the arm ticks."""
 
 MISTAKES, FORGIVEN = 20, 1.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LOOKED_AT = 6000
-"""Ticks: the last minute of a loop at 100 Hz."""
+LOOKED_AT = 1000
+"""Ticks: the last ten seconds of a loop at 100 Hz."""
 
 
 @dataclass(frozen=True)

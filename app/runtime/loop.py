@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections import deque
-from dataclasses import dataclass
 
-from app.control.ledger import Entry, news
+from app.control.ledger import news
 from app.control.session import Session
 from app.control.state import State
 from app.drivers.driver import Driver
+from app.runtime.board import Board, Snapshot
 from app.runtime.clock import Clock
 from app.runtime.lateness import Lateness, Punctuality
 from app.runtime.mailbox import Mailbox
 
-KEPT = 500
-"""Entries of the ledger that are kept."""
-
 log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """What the loop shows the world: a state, and the last mailbox ticket that is in it."""
-
-    state: State
-    ticket: int
 
 
 class ControlLoop:
@@ -44,38 +32,16 @@ class ControlLoop:
         t = clock.now()
         sent = driver.start(t)
         self._state = session.begin(sent.q, sent.gripper, t)
-        self._snapshot = Snapshot(self._state, 0)
-        self._published = threading.Condition()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._ledger: deque[Entry] = deque(maxlen=KEPT)
         self._punctuality = Punctuality(self._period)
-
-    @property
-    def snapshot(self) -> Snapshot:
-        """The newest one."""
-        return self._snapshot
-
-    @property
-    def ledger(self) -> tuple[Entry, ...]:
-        """The last reasons why the arm did not do what was wished, oldest first."""
-        return tuple(self._ledger)
+        self.board = Board(Snapshot(self._state, 0), self.lateness)
+        """Where it shows what it does."""
 
     @property
     def lateness(self) -> Lateness:
         """How well the ticks come when they are due."""
         return self._punctuality.lateness
-
-    def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
-        """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""
-        with self._published:
-            self._published.wait_for(lambda: self._snapshot is not seen, timeout)
-            return self._snapshot
-
-    def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
-        """Return as soon as a command newer than ``seen`` is in, or ``timeout`` [s] is up."""
-        with self._published:
-            self._published.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)
 
     def tick(self) -> None:
         """One turn: take the commands, move on, tell the arm, publish what changed."""
@@ -91,12 +57,9 @@ class ControlLoop:
             log.exception("The control loop met an error; the arm holds.")
             state = self._session.fail(before)
         self._state = state
-        self._ledger.extend(news(before, state))
         # An arm at rest wakes nobody: time alone is no news.
         if commands or _differs(before, state):
-            with self._published:
-                self._snapshot = Snapshot(state, ticket)
-                self._published.notify_all()
+            self.board.pin(Snapshot(state, ticket), news(before, state))
 
     def start(self) -> None:
         """Run the ticks in a thread of their own until ``stop``."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from typing import Protocol
 
 from app.control import commands as cmd
 from app.control.commands import Command
@@ -14,6 +15,19 @@ CAPACITY = 256
 
 STREAMS = (cmd.SetJoint, cmd.SetJoints, cmd.MoveTool, cmd.TurnTool, cmd.SetPose, cmd.SetGripper)
 """Commands of which the last one is enough when several of a kind follow each other."""
+
+
+class CommandSink(Protocol):
+    """Takes commands, here or at the end of a pipe."""
+
+    @property
+    def last_ticket(self) -> int:
+        """The ticket of the newest command."""
+        ...
+
+    def put(self, command: Command) -> int:
+        """Leave ``command`` for the next tick; returns its ticket. Raises InputError."""
+        ...
 
 
 class Mailbox:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import threading
 import time
 
@@ -18,8 +19,8 @@ from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 from app.robot.props import load_props
-from app.runtime.loop import ControlLoop, Snapshot
-from app.runtime.mailbox import Mailbox
+from app.runtime.board import Board, Snapshot
+from app.runtime.mailbox import CommandSink
 from app.view.branches import Find
 from app.view.cameras import Cameras, Preset
 from app.view.conduit import Conduits
@@ -32,6 +33,8 @@ from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
 from app.view.tint import Tint
 from app.view.workcell import Workcell
+
+log = logging.getLogger(__name__)
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
@@ -56,8 +59,8 @@ class View:
         self,
         server: viser.ViserServer,
         model: RobotModel,
-        loop: ControlLoop,
-        mailbox: Mailbox,
+        board: Board,
+        mailbox: CommandSink,
         find: Find,
         frame_rate: float,
         stored: StoredMap | None = None,
@@ -69,26 +72,28 @@ class View:
         """
         self._server = server
         self._model = model
-        self._loop = loop
+        self._board = board
         self._mailbox = mailbox
         self._interval = 1.0 / frame_rate
         self._stopping = threading.Event()
+        self.failed = threading.Event()
+        """Set when it shows nothing any more."""
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
         furnish(server)
         Workcell(server, load_props())
-        state = loop.snapshot.state
+        state = board.snapshot.state
         self._arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self._arm)
         self._tint = Tint(server, model, self._arm.path)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
-        self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: loop.snapshot.state)
+        self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
         self._cameras = Cameras(server, model)
         shows = Shows(self._show_ellipsoid, self._look_from, cloud)
         self._panel = Panel(server, model, mailbox.put, find, shows, state)
-        self.show(loop.snapshot)
+        self.show(board.snapshot)
 
     def start(self) -> None:
         """Follow the control loop in a thread of the view's own."""
@@ -115,23 +120,30 @@ class View:
             return
 
     def _show_ellipsoid(self, visible: bool) -> None:
-        self._ellipsoid.show(visible, self._loop.snapshot.state)
+        self._ellipsoid.show(visible, self._board.snapshot.state)
 
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
-        self._cameras.give(client, preset, self._loop.snapshot.state)
+        self._cameras.give(client, preset, self._board.snapshot.state)
 
     def _run(self) -> None:
-        seen = self._loop.snapshot
+        try:
+            self._follow()
+        except Exception:
+            log.exception("The view met an error.")
+            self.failed.set()
+
+    def _follow(self) -> None:
+        seen = self._board.snapshot
         settled = True
         while not self._stopping.is_set():
             # After the last change the read-out still owes its final numbers.
-            snapshot = self._loop.wait_for_change(seen, 0.5 if settled else READOUT_INTERVAL)
+            snapshot = self._board.wait_for_change(seen, 0.5 if settled else READOUT_INTERVAL)
             settled = snapshot is seen
             seen = snapshot
             due = time.perf_counter() + self._interval
             self.show(snapshot)
             # Motion is shown at the frame rate, what a person does at once.
-            self._loop.wait_for_command(snapshot, due - time.perf_counter())
+            self._board.wait_for_command(snapshot, due - time.perf_counter())
 
     def show(self, snapshot: Snapshot) -> None:
         """Send every browser what has changed."""
@@ -147,7 +159,7 @@ class View:
             self._panel.follow(
                 state,
                 time.perf_counter(),
-                self._loop.ledger,
+                self._board.ledger,
                 caught_up=snapshot.ticket == self._mailbox.last_ticket,
             )
         self._server.flush()

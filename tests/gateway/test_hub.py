@@ -22,8 +22,8 @@ from app.gateway.hub import TICK, Hub, Window, key_of
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.robot.model import RobotModel
+from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
-from app.runtime.loop import Snapshot
 from app.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
@@ -43,6 +43,7 @@ class FakeArm:
         self.moves = False
         self.holds = 0
         self.stops = 0
+        self.beats = 0
         self.halted = False
         self.jogs: list[tuple[Rates, JogFrame]] = []
         self.share = 1.0
@@ -55,6 +56,13 @@ class FakeArm:
         if not self.moves:
             return replace(self.rest, halted=halted)
         return replace(self.rest, goal=self.rest.setpoint + 0.1, halted=halted)
+
+    @property
+    def caught_up(self) -> bool:
+        return True
+
+    def beat(self) -> None:
+        self.beats += 1
 
     def stop(self) -> None:
         self.stops += 1

@@ -59,29 +59,29 @@ def table(arm: Arm, session: Session) -> LoopOnATable:
 def test_a_command_moves_the_arm_until_it_is_there(arm: Arm, table: LoopOnATable) -> None:
     ticket = table.mailbox.put(cmd.SetJoint(0, 0.5))
     table.tick()
-    assert table.loop.snapshot.ticket == ticket
+    assert table.loop.board.snapshot.ticket == ticket
     jerk = float(arm.limits.jerk[0])
-    assert table.loop.snapshot.state.q[0] == pytest.approx(jerk / RATE**3 / 6.0)
+    assert table.loop.board.snapshot.state.q[0] == pytest.approx(jerk / RATE**3 / 6.0)
     table.tick(150)
-    assert table.loop.snapshot.state.q[0] == 0.5
+    assert table.loop.board.snapshot.state.q[0] == 0.5
 
 
 def test_an_arm_at_rest_publishes_nothing(table: LoopOnATable) -> None:
     table.tick(3)
-    resting = table.loop.snapshot
+    resting = table.loop.board.snapshot
     table.tick(50)
-    assert table.loop.snapshot is resting
+    assert table.loop.board.snapshot is resting
     table.mailbox.put(cmd.Settle())
     table.tick()
-    assert table.loop.snapshot is not resting
+    assert table.loop.board.snapshot is not resting
 
 
 def test_after_a_rest_the_first_step_is_one_period_long(arm: Arm, table: LoopOnATable) -> None:
     table.tick(500)
-    before = table.loop.snapshot.state.q
+    before = table.loop.board.snapshot.state.q
     table.mailbox.put(cmd.SetJoint(0, 2.0))
     table.tick()
-    step = np.abs(table.loop.snapshot.state.q - before)
+    step = np.abs(table.loop.board.snapshot.state.q - before)
     assert step.max() == pytest.approx(float(arm.limits.jerk[0]) / RATE**3 / 6.0)
 
 
@@ -106,12 +106,12 @@ def test_a_driver_that_fails_makes_the_arm_hold_and_say_so(
     for _ in range(5):
         clock.t += 0.01
         loop.tick()
-    moving = loop.snapshot.state
+    moving = loop.board.snapshot.state
     driver.broken = True
     clock.t += 0.01
     with caplog.at_level(logging.ERROR):
         loop.tick()
-    held = loop.snapshot.state
+    held = loop.board.snapshot.state
     assert held.status is Status.FAULT
     assert (held.goal == moving.setpoint).all()
     assert "the cable came out" in caplog.text
@@ -120,22 +120,22 @@ def test_a_driver_that_fails_makes_the_arm_hold_and_say_so(
     for _ in range(20):
         clock.t += 0.01
         loop.tick()
-    assert np.allclose(loop.snapshot.state.q, moving.setpoint)
-    assert loop.snapshot.state.findings == held.findings
+    assert np.allclose(loop.board.snapshot.state.q, moving.setpoint)
+    assert loop.board.snapshot.state.findings == held.findings
     mailbox.put(cmd.Home())
     clock.t += 0.01
     loop.tick()
-    assert loop.snapshot.state.findings == ()
+    assert loop.board.snapshot.state.findings == ()
 
 
 def test_waiting_for_a_change_returns_with_it_or_when_time_is_up(table: LoopOnATable) -> None:
     table.tick()
-    seen = table.loop.snapshot
-    assert table.loop.wait_for_change(seen, 0.01) is seen
+    seen = table.loop.board.snapshot
+    assert table.loop.board.wait_for_change(seen, 0.01) is seen
     table.mailbox.put(cmd.Home())
     teller = threading.Thread(target=table.tick)
     teller.start()
-    assert table.loop.wait_for_change(seen, 5.0) is not seen
+    assert table.loop.board.wait_for_change(seen, 5.0) is not seen
     teller.join()
 
 
@@ -146,10 +146,10 @@ def test_on_the_machines_clock_the_loop_runs_and_stops(arm: Arm, session: Sessio
     loop.start()
     started = time.perf_counter()
     mailbox.put(cmd.SetJoint(0, 0.4))
-    snapshot = loop.snapshot
+    snapshot = loop.board.snapshot
     while snapshot.state.q[0] != 0.4:
         assert time.perf_counter() - started < 10.0
-        snapshot = loop.wait_for_change(snapshot, 0.1)
+        snapshot = loop.board.wait_for_change(snapshot, 0.1)
     took = time.perf_counter() - started
     loop.stop()
     # Never sooner than the joint can: however the machine stutters.

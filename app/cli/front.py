@@ -1,0 +1,168 @@
+"""The process that people and programs speak to: gateway and view. It can end and begin again; the
+arm is in another, and stops meanwhile."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import socket
+import sys
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from app.errors import ConfigurationError, KatanaError
+from app.settings import Settings
+
+START_SECONDS = 60.0
+GOODBYE_SECONDS = 5.0
+
+AWAKE = 0.5
+"""[s] How soon it is noticed that there is no view any more."""
+
+OPEN, READY = "open", "ready"
+"""What it says of itself: pages load; the arm is there."""
+
+
+class Front:
+    """One such process, as the one that started it sees it."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        robot: tuple[Path, str | None],
+        workspace: Path | None,
+        listening: tuple[socket.socket, socket.socket | None],
+    ) -> None:
+        """Starts it. ``robot``: see ``described``. ``workspace``: file of a reachability map.
+
+        ``listening``: the port for browsers, and the one for JSON lines if there is one.
+        """
+        spawn = multiprocessing.get_context("spawn")
+        self._told, telling = spawn.Pipe(duplex=False)
+        self.pipe: Connection
+        self.pipe, theirs = spawn.Pipe()
+        self._process = spawn.Process(
+            target=_run,
+            args=(settings, robot, workspace, listening, theirs, telling),
+            name="katana450 front",
+            daemon=True,
+        )
+        self._process.start()
+        self._said: set[str] = set()
+        # Theirs alone, so that each side hears when the other is gone.
+        theirs.close()
+        telling.close()
+
+    @property
+    def running(self) -> bool:
+        return self._process.is_alive()
+
+    @property
+    def exit_code(self) -> int | None:
+        return self._process.exitcode
+
+    def wait_for(self, word: str) -> None:
+        """Return once it says ``word``. Raises what kept it from that, or ConfigurationError."""
+        try:
+            if self._told.poll(START_SECONDS):
+                said: Any = self._told.recv()
+                if isinstance(said, KatanaError):
+                    raise said
+                self._said.add(said)
+                if said == word:
+                    return
+        except EOFError:
+            pass
+        raise ConfigurationError("The page's server did not start; see the log above.")
+
+    def _is_ready(self) -> bool:
+        with suppress(EOFError):
+            while self._told.poll():
+                self._said.add(str(self._told.recv()))
+        return READY in self._said
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._process.kill()
+
+    def stop(self) -> None:
+        """End it: once the arm has hung up in peace, before that or after a while by force."""
+        if not self._is_ready():
+            self._process.terminate()
+        self._process.join(GOODBYE_SECONDS)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+def _run(
+    settings: Settings,
+    robot: tuple[Path, str | None],
+    workspace: Path | None,
+    listening: tuple[socket.socket, socket.socket | None],
+    pipe: Connection,
+    telling: Connection,
+) -> None:
+    """What it does, from its start to its end."""
+    # Ctrl-C goes to all processes of a terminal; the arm's says when this one is to end.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "setpriority"):
+        os.setpriority(os.PRIO_PROCESS, 0, 0)
+    start_log()
+    try:
+        _serve(settings, robot, workspace, listening, pipe, telling)
+    except KatanaError as error:
+        telling.send(error)
+    except (EOFError, BrokenPipeError):
+        # The other process is gone before this one was there.
+        return
+
+
+def _serve(
+    settings: Settings,
+    robot: tuple[Path, str | None],
+    workspace: Path | None,
+    listening: tuple[socket.socket, socket.socket | None],
+    pipe: Connection,
+    telling: Connection,
+) -> None:
+    from app.gateway.gateway import Gateway
+
+    gateway = Gateway(settings, *listening)
+    gateway.start()
+    telling.send(OPEN)
+    try:
+        # The libraries that read the robot take most of a second: the page loads in the meantime.
+        from app.cli.assembly import described
+        from app.exchange.reachability_file import load_map
+        from app.gateway.motion import Motion
+        from app.runtime.link import FrontEnd
+        from app.view.view import View
+
+        stored = None if workspace is None else load_map(workspace)
+        model, session, _ = described(settings, *robot)
+        link = FrontEnd(pipe, session.check)
+        view = View(
+            gateway.viser, model, link.board, link, session.choices, settings.frame_rate, stored
+        )
+        gateway.attach(Motion(model, session, link, view.let_go))
+        link.start()
+        view.start()
+        telling.send(READY)
+        while not link.cut.wait(AWAKE):
+            if view.failed.is_set():
+                raise SystemExit(1)
+        gateway.stop()
+        view.stop()
+    finally:
+        gateway.stop()
+
+
+def start_log() -> None:
+    """What goes wrong, and who drove, on standard error."""
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
+    logging.getLogger("app").setLevel(logging.INFO)

@@ -1,0 +1,187 @@
+"""What the control loop and STOP feel of a crowd: watchers, floods, slow readers, hostile messages.
+
+    python -m benchmarks.load
+
+A program swings the arm all the time. In turn there are: nobody else; 32 watchers who say 30 times
+a second what they have seen; senders who flood the server; readers who read nothing; senders of
+messages no page can have sent. Of each turn are printed how late the control loop's ticks came (the
+server's own count) and how long a STOP takes until a state says that the arm brakes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack, suppress
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from websockets.exceptions import ConnectionClosed
+
+from app.api import answers, requests
+from app.client import AsyncClient, aconnect
+from app.runtime.lateness import LOOKED_AT
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
+
+WATCHERS = 32
+PICTURES = 30.0
+"""A second, that each watcher says it has seen."""
+
+FLOODS, SLOW, HOSTILE = 2, 4, 2
+
+SWING = np.array((0.3, 0.15, 0.15, 0.2, 0.6))
+"""[rad] Of each joint about the ready posture."""
+
+PERIOD = 4.0
+"""[s] Of the swing."""
+
+
+async def swing(arm: AsyncClient) -> None:
+    """Move the arm for ever; after a STOP, go on."""
+    ready = np.array((await arm.look(answers.Arm)).ready)
+    await arm.ask(requests.Take() if await _held(arm) else requests.Acquire())
+    while True:
+        with suppress(KeyError):
+            now = time.monotonic()
+            q = ready + SWING * math.sin(math.tau * now / PERIOD)
+            await arm.tell(requests.Servo(q=q.tolist()))
+            await asyncio.sleep(0.02)
+
+
+async def _held(arm: AsyncClient) -> bool:
+    return (await arm.look(answers.State)).holder is not None
+
+
+async def watch(url: str, pictures: list[int]) -> None:
+    """See the scene as a browser does, until cancelled."""
+    cookie = enter(url)
+    path = f"/viser?page={page_name()}"
+    async with websocket(url, path, cookie, subprotocols=[SUBPROTOCOL]) as socket:
+        count, told = 0, 0.0
+        async for _ in socket:
+            count += 1
+            now = time.monotonic()
+            if now - told > 1.0 / PICTURES:
+                told = now
+                pictures[0] += 1
+                await socket.send(msgspec.msgpack.encode({"type": "Seen", "count": count}))
+
+
+async def flood(url: str) -> None:
+    """Say far too much, be sent away, come again."""
+    while True:
+        # Whoever is sent away takes a moment to come again.
+        await asyncio.sleep(0.1)
+        with suppress(ConnectionClosed, OSError):
+            async with websocket(url, "/api/v1/socket?name=Flood") as socket:
+                while True:
+                    await socket.send('{"do":"look"}')
+                    # So that this process has time for the others it plays.
+                    await asyncio.sleep(0.0)
+
+
+async def crawl(url: str) -> None:
+    """Ask for all there is and read nothing."""
+    async with websocket(url, "/api/v1/socket?name=Slow", max_queue=1) as socket:
+        await socket.send('{"do":"watch","hz":100}')
+        await asyncio.sleep(math.inf)
+
+
+async def poison(url: str) -> None:
+    """Send viser what no page can have sent."""
+    while True:
+        with suppress(ConnectionClosed, OSError):
+            path = f"/viser?page={page_name()}"
+            async with websocket(url, path, enter(url), subprotocols=[SUBPROTOCOL]) as socket:
+                peer = Peer(socket)
+                await peer.learn()
+                for label in peer.controls:
+                    for value in (float("nan"), None, "x" * 500, [1.0] * 9):
+                        await peer.set(label, value=value, disabled=True)
+
+
+async def stop_times(arm: AsyncClient, times: int) -> list[float]:
+    """[s] from saying STOP until a state tells that the arm brakes, each time."""
+    found: list[float] = []
+    states = arm.states(100.0)
+    for _ in range(times):
+        await arm.ask(requests.Reset())
+        await asyncio.sleep(0.4)
+        said = time.perf_counter()
+        await arm.tell(requests.Stop())
+        async for state in states:
+            if state.status == "halted":
+                found.append(time.perf_counter() - said)
+                break
+    await arm.ask(requests.Reset())
+    return found
+
+
+async def turn(
+    url: str, name: str, others: list[Callable[[], Awaitable[None]]], stops: int
+) -> None:
+    """One turn: print how late the ticks came, and how long a STOP took."""
+    async with AsyncExitStack() as stack:
+        group = await stack.enter_async_context(asyncio.TaskGroup())
+        tasks = [group.create_task(_alone(other())) for other in others]
+        arm = await stack.enter_async_context(aconnect(url, "Swing"))
+        swinging = group.create_task(_alone(swing(arm)))
+        await asyncio.sleep(2.0)
+        took = await stop_times(arm, stops)
+        period = (await arm.look(answers.Loop)).period
+        await asyncio.sleep(LOOKED_AT * period)
+        loop = await arm.look(answers.Loop)
+        for task in (*tasks, swinging):
+            task.cancel()
+    p50, p99 = np.percentile(took, (50, 99))
+    print(
+        f"{name:34} ticks late p50 {1e3 * loop.late_p50:5.2f} p99 {1e3 * loop.late_p99:5.2f} most "
+        f"{1e3 * loop.late_most:6.2f} ms   STOP p50 {1e3 * p50:5.1f} p99 {1e3 * p99:5.1f} ms",
+        flush=True,
+    )
+
+
+async def _alone(work: Awaitable[None]) -> None:
+    with suppress(ConnectionClosed):
+        await work
+
+
+async def crowd(url: str, stops: int) -> None:
+    """All turns."""
+    pictures = [0]
+    watchers = [lambda: watch(url, pictures)] * WATCHERS
+    await turn(url, "nobody else", [], stops)
+    before = time.monotonic()
+    await turn(url, f"{WATCHERS} watchers", [*watchers], stops)
+    rate = pictures[0] / WATCHERS / (time.monotonic() - before)
+    print(f"{'':34} {rate:.1f} pictures a second to each watcher")
+    await turn(url, f"{FLOODS} who flood", [lambda: flood(url)] * FLOODS, stops)
+    await turn(url, f"{SLOW} who read nothing", [lambda: crawl(url)] * SLOW, stops)
+    await turn(url, f"{HOSTILE} hostile", [lambda: poison(url)] * HOSTILE, stops)
+
+
+def main() -> None:
+    """Start a server, load it, print."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
+    parser.add_argument("--stops", type=int, default=25, help="of each turn (default: 25)")
+    parser.add_argument("--url", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.url is not None:
+        asyncio.run(crowd(options.url, options.stops))
+        return
+    with AppServer(ATTENTIVE_APP) as server:
+        root = Path(__file__).resolve().parents[1]
+        # Clients in a process of their own, so that they do not slow the server's threads.
+        command = [sys.executable, "-m", "benchmarks.load", "--url", server.url]
+        subprocess.run([*command, "--stops", str(options.stops)], cwd=root, check=True)
+
+
+if __name__ == "__main__":
+    main()

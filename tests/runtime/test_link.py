@@ -1,0 +1,144 @@
+"""Two ends of a pipe: the arm's, with a real control loop, and the front's."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import socket
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.arm import Arm
+from app.control.session import Session
+from app.drivers.simulated import SimulatedDriver
+from app.errors import InputError
+from app.runtime.clock import MonotonicClock
+from app.runtime.link import ArmEnd, FrontEnd
+from app.runtime.loop import ControlLoop
+from app.runtime.mailbox import Mailbox
+
+SILENCE = 0.3
+
+
+class Ends:
+    """Both, and the loop behind them."""
+
+    def __init__(self, arm: Arm, session: Session) -> None:
+        self.session = session
+        self.mailbox = Mailbox(session.check)
+        driver = SimulatedDriver(arm, session.ready, 0.0)
+        self.loop = ControlLoop(session, driver, self.mailbox, MonotonicClock(), 100.0)
+        self.loop.start()
+        self.arm_end, self.front = self.connect()
+
+    def connect(self) -> tuple[ArmEnd, FrontEnd]:
+        """A pipe between the loop and a new front."""
+        ours, theirs = multiprocessing.Pipe()
+        self.theirs = theirs
+        arm_end = ArmEnd(ours, self.loop, self.mailbox, SILENCE)
+        arm_end.start()
+        front = FrontEnd(theirs, self.session.check)
+        front.start()
+        return arm_end, front
+
+
+@pytest.fixture
+def ends(arm: Arm, session: Session) -> Iterator[Ends]:
+    ends = Ends(arm, session)
+    yield ends
+    ends.arm_end.close()
+    ends.loop.stop()
+
+
+def until(true: Callable[[], bool], seconds: float = 5.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_a_command_goes_over_and_its_ticket_comes_back(ends: Ends) -> None:
+    tickets = [ends.front.put(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
+    assert tickets == [1, 2, 3]
+    assert ends.front.last_ticket == 3
+    until(lambda: ends.front.board.snapshot.ticket == 3)
+    alive(ends, lambda: not ends.front.board.snapshot.state.moving)
+    state = ends.front.board.snapshot.state
+    assert (state.q[0], state.q[4]) == (0.1, 0.1)
+    np.testing.assert_array_equal(state.q, ends.loop.board.snapshot.state.q)
+
+
+def alive(ends: Ends, true: Callable[[], bool]) -> None:
+    """Wait, and give signs of life meanwhile."""
+
+    def beaten() -> bool:
+        ends.front.beat()
+        return true()
+
+    until(beaten)
+
+
+def test_what_cannot_be_asked_does_not_go_over(ends: Ends) -> None:
+    with pytest.raises(InputError, match="no axis 9"):
+        ends.front.put(cmd.SetJoint(8, 0.1))
+    assert ends.front.last_ticket == 0
+
+
+def test_more_than_can_be_taken_is_still_answered_for(ends: Ends) -> None:
+    for _ in range(3000):
+        ends.front.put(cmd.Home())
+    until(lambda: ends.front.board.snapshot.ticket == 3000)
+
+
+def test_the_ledger_comes_over_entry_by_entry(ends: Ends) -> None:
+    ends.front.put(cmd.SetJoint(0, 99.0))
+    until(lambda: bool(ends.front.board.ledger))
+    ends.front.put(cmd.SetJoint(0, 0.0))
+    until(lambda: len(ends.front.board.ledger) == len(ends.loop.board.ledger) == 2)
+    told = [(e.t, e.finding, e.began) for e in ends.front.board.ledger]
+    assert told == [(e.t, e.finding, e.began) for e in ends.loop.board.ledger]
+    # A front that comes later knows it too.
+    ends.arm_end.close()
+    ends.arm_end, late = ends.connect()
+    assert [e.t for e in late.board.ledger] == [e.t for e in ends.loop.board.ledger]
+
+
+def test_a_front_that_falls_silent_stops_an_arm_that_moves(ends: Ends) -> None:
+    time.sleep(2 * SILENCE)
+    assert ends.loop.board.snapshot.state.halted is None
+    ends.front.put(cmd.SetJoint(0, 2.0))
+    began = time.monotonic()
+    until(lambda: ends.loop.board.snapshot.state.halted is not None)
+    assert SILENCE < time.monotonic() - began < 2 * SILENCE
+    until(lambda: not ends.loop.board.snapshot.state.moving)
+
+
+def test_a_pipe_that_breaks_stops_the_arm_and_the_next_front_moves_nothing(ends: Ends) -> None:
+    ends.front.put(cmd.SetJoint(0, 2.0))
+    alive(ends, lambda: ends.front.board.snapshot.state.moving)
+    with socket.socket(fileno=os.dup(ends.theirs.fileno())) as line:
+        line.shutdown(socket.SHUT_RDWR)
+    until(ends.arm_end.cut.is_set, 2.0)
+    until(lambda: ends.loop.board.snapshot.state.halted is not None)
+    ends.arm_end, again = ends.connect()
+    assert again.board.snapshot.state.halted is not None
+    until(lambda: not again.board.snapshot.state.moving)
+    again.put(cmd.Release())
+    until(lambda: again.board.snapshot.state.halted is None)
+    q = again.board.snapshot.state.q
+    time.sleep(0.2)
+    np.testing.assert_array_equal(again.board.snapshot.state.q, q)
+
+
+def test_an_arm_that_hangs_up_is_heard_by_its_front(ends: Ends) -> None:
+    ends.arm_end.close()
+    assert ends.front.cut.wait(2.0)
+
+
+def test_how_late_the_ticks_are_is_told_now_and_then(ends: Ends) -> None:
+    until(lambda: ends.front.board.lateness.count > 50)
+    assert ends.front.board.lateness.period == 0.01
