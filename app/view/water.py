@@ -1,0 +1,127 @@
+"""Water in the scene: in the cup, in the air, in the basin, on the table."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from app.geometry import so3
+from app.geometry.arrays import FloatArray
+from app.view.scene import Colour
+from app.water.around import Around
+from app.water.flow import Flow, Water
+from app.water.parcel import landing
+from app.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
+from app.water.units import FEMTOLITRE, MILLILITRE
+
+COLOUR: Colour = (96, 168, 208)
+IN_VESSEL, IN_AIR, ON_TABLE = 0.62, 0.5, 0.4
+"""How much of what is behind it water hides."""
+
+WORTH_SHOWING = MILLILITRE // 20
+"""[fl] A drop."""
+
+WORTH_SENDING = 2e-5
+"""[m] A twentieth of what a pixel is at arm's length."""
+
+CLEAR = 3e-4
+"""[m] That water is drawn off floor and wall, so that they do not flicker in each other."""
+
+FLAT = 5e-3
+"""[m] A puddle of a smaller radius is a drop, and as much lower."""
+
+
+class WaterNodes:
+    """Sends what changed enough to be seen, and nothing of water at rest."""
+
+    def __init__(self, server: viser.ViserServer, around: Around) -> None:
+        self._server = server
+        self._around = around
+        self._flow = Flow(around)
+        self._shown: Water | None = None
+        self._body: FloatArray | None = None
+        inside = around.cup.inside
+        self._inset = np.array((1.0 - CLEAR / inside.radius, 1.0 - CLEAR / inside.radius, 1.0))
+        self._root = server.scene.add_frame("/water", show_axes=False, visible=False)
+        surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
+        self._cup = self._add("cup", body(inside, surface), BODY_FACES, IN_VESSEL)
+        corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
+        self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
+        self._basin = self._add("basin", *disc(), IN_VESSEL)
+        # Made when they are first needed: a good run spills nothing.
+        self._puddles: list[viser.MeshHandle] = []
+
+    def show(self, water: Water) -> None:
+        """Draw ``water``."""
+        if water is not self._shown:
+            self._shown = water
+            self._show_cup(water)
+            self._show_stream(water)
+            self._show_basin(water)
+            self._show_puddles(water)
+        _reveal(self._root, True)
+
+    def hide(self) -> None:
+        """Draw none."""
+        _reveal(self._root, False)
+
+    def _show_cup(self, water: Water) -> None:
+        cup, T = self._around.cup, water.T_base_cup
+        _reveal(self._cup, water.cup >= WORTH_SHOWING)
+        if not self._cup.visible:
+            return
+        self._cup.wxyz = so3.to_quaternion(T[:3, :3])
+        self._cup.position = T[:3, 3] + T[:3, 2] * cup.floor
+        corners = body(cup.inside, self._flow.surface(water)) * self._inset
+        if self._body is None or np.abs(corners - self._body).max() > WORTH_SENDING:
+            self._body = corners
+            self._cup.vertices = corners.astype(np.float32)
+
+    def _show_stream(self, water: Water) -> None:
+        _reveal(self._stream, bool(water.parcels))
+        if water.parcels:
+            level = self._around.basin.level(water.basin * FEMTOLITRE)
+            end = landing(water.parcels[0], self._around, level).age
+            corners = stream(water.parcels, self._around.cup.inside.radius, end)
+            self._stream.vertices = corners.astype(np.float32)
+
+    def _show_basin(self, water: Water) -> None:
+        basin = self._around.basin
+        _reveal(self._basin, water.basin >= WORTH_SHOWING)
+        if self._basin.visible:
+            level = basin.level(water.basin * FEMTOLITRE)
+            x, y, z = basin.at
+            self._basin.position = (x, y, z + basin.floor + max(level, CLEAR))
+            self._basin.scale = (basin.radius(level), basin.radius(level), 1.0)
+
+    def _show_puddles(self, water: Water) -> None:
+        for number in range(len(self._puddles), len(water.puddles)):
+            puddle = self._add(f"puddle{number}", *blob(), ON_TABLE)
+            # The same shape, but nobody need see that.
+            puddle.wxyz = so3.to_quaternion(so3.exp((0.0, 0.0, 2.4 * number)))
+            self._puddles.append(puddle)
+        for number, node in enumerate(self._puddles):
+            shown = number < len(water.puddles)
+            _reveal(node, shown)
+            if shown:
+                at, radius = water.puddles[number].at, water.puddles[number].radius
+                node.position = at
+                node.scale = (radius, radius, min(radius / FLAT, 1.0))
+
+    def _add(
+        self, name: str, corners: FloatArray, faces: Faces, opacity: float
+    ) -> viser.MeshHandle:
+        return self._server.scene.add_mesh_simple(
+            f"/water/{name}",
+            corners,
+            faces,
+            color=COLOUR,
+            opacity=opacity,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+
+def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:
+    if node.visible != visible:
+        node.visible = visible
