@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import trimesh
 import viser
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
@@ -14,15 +19,21 @@ from app.water.parcel import landing
 from app.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
 from app.water.units import FEMTOLITRE, MILLILITRE
 
-COLOUR: Colour = (96, 168, 208)
-IN_VESSEL, IN_AIR, ON_TABLE = 0.62, 0.5, 0.4
+COLOUR: Colour = (74, 148, 192)
+LIGHT: Colour = (18, 75, 134)
+"""The same of light, not of sRGB: so glTF takes it."""
+
+IN_VESSEL, IN_AIR, ON_TABLE = 0.58, 0.5, 0.3
 """How much of what is behind it water hides."""
+
+ROUGH = 0.08
+"""Of the faces that mirror."""
 
 WORTH_SHOWING = MILLILITRE // 20
 """[fl] A drop."""
 
-WORTH_SENDING = 2e-5
-"""[m] A twentieth of what a pixel is at arm's length."""
+WORTH_SENDING = 1e-4
+"""[m] A pixel is eight times as wide, 1 m away in a window of 900."""
 
 CLEAR = 3e-4
 """[m] That water is drawn off floor and wall, so that they do not flicker in each other."""
@@ -47,9 +58,9 @@ class WaterNodes:
         self._cup = self._add("cup", body(inside, surface), BODY_FACES, IN_VESSEL)
         corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
         self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
-        self._basin = self._add("basin", *disc(), IN_VESSEL)
+        self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
         # Made when they are first needed: a good run spills nothing.
-        self._puddles: list[viser.MeshHandle] = []
+        self._puddles: list[viser.GlbHandle] = []
 
     def show(self, water: Water) -> None:
         """Draw ``water``."""
@@ -96,7 +107,7 @@ class WaterNodes:
 
     def _show_puddles(self, water: Water) -> None:
         for number in range(len(self._puddles), len(water.puddles)):
-            puddle = self._add(f"puddle{number}", *blob(), ON_TABLE)
+            puddle = self._add_glossy(f"puddle{number}", *blob(), ON_TABLE)
             # The same shape, but nobody need see that.
             puddle.wxyz = so3.to_quaternion(so3.exp((0.0, 0.0, 2.4 * number)))
             self._puddles.append(puddle)
@@ -107,6 +118,17 @@ class WaterNodes:
                 at, radius = water.puddles[number].at, water.puddles[number].radius
                 node.position = at
                 node.scale = (radius, radius, min(radius / FLAT, 1.0))
+
+    def _add_glossy(
+        self, name: str, corners: FloatArray, faces: Faces, opacity: float
+    ) -> viser.GlbHandle:
+        """Water whose shape only grows: so it can mirror the room, as no mesh of viser's does."""
+        return self._server.scene.add_glb(
+            f"/water/{name}",
+            _glossy(corners, faces, opacity),
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
     def _add(
         self, name: str, corners: FloatArray, faces: Faces, opacity: float
@@ -125,3 +147,19 @@ class WaterNodes:
 def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:
     if node.visible != visible:
         node.visible = visible
+
+
+def _glossy(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
+    """A GLB file of a shape that mirrors and lets through the rest of the light."""
+    # trimesh says nothing of the types of these.
+    pbr: Any = PBRMaterial
+    textured: Any = TextureVisuals
+    material = pbr(
+        baseColorFactor=[*LIGHT, round(255 * opacity)],
+        metallicFactor=0.0,
+        roughnessFactor=ROUGH,
+        alphaMode="BLEND",
+    )
+    mesh = trimesh.Trimesh(corners, faces, process=False, visual=textured(material=material))
+    glb: Any = mesh.export(file_type="glb", include_normals=True)
+    return bytes(glb)

@@ -166,10 +166,12 @@ class Flow:
             return water
         cup, basin, puddles = water.cup, water.basin, water.puddles
         level = self.around.basin.level(basin * FEMTOLITRE)
+        before, after = water.T_base_cup.tolist(), T.tolist()
+        catches = after[2][2] > 0.0
         flying = []
         for parcel in water.parcels:
             room = self._cup_holds - cup
-            if parcel.volume <= room and self._caught(parcel, water.T_base_cup, T, dt):
+            if catches and parcel.volume <= room and self._caught(parcel, before, after, dt):
                 cup += parcel.volume
                 continue
             aged = parcel._replace(age=parcel.age + dt)
@@ -185,14 +187,14 @@ class Flow:
                 puddles = spill(puddles, end.point, parcel.volume)
         return replace(water, cup=cup, basin=basin, parcels=tuple(flying), puddles=puddles)
 
-    def _caught(self, parcel: Parcel, before: FloatArray, after: FloatArray, dt: float) -> bool:
+    def _caught(self, parcel: Parcel, before: se3.Rows, after: se3.Rows, dt: float) -> bool:
         """Whether it comes into the cup through its mouth in the next ``dt`` [s]."""
-        if float(after[2, 2]) <= 0.0:
-            return False
         mouth = self.around.cup.floor + self.around.cup.inside.depth
-        p = _seen_from(before, parcel.at(parcel.age))
         q = _seen_from(after, parcel.at(parcel.age + dt))
-        if not p[2] > mouth >= q[2]:
+        if q[2] > mouth:
+            return False
+        p = _seen_from(before, parcel.at(parcel.age))
+        if p[2] <= mouth:
             return False
         share = (p[2] - mouth) / (p[2] - q[2])
         x, y, _ = add(p, scale(share, sub(q, p)))
@@ -255,5 +257,8 @@ def _moved(T: FloatArray, point: Vector) -> Vector:
     return vector(T[:3, :3] @ point + T[:3, 3])
 
 
-def _seen_from(T: FloatArray, point: Vector) -> Vector:
-    return vector((np.asarray(point) - T[:3, 3]) @ T[:3, :3])
+def _seen_from(T: se3.Rows, point: Vector) -> Vector:
+    """``point`` in the frame of T, on plain floats because every parcel is asked."""
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = T
+    u, v, w = point[0] - x, point[1] - y, point[2] - z
+    return a * u + d * v + g * w, b * u + e * v + h * w, c * u + f * v + i * w

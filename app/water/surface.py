@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.water.cylinder import Cylinder
 from app.water.flow import Surface
@@ -29,7 +30,7 @@ SECTIONS, SIDES = 26, 8
 THICKEST = 0.3
 """[cup radius] The stream at the lip: there it is slow, and a sheet rather than a jet."""
 
-SHEET, GATHERED = 1.6, 0.03
+SHEET, GATHERED = 0.9, 0.03
 """How much wider than a jet the sheet is at the lip, less 1; and on what way [m] it gathers."""
 
 SPOKES = 40
@@ -51,27 +52,31 @@ def body(cylinder: Cylinder, surface: Surface) -> FloatArray:
     """
     low, high = sorted(cylinder.arcs(surface.tilt, surface.level))
     first = min(max(round(RUNGS * low / high), 1), RUNGS - 1) if high > 0.0 else 1
-    half = np.concatenate(
-        (np.linspace(0.0, low, first, endpoint=False), np.linspace(low, high, RUNGS + 1 - first))
-    )
-    psi = np.concatenate((-half[:0:-1], half))
+    psi = (low / first) * np.minimum(_STEPS, first)
+    psi += ((high - low) / (RUNGS - first)) * np.maximum(_STEPS - first, 0)
+    near, aside = cylinder.radius * np.cos(psi), cylinder.radius * np.sin(psi)
     cosine = math.cos(surface.tilt)
     cosine = math.copysign(max(abs(cosine), ROUND), cosine)
-    rise = surface.level + cylinder.radius * math.sin(surface.tilt) * np.cos(psi)
-    cut = np.clip(rise / cosine, 0.0, cylinder.depth)
-    # Wet from floor to rim; told by number, because with the plane along the axis all the other
-    # columns stand where the last of these does, and are nothing.
-    whole = (np.abs(np.arange(len(psi)) - RUNGS) <= first) & (low > 0.0)
-    if cosine > 0.0:
-        bottom, top = np.zeros_like(cut), np.where(whole, cylinder.depth, cut)
-    else:
-        bottom, top = np.where(whole, 0.0, cut), np.full_like(cut, cylinder.depth)
+    cut = (surface.level + math.sin(surface.tilt) * near) / cosine
+    cut = np.minimum(np.maximum(cut, 0.0), cylinder.depth)
+    if low > 0.0:
+        # Wet from floor to rim; told by number, because with the plane along the axis all the other
+        # columns stand where the last of these does, and are nothing.
+        cut[: first + 1] = cylinder.depth if cosine > 0.0 else 0.0
     x, y, _ = surface.downhill
-    out = cylinder.radius * np.stack(
-        (np.cos(psi) * x - np.sin(psi) * y, np.cos(psi) * y + np.sin(psi) * x), axis=1
-    )
-    lower, upper = np.column_stack((out, bottom)), np.column_stack((out, top))
-    return np.concatenate((lower, upper, lower, upper))
+    # Wall, and once more for the faces: bottom and top of each.
+    corners = np.empty((2, 2, 2 * RUNGS + 1, 3))
+    for side, columns in ((-aside[::-1], slice(0, RUNGS + 1)), (aside, slice(RUNGS, None))):
+        ahead = near if columns.start else near[::-1]
+        height = cut if columns.start else cut[::-1]
+        corners[:, :, columns, 0] = ahead * x - side * y
+        corners[:, :, columns, 1] = ahead * y + side * x
+        corners[:, 0, columns, 2] = 0.0 if cosine > 0.0 else height
+        corners[:, 1, columns, 2] = height if cosine > 0.0 else cylinder.depth
+    return corners.reshape(-1, 3)
+
+
+_STEPS = np.arange(RUNGS + 1)
 
 
 def _ladder() -> Faces:
@@ -93,42 +98,43 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     at its ends, and drawn to a thread where nothing flies. radius: of the cup. end: the age [s] at
     which the oldest parcel comes down.
     """
-    newest = parcels[::-1]
-    ages = np.array([parcel.age for parcel in newest])
-    spans = np.array([parcel.span for parcel in newest])
-    volumes = np.array([parcel.volume for parcel in newest]) * FEMTOLITRE
-    starts = np.array([parcel.start for parcel in newest])
-    velocities = np.array([parcel.velocity for parcel in newest])
-    last = min(float(ages[-1] + spans[-1]), end)
-    age = np.linspace(ages[0], max(last, float(ages[-1])), SECTIONS - 2)
-    age = np.concatenate((age[:1], age, age[-1:]))
-    p = np.stack([np.interp(age, ages, starts[:, k]) for k in range(3)], axis=1)
-    v = np.stack([np.interp(age, ages, velocities[:, k]) for k in range(3)], axis=1)
-    p += v * age[:, None]
-    p[:, 2] -= 0.5 * GRAVITY * age**2
-    v[:, 2] -= GRAVITY * age
-
-    speed = np.maximum(np.linalg.norm(v, axis=1), SLOWEST)
-    jet = np.sqrt(np.interp(age, ages, volumes / spans) / (math.pi * speed))
-    jet = np.minimum(jet, THICKEST * radius)
+    left = np.array(
+        [(p.age, p.span, p.volume * FEMTOLITRE / p.span, *p.start, *p.velocity) for p in parcels]
+    )[::-1]
+    ages = left[:, 0]
+    last = max(min(float(ages[-1] + left[-1, 1]), end), float(ages[-1]))
+    age = ages[0] + (last - ages[0]) * _SPOTS
     behind = np.maximum(np.searchsorted(ages, age, side="right") - 1, 0)
-    jet[age > ages[behind] + spans[behind] + MOMENT] = 0.0
+    before = np.minimum(behind + 1, len(ages) - 1)
+    between = np.maximum(ages[before] - ages[behind], MOMENT)
+    share = np.minimum((age - ages[behind]) / between, 1.0)
+    here = left[behind] + share[:, None] * (left[before] - left[behind])
+    p, v, fall = here[:, 3:6], here[:, 6:9], GRAVITY * age
+    p += v * age[:, None]
+    p[:, 2] -= 0.5 * fall * age
+    v[:, 2] -= fall
+
+    speed = np.maximum(np.sqrt((v * v).sum(axis=1)), SLOWEST)
+    jet = np.minimum(np.sqrt(here[:, 2] / (math.pi * speed)), THICKEST * radius)
+    jet[age > ages[behind] + left[behind, 1] + MOMENT] = 0.0
     jet[0] = jet[-1] = 0.0
 
-    level = v[:, :2].sum(axis=0)
+    level = v[:, :2].sum(axis=0).tolist()
     long = math.hypot(*level)
-    across = np.array((-level[1], level[0], 0.0)) / long if long > 0.0 else np.array((1.0, 0, 0))
+    across = (-level[1] / long, level[0] / long, 0.0) if long > 0.0 else (1.0, 0.0, 0.0)
     along = v / speed[:, None]
-    thick = np.cross(across, along)
-    fallen = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))))
-    wide = jet * (1.0 + SHEET * np.exp(-fallen / GATHERED))
+    under = along @ so3.hat(across).T
+    way = p[1:] - p[:-1]
+    fallen = np.zeros(SECTIONS)
+    np.cumsum(np.sqrt((way * way).sum(axis=1)), out=fallen[1:])
+    near = np.exp(-fallen / GATHERED)
+    wide = jet * (1.0 + SHEET * near)
     thin = np.divide(jet * jet, wide, out=np.zeros_like(jet), where=wide > 0.0)
-    turn = np.arange(SIDES) * (math.tau / SIDES)
-    corners = (
-        p[:, None]
-        + (wide[:, None] * np.cos(turn))[..., None] * across
-        + (thin[:, None] * np.sin(turn))[..., None] * thick[:, None]
-    )
+    aside = wide[:, None] * _ROUND_COS
+    # At the lip the sheet lies on the rim, and is as hollow.
+    lift = near[:, None] * (aside**2 / (2.0 * radius) + thin[:, None])
+    down = thin[:, None] * _ROUND_SIN - lift
+    corners = p[:, None] + aside[..., None] * np.array(across) + down[..., None] * under[:, None]
     return np.asarray(corners.reshape(-1, 3))
 
 
@@ -137,6 +143,13 @@ SLOWEST = 0.02
 
 MOMENT = 1e-6
 """[s] Rounding of ages."""
+
+
+_SPOTS = np.clip(np.arange(-1, SECTIONS - 1) / (SECTIONS - 3.0), 0.0, 1.0)
+"""Along the stream, of its length in time; both ends twice, to be closed."""
+
+_TURN = np.arange(SIDES) * (math.tau / SIDES)
+_ROUND_COS, _ROUND_SIN = np.cos(_TURN), np.sin(_TURN)
 
 
 def _tube() -> Faces:
