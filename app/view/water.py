@@ -36,7 +36,10 @@ WORTH_SENDING = 1e-4
 """[m] A pixel is eight times as wide, 1 m away in a window of 900."""
 
 CLEAR = 3e-4
-"""[m] That water is drawn off floor and wall, so that they do not flicker in each other."""
+"""[m] That water is drawn off the basin's floor, so that they do not flicker in each other."""
+
+INSET = (0.99, 0.99, 1.0)
+"""The same of the cup's wall, which is drawn with corners."""
 
 FLAT = 5e-3
 """[m] A puddle of a smaller radius is a drop, and as much lower."""
@@ -51,22 +54,25 @@ class WaterNodes:
         self._flow = Flow(around)
         self._shown: Water | None = None
         self._body: FloatArray | None = None
+        self._level = 0.0
         inside = around.cup.inside
-        self._inset = np.array((1.0 - CLEAR / inside.radius, 1.0 - CLEAR / inside.radius, 1.0))
         self._root = server.scene.add_frame("/water", show_axes=False, visible=False)
         surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
         self._cup = self._add("cup", body(inside, surface), BODY_FACES, IN_VESSEL)
         corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
         self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
         self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
+        x, y, z = around.basin.at
+        self._basin.position = (x, y, z + around.basin.floor)
         # Made when they are first needed: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
 
     def show(self, water: Water) -> None:
         """Draw ``water``."""
-        if water is not self._shown:
-            self._shown = water
-            self._show_cup(water)
+        last, self._shown = self._shown, water
+        if water is not last:
+            if last is None or not _same_in_cup(water, last):
+                self._show_cup(water)
             self._show_stream(water)
             self._show_basin(water)
             self._show_puddles(water)
@@ -81,9 +87,9 @@ class WaterNodes:
         _reveal(self._cup, water.cup >= WORTH_SHOWING)
         if not self._cup.visible:
             return
-        self._cup.wxyz = so3.to_quaternion(T[:3, :3])
-        self._cup.position = T[:3, 3] + T[:3, 2] * cup.floor
-        corners = body(cup.inside, self._flow.surface(water)) * self._inset
+        # In the base frame: then a cup that moves is one message, where its pose would be two more.
+        local = body(cup.inside, self._flow.surface(water)) * INSET
+        corners = local @ T[:3, :3].T + (T[:3, 3] + cup.floor * T[:3, 2])
         if self._body is None or np.abs(corners - self._body).max() > WORTH_SENDING:
             self._body = corners
             self._cup.vertices = corners.astype(np.float32)
@@ -99,11 +105,11 @@ class WaterNodes:
     def _show_basin(self, water: Water) -> None:
         basin = self._around.basin
         _reveal(self._basin, water.basin >= WORTH_SHOWING)
-        if self._basin.visible:
-            level = basin.level(water.basin * FEMTOLITRE)
-            x, y, z = basin.at
-            self._basin.position = (x, y, z + basin.floor + max(level, CLEAR))
-            self._basin.scale = (basin.radius(level), basin.radius(level), 1.0)
+        level = max(basin.level(water.basin * FEMTOLITRE), CLEAR)
+        if self._basin.visible and abs(level - self._level) > WORTH_SENDING:
+            self._level = level
+            radius = basin.radius(level)
+            self._basin.scale = (radius, radius, level)
 
     def _show_puddles(self, water: Water) -> None:
         for number in range(len(self._puddles), len(water.puddles)):
@@ -142,6 +148,11 @@ class WaterNodes:
             cast_shadow=False,
             receive_shadow=False,
         )
+
+
+def _same_in_cup(a: Water, b: Water) -> bool:
+    same = a.cup == b.cup and a.slosh == b.slosh
+    return same and bool((a.T_base_cup == b.T_base_cup).all())
 
 
 def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:

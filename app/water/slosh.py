@@ -27,8 +27,8 @@ SHALLOWEST = 0.25
 """[radius] The depth below which the frequency falls no more: so little water lies in a corner of a
 tilted cup and is no longer a layer on its floor."""
 
-STILL = 1e-6
-"""[1] A surface that leans by less than this is at rest: 30 nm at the wall of the cup."""
+STILL = 1e-4
+"""[1] A surface that is off its rest by less than this is at rest: 3 um at the wall of a cup."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ Faces = npt.NDArray[np.uint32]
 RUNGS = 20
 """Steps from the lowest to the highest side of the water in a cup."""
 
-SECTIONS, SIDES = 26, 8
+SECTIONS, SIDES = 20, 8
 """Of the stream."""
 
 THICKEST = 0.3
@@ -163,12 +163,15 @@ def _tube() -> Faces:
 
 
 def disc() -> tuple[FloatArray, Faces]:
-    """Corners and faces of a level disc of radius 1 about z."""
+    """Corners and faces of a level disc of radius 1 about z, at z = 1.
+
+    So its scale alone says how wide it is and how high it stands.
+    """
     turn = np.arange(SPOKES) * (math.tau / SPOKES)
-    rim = np.stack((np.cos(turn), np.sin(turn), np.zeros(SPOKES)), axis=1)
+    rim = np.stack((np.cos(turn), np.sin(turn), np.ones(SPOKES)), axis=1)
     k = np.arange(SPOKES)
     fan = (np.zeros_like(k), 1 + k, 1 + (k + 1) % SPOKES)
-    return np.concatenate((np.zeros((1, 3)), rim)), _stacked([fan])
+    return np.concatenate(([[0.0, 0.0, 1.0]], rim)), _stacked([fan])
 
 
 def blob() -> tuple[FloatArray, Faces]:
