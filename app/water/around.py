@@ -38,6 +38,8 @@ class Basin:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise InputError(f"The basin's {name} is {value}; give metres above 0.")
+        if not all(map(math.isfinite, (*self.at, self.floor))):
+            raise InputError(f"The basin stands at {self.at}; give three finite numbers in metres.")
 
     @property
     def capacity(self) -> float:

@@ -52,6 +52,8 @@ def test_a_straight_basin_is_the_limit_of_leaning_ones(around: Around) -> None:
     assert nearly.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)
 
 
-def test_a_basin_without_size_is_refused(around: Around) -> None:
+def test_a_basin_without_size_or_place_is_refused(around: Around) -> None:
     with pytest.raises(InputError, match="depth"):
         replace(around.basin, depth=math.nan)
+    with pytest.raises(InputError, match="stands at"):
+        replace(around.basin, at=(0.2, math.inf, 0.0))
