@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.water.cylinder import Cylinder
 from app.water.flow import Surface
@@ -31,7 +30,7 @@ THICKEST = 0.3
 """[cup radius] The stream at the lip: there it is slow, and a sheet rather than a jet."""
 
 SHEET, GATHERED = 0.9, 0.03
-"""How much wider than a jet the sheet is at the lip, less 1; and on what way [m] it gathers."""
+"""How much wider than a jet the sheet is at the lip, less 1; and in how far [m] it gathers."""
 
 SPOKES = 40
 """Of a disc."""
@@ -121,20 +120,20 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
 
     level = v[:, :2].sum(axis=0).tolist()
     long = math.hypot(*level)
-    across = (-level[1] / long, level[0] / long, 0.0) if long > 0.0 else (1.0, 0.0, 0.0)
-    along = v / speed[:, None]
-    under = along @ so3.hat(across).T
-    way = p[1:] - p[:-1]
-    fallen = np.zeros(SECTIONS)
-    np.cumsum(np.sqrt((way * way).sum(axis=1)), out=fallen[1:])
-    near = np.exp(-fallen / GATHERED)
-    wide = jet * (1.0 + SHEET * near)
-    thin = np.divide(jet * jet, wide, out=np.zeros_like(jet), where=wide > 0.0)
+    across = np.array((-level[1], level[0], 0.0)) / long if long > 0.0 else _X
+    # Square to both, and across is level.
+    under = v[:, (2, 2, 1)] * (across[1], -across[0], across[0])
+    under[:, 2] -= across[1] * v[:, 0]
+    under /= speed[:, None]
+    away = p - p[0]
+    near = np.exp(-np.sqrt((away * away).sum(axis=1)) / GATHERED)
+    spread = 1.0 + SHEET * near
+    wide, thin = jet * spread, jet / spread
     aside = wide[:, None] * _ROUND_COS
     # At the lip the sheet lies on the rim, and is as hollow.
     lift = near[:, None] * (aside**2 / (2.0 * radius) + thin[:, None])
     down = thin[:, None] * _ROUND_SIN - lift
-    corners = p[:, None] + aside[..., None] * np.array(across) + down[..., None] * under[:, None]
+    corners = p[:, None] + aside[..., None] * across + down[..., None] * under[:, None]
     return np.asarray(corners.reshape(-1, 3))
 
 
@@ -148,6 +147,7 @@ MOMENT = 1e-6
 _SPOTS = np.clip(np.arange(-1, SECTIONS - 1) / (SECTIONS - 3.0), 0.0, 1.0)
 """Along the stream, of its length in time; both ends twice, to be closed."""
 
+_X = np.array((1.0, 0.0, 0.0))
 _TURN = np.arange(SIDES) * (math.tau / SIDES)
 _ROUND_COS, _ROUND_SIN = np.cos(_TURN), np.sin(_TURN)
 
