@@ -23,7 +23,7 @@ class Vessel:
     """Something to hold water, about its own axis z, on z = 0; all [m] and [kg].
 
     mesh: its GLB file. outer_radius: of its widest part. inner_radius: at the rim. floor: its
-    thickness.
+    thickness. floor_radius: of the inside over the floor.
     """
 
     mesh: Path
@@ -32,6 +32,7 @@ class Vessel:
     outer_radius: float
     height: float
     floor: float
+    floor_radius: float
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,10 @@ def load_props(path: Path = PROPS_PATH) -> Props:
 
 
 def _vessel(path: Path, described: Any) -> Vessel:
-    vessel = Vessel(
-        _mesh(path, described),
-        *(
-            _length(described, key)
-            for key in ("mass", "inner_radius", "outer_radius", "height", "floor")
-        ),
-    )
+    # A vessel that names none has a straight inside.
+    floor_radius = "floor_radius" if "floor_radius" in described else "inner_radius"
+    lengths = ("mass", "inner_radius", "outer_radius", "height", "floor", floor_radius)
+    vessel = Vessel(_mesh(path, described), *(_length(described, key) for key in lengths))
     if not (vessel.inner_radius < vessel.outer_radius and vessel.floor < vessel.height):
         raise ValueError(f"the walls of {vessel.mesh.name} have no thickness")
     return vessel

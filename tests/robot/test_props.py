@@ -35,12 +35,19 @@ def test_the_meshes_have_the_numbers_of_the_file() -> None:
     assert (low[2], high[2]) == pytest.approx((-props.table.thickness, 0.0), abs=1e-3)
 
 
+def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:
+    props = load_props()
+    assert props.cup.floor_radius == props.cup.inner_radius
+    assert props.basin.floor_radius == 0.084 < props.basin.inner_radius
+
+
 @pytest.mark.parametrize(
     ("prop", "change", "said"),
     [
         ("cup", {"height": -1.0}, "'height' is -1.0"),
         ("cup", {"outer_radius": 0.01}, "no thickness"),
         ("basin", {"mass": float("nan")}, "'mass' is nan"),
+        ("basin", {"floor_radius": 0.0}, "'floor_radius' is 0.0"),
         ("basin", {"floor": "thick"}, "could not convert"),
         ("table", {"x": [1.0, 0.0]}, "no span"),
         ("table", {"mesh": "chair.glb"}, "no mesh"),

@@ -1,0 +1,18 @@
+"""Constants of water under gravity, and the unit its volumes are counted in."""
+
+from __future__ import annotations
+
+GRAVITY = 9.81
+"""[m/s^2]"""
+
+FEMTOLITRE = 1e-18
+"""[m^3] Volumes are moved in whole ones, so that none is made or lost by rounding: a basin holds
+2e15 of them, which a float still tells apart."""
+
+MILLILITRE = 1_000_000_000_000
+"""[fl]"""
+
+
+def counted(volume: float) -> int:
+    """The whole femtolitres in ``volume`` [m^3]."""
+    return int(volume / FEMTOLITRE)

@@ -1,0 +1,20 @@
+"""The cup, the basin and the table of the experiment."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.robot.props import load_props
+from app.robot.water import around_of
+from app.water.around import Around
+from app.water.flow import Flow
+
+
+@pytest.fixture(scope="session")
+def around() -> Around:
+    return around_of(load_props())
+
+
+@pytest.fixture(scope="session")
+def flow(around: Around) -> Flow:
+    return Flow(around)

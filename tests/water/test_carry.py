@@ -1,0 +1,67 @@
+"""A cup in the hand of the arm itself, swung half round and stopped on the way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app.control.commands import Command, SetJoint, Stop
+from app.control.session import Session
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.water.flow import Flow, Water
+
+DT = 0.01
+LEVEL = np.deg2rad((-50.0, -70.0, 100.0, -30.0, 0.0))
+"""[rad] The tool level, half a metre from axis 1."""
+
+
+def swung(model: RobotModel, stop_after: float) -> tuple[list[FloatArray], FloatArray]:
+    """Poses of an upright cup at the tool, and its accelerations (n, 3), from rest to rest."""
+    session = Session(model.arm, LEVEL)
+    state = session.begin(LEVEL, 0.0, 0.0)
+    poses = []
+    for k in range(300):
+        commands: list[Command] = [SetJoint(0, math.radians(50.0))] if k == 0 else []
+        if k == round(stop_after / DT):
+            commands = [Stop()]
+        state = session.step(state, commands, k * DT)
+        state = session.observe(state, state.setpoint, state.gripper)
+        tool = model.T_base_shoulder @ forward(model.arm.chain, state.setpoint)
+        turn = so3.exp((0.0, 0.0, float(state.setpoint[0])))
+        poses.append(se3.from_rotation_translation(turn, tool[:3, 3] - (0.0, 0.0, 0.05)))
+    at = np.array([T[:3, 3] for T in poses])
+    accelerations = np.zeros_like(at)
+    accelerations[1:-1] = (at[2:] - 2.0 * at[1:-1] + at[:-2]) / DT**2
+    return poses, accelerations
+
+
+def carried_by(
+    flow: Flow, volume: float, poses: list[FloatArray], accelerations: FloatArray
+) -> tuple[Water, float]:
+    """The water in the end, and the least margin [m] it had to the rim."""
+    water, least = flow.begin(volume, poses[0]), math.inf
+    for T, acceleration in zip(poses, accelerations, strict=True):
+        water = flow.step(water, T, acceleration, DT)
+        least = min(least, flow.margin_to_rim(water))
+    return water, least
+
+
+@pytest.mark.parametrize("stop_after", [9.0, 0.6], ids=["whole way", "stopped"])
+def test_at_full_speed_the_arm_keeps_the_water_off_the_rim(
+    model: RobotModel, flow: Flow, stop_after: float
+) -> None:
+    poses, accelerations = swung(model, stop_after)
+    travelled = np.linalg.norm(poses[-1][:3, 3] - poses[0][:3, 3])
+    assert travelled > (0.5 if stop_after > 3.0 else 0.1)
+    water, least = carried_by(flow, 2e-4, poses, accelerations)
+    assert least > 5e-3
+    assert water.cup == water.total
+    # With as much in it as leaves 6 mm, a stop spills.
+    if stop_after < 3.0:
+        fuller, least = carried_by(flow, 2.3e-4, poses, accelerations)
+        assert least < 0.0 < fuller.spilled

@@ -1,0 +1,171 @@
+"""The volume below a plane, against quadrature and against what must be true of any volume."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from app.errors import InputError
+from app.water.cylinder import Cylinder
+from tests.geometry.strategies import repeatable
+
+CUP = Cylinder(0.03, 0.087)
+
+tilts = st.one_of(
+    st.floats(0.0, math.pi),
+    st.sampled_from([0.0, 0.5 * math.pi, math.pi]),
+    st.floats(-14.0, -1.0).map(lambda e: 10.0**e),
+    st.floats(-14.0, -1.0).map(lambda e: 0.5 * math.pi - 10.0**e),
+    st.floats(-14.0, -1.0).map(lambda e: 0.5 * math.pi + 10.0**e),
+    st.floats(-14.0, -1.0).map(lambda e: math.pi - 10.0**e),
+)
+cylinders = st.builds(Cylinder, st.floats(0.005, 0.5), st.floats(0.005, 0.5))
+shares = st.one_of(st.floats(0.0, 1.0), st.floats(-9.0, 0.0).map(lambda e: 10.0**e))
+
+
+def level_at(cylinder: Cylinder, tilt: float, share: float) -> float:
+    low, high = cylinder.span(tilt)
+    return low + share * (high - low)
+
+
+def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
+    """The volume by columns parallel to the axis, each as far as it is wet."""
+    r = np.sqrt((np.arange(300) + 0.5) / 300.0) * cylinder.radius
+    turn = (np.arange(300) + 0.5) * (math.tau / 300.0)
+    below = level - math.sin(tilt) * np.outer(r, np.cos(turn))
+    end = below / math.cos(tilt)
+    if math.cos(tilt) > 0.0:
+        wet = np.clip(end, 0.0, cylinder.depth)
+    else:
+        wet = cylinder.depth - np.clip(end, 0.0, cylinder.depth)
+    return float(wet.mean()) * math.pi * cylinder.radius**2
+
+
+@repeatable
+@given(cylinders, st.floats(0.01, math.pi - 0.01), st.floats(0.0, 1.0))
+def test_as_much_as_its_columns_together(cylinder: Cylinder, tilt: float, share: float) -> None:
+    level = level_at(cylinder, tilt, share)
+    expected = summed_up(cylinder, tilt, level)
+    assert cylinder.volume(tilt, level) == pytest.approx(expected, abs=5e-4 * cylinder.capacity)
+
+
+def test_points_thrown_at_random_are_below_as_often() -> None:
+    rng = np.random.default_rng(5)
+    n = 200_000
+    r, turn = np.sqrt(rng.random(n)) * CUP.radius, rng.random(n) * math.tau
+    x, z = r * np.cos(turn), rng.random(n) * CUP.depth
+    for tilt in np.linspace(0.0, math.pi, 13):
+        for share in (0.1, 0.35, 0.6, 0.9):
+            level = level_at(CUP, tilt, share)
+            below = float((math.sin(tilt) * x + math.cos(tilt) * z <= level).mean())
+            assert CUP.volume(tilt, level) / CUP.capacity == pytest.approx(below, abs=5e-3)
+
+
+def test_known_volumes() -> None:
+    r, h = CUP.radius, CUP.depth
+    assert CUP.volume(0.0, 0.04) == pytest.approx(math.pi * r * r * 0.04, rel=1e-14)
+    assert CUP.volume(math.pi, -0.05) == pytest.approx(math.pi * r * r * (h - 0.05), rel=1e-14)
+    # Lying, and half full.
+    assert CUP.volume(0.5 * math.pi, 0.0) == pytest.approx(0.5 * CUP.capacity, rel=1e-14)
+    # The hoof of Archimedes: a plane through a diameter of the floor, 2/3 r^2 times its height.
+    for height in (0.01, 0.05, 0.087):
+        tilt = math.atan2(height, r)
+        assert CUP.volume(tilt, 0.0) == pytest.approx(2.0 / 3.0 * r * r * height, rel=1e-13)
+
+
+@repeatable
+@given(cylinders, tilts, shares)
+def test_both_sides_make_the_whole(cylinder: Cylinder, tilt: float, share: float) -> None:
+    level = level_at(cylinder, tilt, share)
+    # Seen from the other side the plane faces down.
+    rest = cylinder.volume(math.pi - tilt, -level)
+    up = cylinder.volume(tilt, level)
+    assert up + rest == pytest.approx(cylinder.capacity, rel=1e-12)
+    # And the mirror image in height: floor for rim.
+    mirrored = cylinder.volume(math.pi - tilt, level - cylinder.depth * math.cos(tilt))
+    assert mirrored == pytest.approx(up, rel=1e-9, abs=1e-13 * cylinder.capacity)
+
+
+@repeatable
+@given(cylinders, tilts, shares, shares)
+def test_a_higher_plane_has_more_below(c: Cylinder, tilt: float, a: float, b: float) -> None:
+    low, high = sorted((level_at(c, tilt, a), level_at(c, tilt, b)))
+    more = c.volume(tilt, high) - c.volume(tilt, low)
+    assert more >= -1e-14 * c.capacity
+    # It never grows faster than the largest cut of the cylinder lets it: there are no leaps.
+    widest = 2.0 * c.radius * math.hypot(2.0 * c.radius, c.depth)
+    assert more <= widest * (high - low) + 1e-13 * c.capacity
+
+
+@repeatable
+@given(cylinders, tilts, shares, st.floats(-1e-9, 1e-9))
+def test_a_hair_of_tilt_changes_a_hair(c: Cylinder, tilt: float, share: float, by: float) -> None:
+    assume(0.0 <= tilt + by <= math.pi)
+    level = level_at(c, tilt, share)
+    size = math.hypot(c.radius, c.depth)
+    change = abs(c.volume(tilt + by, level) - c.volume(tilt, level))
+    assert change <= 8.0 * size**3 * abs(by) + 1e-13 * c.capacity
+
+
+@repeatable
+@given(cylinders, tilts, shares)
+def test_the_level_of_a_volume_has_that_volume_below(
+    cylinder: Cylinder, tilt: float, share: float
+) -> None:
+    volume = share * cylinder.capacity
+    level = cylinder.level(tilt, volume)
+    assert cylinder.volume(tilt, level) == pytest.approx(volume, abs=4e-15 * cylinder.capacity)
+    low, high = cylinder.span(tilt)
+    assert low <= level <= high
+
+
+@repeatable
+@given(cylinders, st.floats(0.0, math.pi), st.floats(0.05, 0.95))
+def test_the_surface_is_what_the_volume_grows_by(
+    cylinder: Cylinder, tilt: float, share: float
+) -> None:
+    level = level_at(cylinder, tilt, share)
+    step = 1e-6 * (cylinder.span(tilt)[1] - cylinder.span(tilt)[0])
+    grown = cylinder.volume(tilt, level + step) - cylinder.volume(tilt, level - step)
+    scale = cylinder.surface(tilt, level)
+    widest = 2.0 * cylinder.radius * math.hypot(2.0 * cylinder.radius, cylinder.depth)
+    assert grown / (2.0 * step) == pytest.approx(scale, abs=2e-2 * widest)
+
+
+def test_what_it_holds_ends_at_the_lip() -> None:
+    assert CUP.holds(0.0) == CUP.capacity
+    assert CUP.holds(0.5 * math.pi) == pytest.approx(0.0, abs=1e-20)
+    assert CUP.holds(2.0) == CUP.holds(math.pi) == 0.0
+    # While the floor is covered it is the mean of what the highest and the lowest wall hold.
+    tilt = math.radians(35.0)
+    rest = math.pi * CUP.radius**2 * (CUP.depth - CUP.radius * math.tan(tilt))
+    assert CUP.holds(tilt) == pytest.approx(rest, rel=1e-13)
+    held = [CUP.holds(tilt) for tilt in np.linspace(0.0, math.pi, 200)]
+    assert all(a >= b for a, b in pairwise(held))
+
+
+@repeatable
+@given(cylinders, st.floats(0.001, 0.999))
+def test_it_spills_from_the_tilt_at_which_it_holds_no_more(c: Cylinder, share: float) -> None:
+    volume = share * c.capacity
+    tilt = c.spills_at(volume)
+    assert c.holds(tilt) == pytest.approx(volume, rel=1e-9)
+    assert c.margin(tilt, c.level(tilt, volume)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_full_and_empty_cups_spill_at_once_and_never() -> None:
+    assert CUP.spills_at(CUP.capacity) == pytest.approx(0.0, abs=1e-12)
+    assert CUP.spills_at(0.0) == pytest.approx(0.5 * math.pi, abs=1e-9)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
+def test_sizes_that_are_none_are_refused(bad: float) -> None:
+    with pytest.raises(InputError, match="radius"):
+        Cylinder(bad, 0.1)
+    with pytest.raises(InputError, match="depth"):
+        Cylinder(0.1, bad)

@@ -1,0 +1,248 @@
+"""Carrying, spilling, pouring, stopping: no water is lost, and all of it goes where it would."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.geometry.vectors import Vector
+from app.water.around import Around, Basin
+from app.water.flow import Flow, Water
+from app.water.parcel import Parcel
+from app.water.slosh import steady_acceleration
+from app.water.units import FEMTOLITRE, MILLILITRE, counted
+from tests.geometry.strategies import points, repeatable, rotation_vectors
+from tests.water.motions import UPRIGHT, carried, over_basin, placed, poured, turned_to
+
+FULL = 2e-4
+"""[m^3]"""
+
+Move = tuple[FloatArray, Vector, FloatArray, float]
+"""A rotation vector, a place, an acceleration and a time."""
+
+moves = st.lists(
+    st.tuples(
+        rotation_vectors,
+        st.tuples(st.floats(-0.3, 0.8), st.floats(-0.8, 0.8), st.floats(-0.1, 0.6)),
+        points.map(lambda p: 8.0 * p),
+        st.sampled_from([0.0, 0.001, 0.01, 0.02, 0.05]),
+    ),
+    min_size=1,
+    max_size=40,
+)
+
+
+def checked(before: Water, after: Water, flow: Flow) -> None:
+    assert after.total == before.total
+    assert min(after.cup, after.basin) >= 0
+    assert all(parcel.volume > 0 for parcel in after.parcels)
+    assert all(puddle.volume > 0 for puddle in after.puddles)
+    assert after.cup <= counted(flow.around.cup.inside.capacity)
+    assert after.basin <= counted(flow.around.basin.capacity)
+
+
+@repeatable
+@given(st.floats(0.0, 2.4e-4), moves)
+def test_no_motion_makes_or_loses_water(flow: Flow, volume: float, moves: list[Move]) -> None:
+    water = flow.begin(volume, placed(0.3, 0.0, 0.2))
+    assert abs(water.total * FEMTOLITRE - volume) <= FEMTOLITRE + 1e-9 * volume
+    for turn, place, acceleration, dt in moves:
+        T = se3.from_rotation_translation(so3.exp(turn), place)
+        after = flow.step(water, T, acceleration, dt)
+        checked(water, after, flow)
+        water = after
+
+
+@settings(repeatable, max_examples=25)
+@given(st.floats(0.5, 6.0), st.floats(0.0, math.pi), st.sampled_from([0.01, 0.05]))
+def test_a_cup_over_the_basin_keeps_what_its_tilt_holds_and_the_rest_is_caught(
+    flow: Flow, rate: float, final: float, dt: float
+) -> None:
+    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+    for after in poured(flow, water, turned_to(final, rate), final / rate + 2.5, dt):
+        checked(water, after, flow)
+        assert after.cup <= water.cup
+        water = after
+    held = flow.around.cup.inside.holds(final)
+    assert water.cup == min(counted(FULL), counted(held))
+    assert not water.parcels
+    assert water.spilled == 0
+
+
+def test_a_cup_turned_over_is_emptied_into_the_basin_whole(flow: Flow) -> None:
+    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+    *_, water = poured(flow, water, turned_to(math.radians(120.0), 1.0), 4.0, 0.01)
+    assert (water.cup, water.basin, water.spilled) == (0, water.total, 0)
+
+
+def test_stopped_in_the_middle_it_flows_down_to_the_lip_and_no_farther(flow: Flow) -> None:
+    tilt = math.radians(65.0)
+    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+    runs = list(poured(flow, water, turned_to(tilt, 1.0), 8.0, 0.01))
+    at_stop = round(tilt / 0.01)
+    held = counted(flow.around.cup.inside.holds(tilt))
+    # It goes on when the arm stands, ever more slowly, and comes to an end within two seconds.
+    flowing = [a.cup - b.cup for a, b in pairwise(runs[at_stop:])]
+    assert flowing[0] > 0
+    assert all(a >= b for a, b in pairwise(flowing[:100]))
+    after = runs[at_stop + 200]
+    assert (after.cup, after.parcels) == (held, ())
+    assert flow.margin_to_rim(after) == pytest.approx(0.0, abs=1e-9)
+    last = runs[-1]
+    assert (last.cup, last.basin, last.spilled) == (held, last.total - held, 0)
+
+
+def test_the_size_of_the_steps_hardly_matters(flow: Flow) -> None:
+    left = []
+    for dt in (0.0025, 0.01, 0.05):
+        water = flow.begin(FULL, over_basin(flow.around, 0.0))
+        *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, dt)
+        left.append(water.cup / MILLILITRE)
+    assert left == pytest.approx([left[0]] * 3, abs=6.0)
+
+
+def carry(flow: Flow, way: float, duration: float) -> tuple[Water, float]:
+    water, least = flow.begin(FULL, placed(0.2, -0.3, 0.15)), math.inf
+    for T, acceleration in carried(0.2, way, duration, 0.01):
+        water = flow.step(water, T, acceleration, 0.01)
+        least = min(least, flow.margin_to_rim(water))
+    for _ in range(200):
+        water = flow.step(water, water.T_base_cup, UPRIGHT, 0.01)
+        least = min(least, flow.margin_to_rim(water))
+    return water, least
+
+
+def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: Flow) -> None:
+    water, least = carry(flow, 0.4, 2.0)
+    assert (water.cup, water.spilled) == (water.total, 0)
+    at_rest = flow.around.cup.inside.depth - FULL / (math.pi * flow.around.cup.inside.radius**2)
+    assert 0.7 * at_rest < least < at_rest
+    water, least = carry(flow, 0.4, 0.45)
+    assert least < 0.0
+    assert water.spilled > MILLILITRE
+    assert water.cup + water.spilled == water.total
+
+
+def test_the_steady_acceleration_is_where_spilling_begins(flow: Flow) -> None:
+    T = placed(0.2, -0.3, 0.15)
+    limit = steady_acceleration(flow.around.cup.inside, FULL)
+    for share, spills in ((0.98, False), (1.02, True)):
+        water = flow.begin(FULL, T)
+        # Brought up slowly, over many swings.
+        for k in range(3000):
+            pull = share * limit * min(k / 2500.0, 1.0)
+            water = flow.step(water, T, (0.0, pull, 0.0), 0.01)
+        assert (water.spilled > 0) is spills
+
+
+def test_the_surface_leans_against_the_acceleration(flow: Flow) -> None:
+    water = flow.begin(1e-4, placed(0.2, -0.3, 0.15))
+    upright = flow.surface(water)
+    assert upright.tilt == 0.0
+    assert upright.level == pytest.approx(1e-4 / (math.pi * flow.around.cup.inside.radius**2))
+    for _ in range(3000):
+        water = flow.step(water, water.T_base_cup, (1.0, 0.0, 0.0), 0.01)
+    surface = flow.surface(water)
+    # A cup that is pulled to +x has its water rise on the other side.
+    assert surface.downhill == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
+    assert surface.tilt == pytest.approx(math.atan2(1.0, 9.81), abs=1e-6)
+
+
+def test_water_leaves_with_the_lip_and_flies_on(flow: Flow) -> None:
+    T = placed(0.2, -0.3, 0.3, math.radians(80.0))
+    water = flow.begin(1.5e-4, T)
+    moved = T.copy()
+    moved[0, 3] += 0.005
+    water = flow.step(water, moved, UPRIGHT, 0.01)
+    (parcel,) = water.parcels
+    lip = moved[:3, :3] @ (0.0, -0.03, 0.09) + moved[:3, 3]
+    assert parcel.start == pytest.approx(tuple(lip))
+    assert parcel.velocity[0] == pytest.approx(0.5)
+    assert parcel.velocity[1] < 0.0
+    assert parcel.velocity[2] == pytest.approx(0.0, abs=1e-9)
+    again = flow.step(water, moved, UPRIGHT, 0.01)
+    assert again.parcels[0] == parcel._replace(age=0.01)
+
+
+def test_the_cup_catches_what_falls_into_its_mouth(flow: Flow) -> None:
+    water = flow.begin(1e-4, placed(0.2, -0.3, 0.1))
+    drop = Parcel(MILLILITRE, (0.21, -0.3, 0.192), (0.0, 0.0, -1.0), 0.0, 0.01)
+    for offset, caught in ((0.0, True), (0.03, False)):
+        start = (0.21 + offset, -0.3, 0.192)
+        flying = Water(
+            water.cup, 0, (drop._replace(start=start),), (), water.slosh, water.T_base_cup
+        )
+        after = flow.step(flying, water.T_base_cup, UPRIGHT, 0.01)
+        assert (after.cup == water.cup + MILLILITRE) is caught
+        checked(flying, after, flow)
+
+
+def test_a_full_basin_spills_onto_the_table(around: Around) -> None:
+    small = Basin(around.basin.at, 0.004, 0.04, 0.05, 0.01, 0.06)
+    flow = Flow(Around(around.cup, small, around.table))
+    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+    *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
+    assert water.basin == counted(small.capacity)
+    assert water.basin + water.spilled == water.total
+    x, y, _ = small.at
+    for puddle in water.puddles:
+        assert math.hypot(puddle.at[0] - x, puddle.at[1] - y) < 0.08
+
+
+def test_in_free_fall_water_stays_and_upside_down_it_does_not(flow: Flow) -> None:
+    T = placed(0.2, -0.3, 0.3)
+    water = flow.begin(FULL, T)
+    for _ in range(400):
+        water = flow.step(water, T, (0.0, 0.0, -9.81), 0.01)
+    assert water.cup == water.total
+    *_, water = poured(flow, water, lambda _: math.pi, 3.0, 0.01)
+    assert (water.cup, water.air) == (0, 0)
+
+
+def test_water_at_rest_rests(flow: Flow) -> None:
+    water = flow.begin(FULL, placed(0.2, -0.3, 0.15, 0.2))
+    after = flow.step(water, water.T_base_cup, UPRIGHT, 0.01)
+    assert (after.cup, after.parcels, after.slosh) == (water.cup, (), water.slosh)
+
+
+def test_a_step_of_no_time_only_moves_the_cup(flow: Flow) -> None:
+    water = flow.begin(FULL, placed(0.2, -0.3, 0.15))
+    after = flow.step(water, placed(0.3, -0.3, 0.15, 2.0), UPRIGHT, 0.0)
+    assert after.cup == water.cup
+    assert after.T_base_cup[0, 3] == 0.3
+
+
+def test_the_puddles_stay_few(flow: Flow) -> None:
+    water = flow.begin(2.4e-4, placed(-0.2, -0.5, 0.2, 0.3))
+    for k in range(600):
+        T = placed(-0.2 + k * 1.5e-3, -0.5, 0.2, 0.3 + k * 3e-3)
+        after = flow.step(water, T, UPRIGHT, 0.01)
+        checked(water, after, flow)
+        water = after
+    assert 4 <= len(water.puddles) <= 8
+
+
+def test_a_cup_cannot_begin_fuller_than_full(flow: Flow) -> None:
+    for volume in (-1e-6, 1e-3, math.nan):
+        with pytest.raises(InputError, match="ml"):
+            flow.begin(volume, np.eye(4))
+
+
+def test_bad_numbers_are_refused(flow: Flow) -> None:
+    water = flow.begin(FULL, np.eye(4))
+    with pytest.raises(InputError, match="pose of the cup"):
+        flow.step(water, np.ones((4, 4)), UPRIGHT, 0.01)
+    with pytest.raises(InputError, match="acceleration"):
+        flow.step(water, np.eye(4), (0.0, math.nan, 0.0), 0.01)
+    with pytest.raises(InputError, match="time step"):
+        flow.step(water, np.eye(4), UPRIGHT, -0.01)
+    with pytest.raises(InputError, match="time step"):
+        flow.step(water, np.eye(4), UPRIGHT, math.inf)

@@ -1,0 +1,76 @@
+"""Flight and landing, against flights taken in very small steps."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.water.around import Around
+from app.water.parcel import Ground, Parcel, landing
+from app.water.units import GRAVITY
+from tests.geometry.strategies import repeatable
+
+speeds = st.floats(-2.0, 2.0)
+velocities = st.tuples(speeds, speeds, speeds)
+
+
+def test_it_flies_as_a_stone_does() -> None:
+    parcel = Parcel(1, (0.0, 0.0, 1.0), (0.5, 0.0, 2.0), 0.0, 0.01)
+    up = 2.0 / GRAVITY
+    assert parcel.at(up) == pytest.approx((0.5 * up, 0.0, 1.0 + 2.0 / GRAVITY))
+    assert parcel.falls_to(1.0) == pytest.approx(2.0 * up)
+    assert parcel.falls_to(1.3) is None
+    assert parcel._replace(velocity=(0.0, 0.0, -1.0)).falls_to(1.1) is None
+
+
+@repeatable
+@given(st.tuples(st.floats(-0.2, 0.8), st.floats(-0.6, 0.8), st.floats(0.08, 0.6)), velocities)
+def test_it_lands_where_small_steps_lead(
+    around: Around, start: tuple[float, float, float], velocity: tuple[float, float, float]
+) -> None:
+    basin, table = around.basin, around.table
+    parcel = Parcel(1, start, velocity, 0.0, 0.01)
+    level = 0.01
+    end = landing(parcel, around, level)
+    (x, y, z), (u, v, w) = start, velocity
+    dt, t, ground, off = 1e-4, 0.0, None, math.inf
+    while ground is None:
+        before = z
+        t += dt
+        x, y, z, w = x + u * dt, y + v * dt, z + w * dt - 0.5 * GRAVITY * dt * dt, w - GRAVITY * dt
+        if before > basin.rim >= z:
+            off = math.hypot(x - basin.at[0], y - basin.at[1]) - basin.rim_radius
+        if off < 0.0 and z <= basin.floor + level:
+            ground = Ground.BASIN
+        elif off >= 0.0 and before > 0.0 >= z:
+            edges = (x - table.x[0], table.x[1] - x, y - table.y[0], table.y[1] - y)
+            off = min(map(abs, edges)) if off == math.inf else min(abs(off), *map(abs, edges))
+            ground = Ground.TABLE if min(edges) >= 0.0 else None
+        elif z <= table.floor:
+            ground = Ground.FLOOR
+    if abs(off) > 1e-3:
+        assert end.ground is ground
+        assert end.age == pytest.approx(t, abs=2e-4)
+        assert end.point == pytest.approx((x, y, z), abs=2e-3)
+
+
+def test_what_leaves_inside_the_basin_stays_there(around: Around) -> None:
+    x, y, _ = around.basin.at
+    dipped = Parcel(1, (x, y, 0.03), (0.1, 0.0, 0.0), 0.0, 0.01)
+    assert landing(dipped, around, 0.01).ground is Ground.BASIN
+    beside = dipped._replace(start=(x + 0.2, y, 0.03))
+    assert landing(beside, around, 0.01).ground is Ground.TABLE
+
+
+def test_beside_the_table_there_is_the_floor(around: Around) -> None:
+    (west, _), floor = around.table.x, around.table.floor
+    end = landing(Parcel(1, (west - 0.1, 0.0, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01), around, 0.0)
+    assert end.ground is Ground.FLOOR
+    assert end.point == pytest.approx((west - 0.1, 0.0, floor))
+    assert end.age == pytest.approx(math.sqrt(2.0 * (0.3 - floor) / GRAVITY))
+    # Already lower than all there is.
+    sunk = Parcel(1, (west - 0.1, 0.0, -0.4), (0.0, 0.0, -1.0), 0.0, 0.01)
+    assert landing(sunk, around, 0.0) == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))
