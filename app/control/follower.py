@@ -12,7 +12,11 @@ from app.collision.world import World
 from app.control.following import Following
 from app.motion.limiter import Limiter, Limits
 from app.planning.clearance import Room
+from app.planning.plan import Segment
 from app.planning.scaling import Scaling
+
+GRAZE = 1e-3
+"""[m] Ways shorter than this are not looked at in between: no part is as thin."""
 
 PROBE = 0.02
 """[1] Of a segment: an arm that waits goes on once the way is clear so far."""
@@ -25,6 +29,8 @@ class Follower:
         """``world``: what must not be touched."""
         self._world = world
         self._limiters: dict[Scaling, Limiter] = {}
+        # What of a segment is known to be clear with the fingers as they are: no state, but facts.
+        self._known: tuple[Segment, float, float, float] | None = None
 
     def ahead(self, now: Following, dt: float, share: float) -> Following:
         """``dt`` [s] on, no faster than ``share`` of what the plan allows."""
@@ -59,14 +65,25 @@ class Follower:
         return self._met(here, here.at(probe), fingers) is None
 
     def _met(self, here: Following, halt: Following, fingers: float) -> Contact | None:
-        if self._world is None:
+        plan, segment = here.plan, here.segment
+        if self._world is None or (plan.world is self._world and plan.fingers == fingers):
             return None
-        segment = here.segment
-        low, high = sorted(segment.scaling.pace(each.local).sigma for each in (here, halt))
-        start = segment.scaling.pace(here.local).sigma
+        start, end = (segment.scaling.pace(each.local).sigma for each in (here, halt))
+        low, high = min(start, end), max(start, end)
+        known = self._known
+        if known is None or known[:2] != (segment, fingers) or not known[2] <= start <= known[3]:
+            known = (segment, fingers, start, start)
+        if known[2] <= low and high <= known[3]:
+            return None
         room = Room.about(self._world, STOP, segment.sweep.at(start, fingers))
-        found = segment.sweep.blocked(room, fingers, low, high)
-        return None if found is None else found.contact
+        for a, b in ((low, known[2]), (known[3], high)):
+            found = segment.sweep.blocked(room, fingers, a, b, GRAZE) if a < b else None
+            if found is not None:
+                return found.contact
+        # What leads out of a contact is clear from here alone.
+        if float(room.least.min()) >= STOP:
+            self._known = (segment, fingers, min(low, known[2]), max(high, known[3]))
+        return None
 
     def _limiter(self, now: Following) -> Limiter:
         """Of tau along the segment."""

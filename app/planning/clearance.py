@@ -71,9 +71,12 @@ class Room:
         return Room(world, least)
 
     def blocked(
-        self, at: At, turned: Turned, low: float = 0.0, high: float = 1.0
+        self, at: At, turned: Turned, low: float = 0.0, high: float = 1.0, fine: float = FINE
     ) -> Clearance | None:
-        """A place on the way from `low` to `high` that is too near, or None; the first it finds."""
+        """A place on the way from `low` to `high` that is too near, or None; the first it finds.
+
+        fine: pieces on which no body travels farther are not halved [m].
+        """
         pieces = [(low, high)]
         while pieces:
             low, high = pieces.pop()
@@ -88,7 +91,7 @@ class Room:
                 distance = placed.distance(pair)
                 if distance < self.least[pair]:
                     return Clearance(placed.contact(pair), middle)
-                left_open |= distance < self.least[pair] + reach[pair] and reach[pair] > FINE
+                left_open |= distance < self.least[pair] + reach[pair] and reach[pair] > fine
             if left_open:
                 pieces += [(middle, high), (low, middle)]
         return None

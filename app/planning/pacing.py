@@ -21,10 +21,10 @@ LOOKS: Final = 16
 SPARE: Final = 0.995
 """[1] Of every limit."""
 
-ROUNDS: Final = 60
+ROUNDS: Final = 50
 """Of making a path slower where it is too fast and faster where it is not."""
 
-TRIED: Final = 12
+TRIED: Final = 8
 """Of the same, to tell whether other a and j are better."""
 
 PRESS: Final = 0.6
@@ -32,6 +32,9 @@ PRESS: Final = 0.6
 
 RELAX: Final = 0.1
 """[1] The same where it is too slow: less, or the rounds would chase each other."""
+
+TINY: Final = 1e-300
+"""Keeps nothing by nothing from being no number."""
 
 NARROWINGS: Final = (2.0, 1.4, 1.18, 1.08)
 """[1] By which a and j are varied, ever less, as long as it saves time."""
@@ -48,7 +51,10 @@ def fastest(path: Path, bounds: Bounds) -> Scaling:
     joints = bounds.joints
     a = float((joints.acceleration / joints.speed).min())
     j = float((joints.jerk / joints.speed).min())
-    best = sampled.fitted(a, j, None, ROUNDS)
+    even = np.ones(len(sampled.first) + 3)
+    # As slow everywhere, or as slow as each place by itself has to be: either may end up better.
+    starts = even, sampled.near(sampled.excess(even, a, j))
+    best = min((sampled.fitted(a, j, each, ROUNDS) for each in starts), key=lambda f: f.time)
     for factor in NARROWINGS:
         improved = True
         while improved:
@@ -110,30 +116,33 @@ class _Sampled:
             bounds,
         )
 
-    def fitted(self, a: float, j: float, start: FloatArray | None, rounds: int) -> _Fitted:
+    def fitted(self, a: float, j: float, start: FloatArray, rounds: int) -> _Fitted:
         """The least slowness found for the bounds `a` and `j` of tau(t), from `start` (K + 3,)."""
-        c = np.ones(len(self.first) + 3) if start is None else start
-        c = c * self._excess(c, a, j).max()
+        c = start * self.excess(start, a, j).max()
         best, least = c, np.inf
         for _ in range(rounds):
-            excess = self._excess(c, a, j)
+            excess = self.excess(c, a, j)
             most = float(excess.max())
             # tau at the end, were all made slower until nothing is too fast.
             time = rest_to_rest(most * self._span(c), a, j)
             if time < least:
                 best, least = most * c, time
-            worst = np.maximum.reduceat(excess, self.first)
-            padded = np.concatenate((np.zeros(3), worst, np.zeros(3)))
-            near = np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1)
+            near = self.near(excess)
             c = c * np.where(near > 1.0, near**PRESS, near**RELAX)
         return _Fitted(best, a, j, least)
+
+    def near(self, excess: FloatArray) -> FloatArray:
+        """(K + 3,) the greatest of `excess` (N,) that each coefficient has a part in."""
+        worst = np.maximum.reduceat(excess, self.first)
+        padded = np.concatenate((np.zeros(3), worst, np.zeros(3)))
+        return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
 
     @staticmethod
     def _span(c: FloatArray) -> float:
         total = c.sum() - (23.0 * (c[0] + c[-1]) + 12.0 * (c[1] + c[-2]) + c[2] + c[-3]) / 24.0
         return float(total) / (len(c) - 3)
 
-    def _excess(self, c: FloatArray, a: float, j: float) -> FloatArray:
+    def excess(self, c: FloatArray, a: float, j: float) -> FloatArray:
         """(N,) how many times slower each place must be run through to keep every limit."""
         limits, bounds = self.bounds.joints, self.bounds
         fours = np.stack([c[self.piece + k] for k in range(4)], axis=1)
@@ -172,8 +181,7 @@ def _cubic(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     """The r > 0 with x / r^3 + y / r^2 + z / r = 1, from above so that no limit is passed."""
     # r^3 - z r^2 - y r - x is convex and rises beyond its root, and this is beyond it.
     r = np.cbrt(x) + np.sqrt(y) + z
-    for _ in range(4):
+    for _ in range(3):
         value = ((r - z) * r - y) * r - x
-        slope = (3.0 * r - 2.0 * z) * r - y
-        r = r - np.divide(value, slope, out=np.zeros_like(r), where=slope > 0.0)
+        r = r - value / ((3.0 * r - 2.0 * z) * r - y + TINY)
     return r

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -82,12 +82,15 @@ class Nearest:
 class Plan:
     """Segments in their order, tau running through them all.
 
-    nearest: the least clearance on the whole way; None where nothing can meet or nothing was
-    looked at.
+    world, fingers: what it is known to be clear of, with the finger joint at that angle [rad]; None
+    when nothing was looked at. nearest: the least clearance on the whole way; None where nothing
+    can meet or nothing was looked at.
     """
 
     segments: tuple[Segment, ...]
-    nearest: Nearest | None
+    world: World | None = None
+    fingers: float = 0.0
+    nearest: Nearest | None = None
 
     @cached_property
     def begins(self) -> tuple[float, ...]:
@@ -154,13 +157,13 @@ def plan(
             )
     clearances = [None if world is None else _clearance(p, world, fingers, margin) for p in paths]
     segments = tuple(Segment(path, fastest(path, bounds)) for path in paths)
-    found = Plan(segments, None)
+    found = Plan(segments, world, fingers)
     each = [
         Nearest(clearance.contact, begin + segment.scaling.tau(clearance.sigma))
         for clearance, segment, begin in zip(clearances, segments, found.begins, strict=False)
         if clearance is not None
     ]
-    return Plan(segments, min(each, key=lambda n: n.contact.distance, default=None))
+    return replace(found, nearest=min(each, key=lambda n: n.contact.distance, default=None))
 
 
 def check_clear(path: Path, world: World, fingers: float, margin: float = MARGIN) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.planning.clearance import Clearance, Room
+from app.planning.clearance import FINE, Clearance, Room
 from app.planning.jet import Jet
 from app.planning.path import Path, joint_derivatives
 
@@ -40,10 +40,15 @@ class Sweep:
         return room.nearest(lambda sigma: self.at(sigma, fingers), self.turned)
 
     def blocked(
-        self, room: Room, fingers: float, low: float = 0.0, high: float = 1.0
+        self,
+        room: Room,
+        fingers: float,
+        low: float = 0.0,
+        high: float = 1.0,
+        fine: float = FINE,
     ) -> Clearance | None:
-        """A place between two that is too near, or None."""
-        return room.blocked(lambda sigma: self.at(sigma, fingers), self.turned, low, high)
+        """A place between two that is too near, or None; as `Room.blocked`."""
+        return room.blocked(lambda sigma: self.at(sigma, fingers), self.turned, low, high, fine)
 
     def turned(self, low: float, high: float) -> FloatArray:
         """(6,) at most how far each turns between two places [rad]."""

@@ -167,6 +167,9 @@ class ToolPath:
         worst = float(np.maximum(beyond, 0.0)[:, axis].max(initial=float(over[:, axis].max())))
         limit = lower[axis] if q[place, axis] < 0.5 * (lower + upper)[axis] else upper[axis]
         sigma = float(self._sigma[place])
+        if place > 0 and beyond[place, axis] > slack:
+            passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
+            sigma -= float(passed) / KNOTS
         raise InputError(
             f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
             f"{_at(sigma, self._target(sigma))}, by up to {np.degrees(worst):.2g} deg later on. "
