@@ -82,7 +82,7 @@ def guarded(arm: Arm, world: World) -> Session:
 @pytest.fixture(scope="module")
 def round_cup(arm: Arm, world: World, guarded: Session) -> Plan:
     """From one side of the cup to the other, where the straight way would hit it."""
-    return plan_to(arm, world, guarded.begin(LOW, 0.0, 0.0), BEYOND_CUP, seed=4)
+    return plan_to(arm, world, guarded.begin(LOW, 0.0, 0.0), BEYOND_CUP, seed=1)
 
 
 def trace(
@@ -150,7 +150,7 @@ def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, sta
     assert last.following is not None
     assert last.following.share == 1.0
     assert len(states) * TICK == pytest.approx(plan.duration, abs=2 * TICK)
-    assert off_path(states, plan) == 0.0
+    assert off_path(states, plan) <= 1e-15
     check_limits(session, [state, state, state, *states])
 
 
@@ -177,7 +177,7 @@ def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
     states = trace(session, start, commands, last + 1500)
     assert states[-1].setpoint == pytest.approx(poured.end, abs=0.0)
     assert not states[-1].moving
-    assert off_path(states, poured) == 0.0
+    assert off_path(states, poured) <= 1e-15
     check_limits(session, [start, start, start, *states])
     carried = [
         forward(arm.chain, state.setpoint)[:3, 3]
@@ -278,7 +278,7 @@ def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, pour
     states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 1200)
     assert (states[-1].setpoint == poured.end).all()
     assert states[-1].gripper_setpoint == 0.2
-    assert off_path(states, poured) == 0.0
+    assert off_path(states, poured) <= 1e-15
 
 
 def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) -> None:
@@ -311,7 +311,7 @@ def test_it_goes_round_the_cup_where_the_straight_way_is_blocked(
 ) -> None:
     state, plan = guarded.begin(LOW, 0.0, 0.0), round_cup
     assert plan.nearest is not None
-    again = path_to(arm, world, state, BEYOND_CUP, seed=4)
+    again = path_to(arm, world, state, BEYOND_CUP, seed=1)
     sigma = np.linspace(0.0, 1.0, 50)
     same = joint_derivatives(plan.segments[0].path, sigma) == joint_derivatives(again, sigma)
     assert same.all()
@@ -332,14 +332,18 @@ def test_a_stop_beside_the_cup_keeps_clear_of_it(
     """Braked joint by joint the arm would leave its path, and not everywhere is room for that."""
     start = guarded.begin(LOW, 0.0, 0.0)
     states = run(guarded, start, [cmd.Follow(round_cup)])
-    for order in (cmd.Stop(), cmd.Home()):
-        for at in range(40, len(states) - 20, 50):
-            after = trace(guarded, states[at], {0: [order]}, 120)
-            assert min(clearance(world, each) for each in after) >= STOP - SLIGHTLY
-            assert after[-1].following is None or order == cmd.Stop()
-            if order == cmd.Stop():
-                assert after[-1].motion.at_rest
-                check_limits(guarded, [*states[at - 3 : at + 1], *after])
+    along = 0
+    for at in range(60, len(states) - 40, 8):
+        halted = run(guarded, states[at], [cmd.Stop()])
+        along += halted[0].following is not None
+        assert min(clearance(world, each) for each in halted) >= STOP - SLIGHTLY
+        assert halted[-1].motion.at_rest
+        check_limits(guarded, [*states[at - 3 : at + 1], *halted])
+    assert along > 0
+    for at in range(60, len(states) - 40, 60):
+        away = trace(guarded, states[at], {0: [cmd.Home()]}, 100)
+        assert min(clearance(world, each) for each in away) >= STOP - SLIGHTLY
+        assert away[-1].following is None
 
 
 def test_what_was_put_in_the_way_since_is_met_at_rest(
@@ -353,7 +357,7 @@ def test_what_was_put_in_the_way_since_is_met_at_rest(
     assert states[-1].status is Status.BLOCKED
     assert "cup" in (states[-1].findings[0].parts or ())
     assert min(clearance(world, each) for each in states) >= STOP - SLIGHTLY
-    assert off_path(states, plan) == 0.0
+    assert off_path(states, plan) <= 1e-15
     # Back is free, and so is on when the cup is gone.
     back = run(guarded, states[-1], [cmd.GoAlong(0.0)])
     assert (back[-1].setpoint == LOW).all()
