@@ -186,7 +186,7 @@ class ToolScrew:
         Y = k * y0 + s * (b * w0 + c * x0 - a * z0)
         Z = k * z0 + s * (c * w0 + a * y0 - b * x0)
         # Seen from the arm's plane.
-        alpha1, _, _, _ = facing(arm, self.branch.shoulder, x, y, z)
+        alpha1, _, _ = facing(arm, self.branch.shoulder, x, y, z)
         s, k = sin_cos(0.5 * alpha1)
         W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
         total, difference = atan2(X + Y, W + Z), atan2(Y - X, W - Z)

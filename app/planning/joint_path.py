@@ -43,8 +43,8 @@ class JointPath:
     A corner is a Bezier curve of degree 5 whose control points lie on the two legs, three evenly
     spaced on each, the last of the one and the first of the other in the via: so it leaves and
     meets the legs with their rates and without acceleration, and stays in the triangle that it cuts
-    off (Farin, Curves and Surfaces for CAGD, 2002, ch. 5). Inside the limits are the vias, so is
-    the path. It passes its inner vias by; with `blend` 0 there may be none.
+    off (Farin, Curves and Surfaces for CAGD, 2002, ch. 5). With its vias inside the limits the path
+    is. Inner vias are passed by, the nearer the smaller the blend.
 
     chain: the arm with its tool. vias: (m, 5) [rad], the first and last are start and end. blend:
     (m - 2,) how much of half of its shorter leg each corner cuts off, above 0 up to 1.

@@ -17,11 +17,11 @@ ThreeJets = tuple[Jet, Jet, Jet]
 
 def facing(
     arm: FiveAxisArm, shoulder: Shoulder, x: Jet, y: Jet, z: Jet, aside: Jet | float = 0.0
-) -> tuple[Jet, Jet, Jet, Jet]:
-    """(alpha1, u, height, square): the arm's plane that holds the point (x, y, z) of {S}.
+) -> ThreeJets:
+    """(alpha1, u, height): the arm's plane that holds the point (x, y, z) of {S}.
 
     aside: how far sideways of {K} the point is in it [m]. u: how far outward the point is from axis
-    1 [m], height: above the shoulder [m], square: of u, below 0 where no plane holds the point.
+    1 [m], not a number where no plane holds it; height: above the shoulder [m].
     """
     (r11, r12, r13, p1), (r21, r22, r23, p2), (r31, r32, r33, p3), _ = arm.T_C_S.tolist()
     if not arm.is_canonical:
@@ -31,9 +31,9 @@ def facing(
             r31 * x + r32 * y + r33 * z + p3,
         )
     side = arm.d + aside
-    square = x * x + y * y - side * side
-    u = sqrt(square) if shoulder == "front" else -sqrt(square)
-    return atan2(y * u - x * side, x * u + y * side), u, z, square
+    outward = sqrt(x * x + y * y - side * side)
+    u = outward if shoulder == "front" else -outward
+    return atan2(y * u - x * side, x * u + y * side), u, z
 
 
 def posture(
@@ -47,7 +47,7 @@ def posture(
     sr, cr = sin_cos(roll)
     outward: Jet | float
     outward, sideways, up = _beside(arm, sp, cp, sr, cr) if arm.off_axis else (0.0, 0.0, 0.0)
-    alpha1, u, height, _ = facing(arm, branch.shoulder, x, y, z, sideways)
+    alpha1, u, height = facing(arm, branch.shoulder, x, y, z, sideways)
     # {K} as its own plane sees it: there alpha1 is 0.
     rows = (
         (cp, sp * sr, sp * cr, u - outward),

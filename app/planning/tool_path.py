@@ -23,8 +23,9 @@ from app.planning.posture import FiveJets, ThreeJets, posture
 KNOTS = 400
 """Places at which a path is looked at when it is built."""
 
-LEAP = 0.5
-"""[rad] No axis turns so far between two of them, unless the path leaves the branch in between."""
+KINK = 1e-4
+"""[rad] Between two of them no axis is farther from the cubic through both, unless the path meets
+the end of the branch in between."""
 
 HALVINGS = 40
 """Until the place where a path fails is known to rounding."""
@@ -58,7 +59,7 @@ class ToolPath:
         q = np.unwrap(q, axis=0)
         object.__setattr__(self, "_sigma", sigma)
         object.__setattr__(self, "_turns", frozen(q))
-        self._refuse_leaps(q)
+        self._refuse_kinks(q, qd)
         self._refuse_limits(q, qd)
 
     @property
@@ -123,34 +124,32 @@ class ToolPath:
             good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
         target = self._target(failing)
         theta1 = target.facing(self.chain, self.branch, float(self.near[0]))
+        T = target.pose(self.chain, theta1)
         best = project(
-            self.chain,
-            target.pose(self.chain, theta1),
-            branch=self.branch,
-            within_limits=False,
-            reading=Reading.PITCH,
+            self.chain, T, branch=self.branch, within_limits=False, reading=Reading.PITCH
         )
-        end = self._target(float(sigma[bad]))
+        short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
         raise InputError(
             f"The path leaves what the arm reaches on the branch {self.branch} "
-            f"{_at(failing, target)}: there links come in line or the tool onto axis 1"
-            + (
-                f", {1e3 * best.position_error:.1f} mm short"
-                if best.position_error > tolerances.SAME_POSITION * 1e3
-                else ""
-            )
-            + f" with the pitch of {np.degrees(end.pitch):.1f} deg. Keep the path nearer to the "
+            f"{_at(failing, target)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}: "
+            "links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
             "arm, or give it another pitch."
         )
 
-    def _refuse_leaps(self, q: FloatArray) -> None:
-        steps = np.abs(np.diff(q, axis=0))
-        if steps.max() > LEAP:
-            place, axis = np.unravel_index(int(steps.argmax()), steps.shape)
+    def _refuse_kinks(self, q: FloatArray, qd: FloatArray) -> None:
+        """Where a branch ends the angles leap or turn back at once, maybe between two places."""
+        h = 1.0 / KNOTS
+        middle, _ = self._loose(self._sigma[:-1] + 0.5 * h)
+        smooth = 0.5 * (q[:-1] + q[1:]) + 0.125 * h * (qd[:-1] - qd[1:])
+        gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
+        kinked = ~(gap <= KINK)
+        if kinked.any():
+            place, axis = (int(each) for each in np.argwhere(kinked)[0])
             sigma = float(self._sigma[place])
             raise InputError(
-                f"Axis {axis + 1} would have to leap {_at(sigma, self._target(sigma))}, where the "
-                "tool passes axis 1 or links come in line. Lead the path around that place."
+                f"Axis {axis + 1} would have to leap or turn at once "
+                f"{_at(sigma, self._target(sigma))}: links come in line there, or the tool passes "
+                "over axis 1. Lead the path around that place."
             )
 
     def _refuse_limits(self, q: FloatArray, qd: FloatArray) -> None:

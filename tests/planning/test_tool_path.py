@@ -170,6 +170,20 @@ def test_a_line_through_axis_1_is_refused(arm: Arm) -> None:
         straight(arm.chain, q, (-2.0 * x, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("beyond", [1e-7, -1e-12])
+def test_a_curve_that_only_grazes_the_reach_is_refused(arm: Arm, beyond: float) -> None:
+    """Between two of the places that are looked at the arm is stretched, or would have to be."""
+    chain, canonical = arm.chain, arm_of(arm.chain)
+    radius = canonical.l1 + canonical.l2 + canonical.l3 - 0.1 + beyond
+    level, centre = Linear(0.0, 0.0), np.array([0.1, 0.0, 0.0])
+    start = centre + radius * np.array([math.cos(0.7), -math.sin(0.7), 0.0])
+    arc = ToolArc(start, centre, np.array([0.0, 0.0, 1.0]), 1.4031, level, level)
+    with pytest.raises(InputError, match=r"\(631.8, .*links come in line"):
+        ToolPath(chain, arc, FRONT_UP, np.zeros(5))
+    nearer = replace(arc, start=centre + (1.0 - 2e-3) * (start - centre))
+    ToolPath(chain, nearer, FRONT_UP, np.zeros(5))
+
+
 TWISTS = {
     "about axis 1": (0.0, 0.0, 0.8, 0.0, 0.0, 0.0),
     "upwards": (0.0, 0.0, 0.0, 0.0, 0.0, 0.1),
