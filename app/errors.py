@@ -11,6 +11,10 @@ class InputError(KatanaError, ValueError):
     """A value handed in cannot be used: not finite, of the wrong shape, not a rotation, ..."""
 
 
+class BlockedError(InputError):
+    """A way that is asked for would bring two things too near to each other."""
+
+
 class RobotDescriptionError(KatanaError):
     """The description of the robot is broken, or of an arm these kinematics do not cover."""
 

@@ -17,6 +17,7 @@ from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.reading import Reading
 from app.kinematics.velocity import JogFrame
+from app.planning.plan import Plan
 
 LEAST_SPEED = 0.01
 """A share below this is a hold, for which there are Pause and Stop."""
@@ -165,6 +166,29 @@ class Resume:
     """Go on to the goal there is."""
 
 
+@dataclass(frozen=True, eq=False)
+class Follow:
+    """Follow ``plan`` from its start, where the arm has to stand, to its end."""
+
+    plan: Plan
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.plan, Plan):
+            raise InputError(f"What is to be followed is a plan, not {self.plan!r}.")
+
+
+@dataclass(frozen=True)
+class GoAlong:
+    """Go on or back along the plan that is followed, to ``share`` of it: 0 its start, 1 its end."""
+
+    share: float
+
+    def __post_init__(self) -> None:
+        _check_finite("The share of the plan", self.share)
+        if not 0.0 <= self.share <= 1.0:
+            raise InputError(f"The share of the plan is from 0 to 1, not {self.share}.")
+
+
 @dataclass(frozen=True)
 class SpeedScale:
     """From now on no joint and no tool is faster than ``value`` of its most, above 0 up to 1."""
@@ -211,6 +235,8 @@ Command = (
     | Release
     | Pause
     | Resume
+    | Follow
+    | GoAlong
     | SpeedScale
     | Jog
 )

@@ -16,6 +16,8 @@ from app.collision.clearance import SETTLING, advance, surely_clear
 from app.collision.contact import Contact
 from app.collision.world import LONGEST_WAY, World
 from app.control.arm import Arm
+from app.control.follower import Follower
+from app.control.following import Following
 from app.control.state import Finding, Jogging, Reason, State
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.arm import arm_of
@@ -47,6 +49,7 @@ class Mover:
         self._arm = arm
         self._world = world
         self._tool_speed = PLANNED * tool_speed
+        self._follower = Follower(world)
         self._any = Limiter(arm.limits)
         self._elbow = {elbow: Limiter(_bent(arm, elbow)) for elbow in ("up", "down")}
 
@@ -56,29 +59,32 @@ class Mover:
             return state
         if not state.under_way:
             return replace(state, blocked=False) if state.blocked else state
+        if state.following is not None and state.following.leaving and self._free_to_leave(state):
+            state = replace(state, following=None)
         fingers = self._fingers(state, dt)
         if state.blocked and state.motion.at_rest and self._may_go_on(state):
             state = replace(state, blocked=False)
         # Once it brakes it comes to rest: at the edge of what is clear it would only quiver.
         braking = state.blocked and state.jogging is None
-        ahead = self._brake(state, dt) if braking else self._ahead(state, dt)
+        ahead, along = self._brake(state, dt) if braking else self._ahead(state, dt)
         if self._world is None:
-            return replace(state, motion=ahead, gripper_setpoint=fingers)
-        contact = None if braking else self._met(state, ahead, state.gripper_setpoint)
+            return replace(state, motion=ahead, following=along, gripper_setpoint=fingers)
+        contact = None if braking else self._met(state, ahead, along, state.gripper_setpoint)
         if contact is not None:
-            ahead = self._brake(state, dt)
+            ahead, along = self._brake(state, dt)
         hand = None
         if fingers != state.gripper_setpoint:
             here = np.append(ahead.q, state.gripper_setpoint)
             hand = advance(self._world, here, np.append(ahead.q, fingers), dt)
             fingers = float(hand.x[-1])
-            if self._met(state, ahead, fingers) is not None and not ahead.at_rest:
+            if self._met(state, ahead, along, fingers) is not None and not ahead.at_rest:
                 fingers = state.gripper_setpoint
         stands = state.motion.at_rest and ahead.at_rest and (ahead.q == state.setpoint).all()
         pinched = bool(stands) and fingers == state.gripper_setpoint and hand is not None
         after = replace(
             state,
             motion=state.motion if stands else ahead,
+            following=along,
             gripper_setpoint=fingers,
             blocked=braking or contact is not None or pinched,
         )
@@ -97,14 +103,38 @@ class Mover:
 
     def halt(self, state: State) -> tuple[FloatArray, float, float]:
         """Where a brake begun now ends (n,) [rad], how far off the tool is then [m], and when."""
-        limiter, motion = self._any, state.motion
-        chain = self._arm.chain_to(state.tool)
-        # A plan that ends at a limit may miss it by rounding, and nobody could go there.
-        end = chain.clamp(limiter.halt(motion))
+        motion, chain = state.motion, self._arm.chain_to(state.tool)
+        if state.following is not None:
+            end = self._follower.halt(state.following).motion().q
+            time = self._follower.time_to_halt(state.following)
+        else:
+            # A plan that ends at a limit may miss it by rounding, and nobody could go there.
+            end, time = chain.clamp(self._any.halt(motion)), self._any.time_to_halt(motion)
         way = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
-        return frozen(end), way, limiter.time_to_halt(motion)
+        return frozen(end), way, time
 
-    def _ahead(self, state: State, dt: float) -> Motion:
+    def may_leave(self, state: State) -> bool:
+        """Whether the arm may brake beside the plan it follows, as hard as it can."""
+        if self._world is None or state.motion.at_rest:
+            return True
+        return self._met(state, state.motion, None, state.gripper_setpoint) is None
+
+    def _free_to_leave(self, state: State) -> bool:
+        # How far a stop takes has been said, so it goes on as it began.
+        return state.motion.at_rest or (state.halted is None and self.may_leave(state))
+
+    def _ahead(self, state: State, dt: float) -> tuple[Motion, Following | None]:
+        """The next motion, and the place on the plan if one is followed."""
+        following = state.following
+        if following is None:
+            return self._beside(state, dt), None
+        if state.halted is not None or state.paused or following.leaving:
+            return self._brake(state, dt)
+        ahead = self._follower.ahead(following, dt, state.speed)
+        return ahead.motion(), ahead
+
+    def _beside(self, state: State, dt: float) -> Motion:
+        """The next motion of an arm that follows no plan."""
         limiter, motion = self.limiter(state), state.motion
         if state.halted is not None:
             return self._any.stop(motion, dt)
@@ -124,9 +154,12 @@ class Mover:
             share *= 0.9 * self._tool_speed / speed
         return ahead
 
-    def _brake(self, state: State, dt: float) -> Motion:
+    def _brake(self, state: State, dt: float) -> tuple[Motion, Following | None]:
         """The very way to rest that the tick before found clear."""
-        return self.limiter(state).stop(state.motion, dt)
+        if state.following is None:
+            return self.limiter(state).stop(state.motion, dt), None
+        along = self._follower.braking(state.following, dt)
+        return along.motion(), along
 
     def _share(self, chain: Chain, state: State) -> float:
         """Of the joints' speeds, how much the tool may have on its way to the goal."""
@@ -147,9 +180,15 @@ class Mover:
             max(state.gripper_goal - state.gripper_setpoint, -reach), reach
         )
 
-    def _met(self, state: State, ahead: Motion, fingers: float) -> Contact | None:
+    def _met(
+        self, state: State, ahead: Motion, along: Following | None, fingers: float
+    ) -> Contact | None:
         """What is met on the way to ``ahead`` and on to rest; None when nothing is."""
         assert self._world is not None
+        if state.following is not None and along is not None:
+            met = self._follower.met(state.following, along, fingers)
+            here = self._world.nearest(np.append(state.setpoint, fingers)) if met else None
+            return None if met is None else _as_far_as(met, here)
         limiter, x = self.limiter(state), np.append(state.setpoint, fingers)
         if surely_clear(self._world, x, np.append(limiter.halt(ahead), fingers)):
             return None
@@ -175,6 +214,8 @@ class Mover:
     def _may_go_on(self, state: State) -> bool:
         """Whether the way of an arm that waits is clear again, at its beginning."""
         assert self._world is not None
+        if state.following is not None:
+            return self._follower.may_go_on(state.following, state.gripper_setpoint)
         way = state.goal - state.setpoint
         if not way.any():
             return True

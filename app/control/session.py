@@ -13,6 +13,7 @@ from app.control import commands as cmd
 from app.control.arm import Arm
 from app.control.choices import Choice, choice, choices, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
+from app.control.following import Following
 from app.control.mover import Mover
 from app.control.state import (
     Finding,
@@ -31,6 +32,7 @@ from app.kinematics.branch import Branch, branch_of
 from app.kinematics.projection import project
 from app.kinematics.tracker import track
 from app.motion.limiter import Motion
+from app.planning.plan import Plan
 
 TOOL_SPEED = 0.5
 """[m/s] The most of the tool point, unless somebody says otherwise: a person can follow it."""
@@ -40,6 +42,9 @@ STILL = frozen(np.zeros(5))
 
 SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale)
 """What counts while a stop holds the arm."""
+
+AT_START = 1e-6
+"""[rad] An arm that is no farther from the start of a plan stands there: no encoder tells it."""
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -94,6 +99,10 @@ class Session:
                 raise InputError(f"This arm has {n} joints, the command {q.size}.")
             case cmd.SetTool(name=name):
                 self.arm.chain_to(name)
+            case cmd.Follow(plan=plan):
+                chains = [segment.path.chain for segment in plan.segments]
+                if any(not np.array_equal(chain.S, self.arm.chain.S) for chain in chains):
+                    raise InputError("The plan was made for another arm.")
 
     def choices(self, state: State) -> tuple[Choice, ...]:
         """What there is to choose from on each branch."""
@@ -133,6 +142,7 @@ class Session:
             since=None,
             let_go=False,
             jogging=None,
+            following=None,
         )
         return replace(held, findings=(Finding(Reason.INTERNAL),))
 
@@ -145,19 +155,23 @@ class Session:
             case cmd.Release():
                 goal = self._mover.halt(state)[0]
                 free = replace(state, halted=None, goal=goal, target=JointTarget(goal))
-                return self._without(free, Reason.HALTED)
+                return _leaving(self._without(free, Reason.HALTED))
             case cmd.Pause():
                 told = self._without(state, Reason.PAUSED).findings
                 return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
             case cmd.Resume():
                 return self._without(replace(state, paused=False), Reason.PAUSED)
+            case cmd.Follow(plan=plan):
+                return self._begin(state, plan)
+            case cmd.GoAlong(share=share):
+                return self._go_along(state, share)
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
             case cmd.Jog(rates=rates, frame=frame):
                 if state.paused:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
-                return replace(state, jogging=jogging, since=None, let_go=False)
+                return _leaving(replace(state, jogging=jogging, since=None, let_go=False))
             case cmd.SetJoint(axis=axis, value=value):
                 q = np.array(state.goal)
                 q[axis] = value
@@ -183,9 +197,11 @@ class Session:
                     return replace(state, let_go=True)
                 # The findings stay: they say why the handle springs back.
                 goal = state.setpoint if state.blocked else state.goal
-                return replace(state, goal=goal, target=JointTarget(goal), blocked=False)
+                let_go = replace(state, goal=goal, target=JointTarget(goal), blocked=False)
+                return _leaving(let_go) if state.blocked else let_go
             case cmd.SetTool(name=name):
-                return self._aim(replace(state, tool=name), JointTarget(state.goal))
+                renamed = self._aim(replace(state, tool=name), JointTarget(state.goal))
+                return replace(renamed, following=state.following)
             case cmd.SetReading(reading=reading):
                 return self._reread(replace(state, reading=reading))
             case cmd.TakeBranch(branch=branch):
@@ -219,7 +235,31 @@ class Session:
     def _drag(self, state: State, target: ToolTarget) -> State:
         """Make ``target`` what is followed from now on, along the way the hand took there."""
         since = wish(self.arm, state) if state.since is None else state.since
-        return replace(state, target=target, since=since, let_go=False)
+        return _leaving(replace(state, target=target, since=since, let_go=False))
+
+    def _begin(self, state: State, plan: Plan) -> State:
+        """Follow ``plan`` from here, if the arm stands at its start."""
+        off = np.abs(state.setpoint - plan.start)
+        if off.max() > AT_START or not state.motion.at_rest:
+            axis = int(off.argmax())
+            told = self._without(state, Reason.NOT_AT_START).findings
+            return replace(
+                state, findings=(*told, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
+            )
+        return self._along(state, Following.begun(plan))
+
+    def _go_along(self, state: State, share: float) -> State:
+        """Go on or back on the plan the arm is on; without one there is nowhere to go."""
+        following = state.following
+        if following is None or following.leaving:
+            return state
+        return self._along(state, replace(following, towards=share * following.plan.span))
+
+    def _along(self, state: State, following: Following) -> State:
+        """With the goal where ``following`` ends."""
+        goal = following.goal
+        state = replace(state, branch=branch_of(self.arm.chain, goal))
+        return replace(self._gone(state, JointTarget(goal), goal, ()), following=following)
 
     def _follow(self, state: State, target: ToolTarget, since: ToolTarget) -> State:
         """Take the goal on towards ``target``, as far as one tick has time for."""
@@ -241,7 +281,7 @@ class Session:
         paused = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
         # What the arm brakes for stays the reason, however often it is told anew meanwhile.
         met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
-        return replace(
+        aimed = replace(
             state,
             target=target,
             goal=goal,
@@ -250,11 +290,15 @@ class Session:
             let_go=False,
             jogging=None,
         )
+        return _leaving(aimed)
 
     def _halt(self, state: State) -> State:
         """Brake, and forget every wish. The grip stays: what is held must not be dropped."""
         if state.halted is not None:
             return state
+        if state.following is not None:
+            left = None if self._mover.may_leave(state) else _leaving(state).following
+            state = replace(state, following=left)
         goal, way, time = self._mover.halt(state)
         halted = replace(
             state,
@@ -315,3 +359,10 @@ class Session:
         beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
         held = (Finding(Reason.GRIPPER_LIMIT, goal),) if beyond else ()
         return replace(state, gripper_goal=goal, findings=others + held)
+
+
+def _leaving(state: State) -> State:
+    """``state`` that follows a plan no longer than it takes to leave it."""
+    if state.following is None:
+        return state
+    return replace(state, following=replace(state.following, leaving=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from app.control.following import Following
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
 from app.kinematics.reading import Reading
@@ -69,6 +70,7 @@ class Reason(Enum):
     YAW_FIXED = "yaw fixed"
     PITCH_CHANGED = "pitch changed"
     ROLL_CHANGED = "roll changed"
+    NOT_AT_START = "not at the start"
     INTERNAL = "internal error"
 
 
@@ -80,7 +82,7 @@ class Finding:
         reason: what holds the goal back.
         amount: by how much [m or rad]; for a limit, the limit itself [rad]; for a gap, the leap
             across it [rad]; for a contact, the distance that is left [m]; for a stop, how far the
-            tool went until it was at rest [m].
+            tool went until it was at rest [m]; for a plan, how far its start is [rad].
         axis: the axis it is about, counted from 0, where it is about one.
         parts: the two links or things it is about, where it is about two.
         time: for a stop, how long that took [s].
@@ -135,6 +137,8 @@ class State:
         since: how far along its way the target has been followed, while the goal is still on its
             way to it; None once it is there. Until then the findings are those from before.
         let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
+        following: the plan the arm is on and where on it, until it is told to go elsewhere; None
+            when it is on none.
     """
 
     t: float
@@ -156,6 +160,7 @@ class State:
     jogging: Jogging | None = None
     since: ToolTarget | None = None
     let_go: bool = False
+    following: Following | None = None
 
     @property
     def status(self) -> Status:
@@ -190,5 +195,6 @@ class State:
             (self.setpoint != self.goal).any()
             or not self.motion.at_rest
             or self.jogging is not None
+            or (self.following is not None and not self.following.there)
             or self.gripper_setpoint != self.gripper_goal
         )

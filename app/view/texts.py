@@ -82,6 +82,10 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"pitch gives way by {_short(math.degrees(f.amount))}° to keep the position"
     ),
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
+    Reason.NOT_AT_START: lambda f: (
+        f"the plan begins elsewhere: {axis(f.axis)} is {_short(math.degrees(f.amount))}° off, "
+        "or the arm still moves; go to its start first"
+    ),
     Reason.INTERNAL: lambda _: "something went wrong inside: the arm holds; see the server's log",
 }
 

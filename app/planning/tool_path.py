@@ -1,0 +1,199 @@
+"""Joints that take the tool along a curve, solved anew at every place: nothing is interpolated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from app import tolerances
+from app.errors import InputError
+from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.arm import arm_of
+from app.kinematics.branch import Branch
+from app.kinematics.chain import Chain
+from app.kinematics.projection import project
+from app.kinematics.reading import Reading
+from app.kinematics.tool import ToolTarget
+from app.planning.curve import Curve, Tool
+from app.planning.jet import Coefficient, Jet
+from app.planning.posture import FiveJets, ThreeJets, posture
+
+KNOTS = 400
+"""Places at which a path is looked at when it is built."""
+
+KINK = 1e-4
+"""[rad] Between two of them no axis is farther from the cubic through both, unless the path meets
+the end of the branch in between."""
+
+HALVINGS = 40
+"""Until the place where a path fails is known to rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPath:
+    """The joints on `branch` that have the tool on `curve`.
+
+    chain: the arm with its tool. near: (5,) [rad] of the turns an angle may be in, that nearest to
+    this is taken at the start. Raises InputError where the curve leaves the branch's reach or the
+    limits, or meets the end of the branch: where on the way, what binds, what to do.
+    """
+
+    chain: Chain
+    curve: Curve
+    branch: Branch
+    near: FloatArray
+    _turns: FloatArray = field(init=False, repr=False)
+    _sigma: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        near = frozen(self.chain.check_q(self.near))
+        object.__setattr__(self, "near", near)
+        sigma = frozen(np.linspace(0.0, 1.0, KNOTS + 1))
+        q, qd = self._loose(sigma)
+        bad = np.flatnonzero(~np.isfinite(qd).all(axis=1))
+        if bad.size:
+            self._refuse_reach(sigma, int(bad[0]))
+        q[0] += np.round((near - q[0]) / (2.0 * np.pi)) * (2.0 * np.pi)
+        q = np.unwrap(q, axis=0)
+        object.__setattr__(self, "_sigma", sigma)
+        object.__setattr__(self, "_turns", frozen(q))
+        self._refuse_kinks(q, qd)
+        self._refuse_limits(q, qd)
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """None: a curve is one formula."""
+        return ()
+
+    def joints(self, sigma: Jet) -> FiveJets:
+        """The joint angles [rad] at `sigma`, one place or many (N,)."""
+        arm = arm_of(self.chain)
+        alpha = posture(arm, self.branch, *self.curve.at(sigma))
+        found = []
+        for axis, (angle, sign, shift) in enumerate(zip(alpha, arm.signs, arm.shifts, strict=True)):
+            q = sign * (angle - shift) if sign != 1.0 or shift else angle
+            turns = self._turn(axis, sigma.c0, q.c0)
+            found.append(q + turns * math.tau if np.any(turns) else q)
+        one, two, three, four, five = found
+        return one, two, three, four, five
+
+    def point(self, sigma: Jet) -> ThreeJets:
+        """The tool point in {S} [m]."""
+        x, y, z, _, _ = self.curve.at(sigma)
+        return x, y, z
+
+    @property
+    def start(self) -> FloatArray:
+        """(5,) where it begins [rad]."""
+        return frozen([each.c0 for each in self.joints(Jet.variable(0.0))])
+
+    @property
+    def end(self) -> FloatArray:
+        """(5,) where it ends [rad]."""
+        return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
+
+    def _turn(self, axis: int, sigma: Coefficient, angle: Coefficient) -> Coefficient:
+        """How many turns `angle` is short: they go on from place to place."""
+        knots = self._turns[:, axis]
+        if isinstance(sigma, float):
+            place = min(max(round(sigma * KNOTS), 0), KNOTS)
+            return round((float(knots[place]) - angle) / math.tau)
+        place = np.clip(np.rint(sigma * KNOTS), 0, KNOTS).astype(np.int64)
+        return np.rint((knots[place] - angle) / math.tau)
+
+    def _loose(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angles and their rates (N, 5) whatever turn they are in; not finite out of reach."""
+        arm = arm_of(self.chain)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            alpha = posture(arm, self.branch, *self.curve.at(Jet.variable(sigma)))
+            q = np.stack([np.broadcast_to(each.c0, sigma.shape) for each in alpha], axis=1)
+            qd = np.stack([np.broadcast_to(each.c1, sigma.shape) for each in alpha], axis=1)
+        return (q - arm.shifts) * arm.signs, qd * arm.signs
+
+    def _target(self, sigma: float) -> ToolTarget:
+        tool = Tool(*(float(each.c0) for each in self.curve.at(Jet.variable(sigma))))  # type: ignore[arg-type]
+        return ToolTarget(np.array(tool[:3]), float(tool.pitch), float(tool.roll))  # type: ignore[arg-type]
+
+    def _refuse_reach(self, sigma: FloatArray, bad: int) -> None:
+        good, failing = float(sigma[max(bad - 1, 0)]), float(sigma[bad])
+        for _ in range(HALVINGS if bad else 0):
+            middle = 0.5 * (good + failing)
+            _, qd = self._loose(np.array([middle]))
+            good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
+        target = self._target(failing)
+        theta1 = target.facing(self.chain, self.branch, float(self.near[0]))
+        T = target.pose(self.chain, theta1)
+        best = project(
+            self.chain, T, branch=self.branch, within_limits=False, reading=Reading.PITCH
+        )
+        short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
+        raise InputError(
+            f"The path leaves what the arm reaches on the branch {self.branch} "
+            f"{_at(failing, target)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}: "
+            "links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
+            "arm, or give it another pitch."
+        )
+
+    def _refuse_kinks(self, q: FloatArray, qd: FloatArray) -> None:
+        """Where a branch ends the angles leap or turn back at once, maybe between two places."""
+        h = 1.0 / KNOTS
+        middle, _ = self._loose(self._sigma[:-1] + 0.5 * h)
+        smooth = 0.5 * (q[:-1] + q[1:]) + 0.125 * h * (qd[:-1] - qd[1:])
+        gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
+        kinked = ~(gap <= KINK)
+        if kinked.any():
+            place, axis = (int(each) for each in np.argwhere(kinked)[0])
+            sigma = float(self._sigma[place])
+            raise InputError(
+                f"Axis {axis + 1} would have to leap or turn at once "
+                f"{_at(sigma, self._target(sigma))}: links come in line there, or the tool passes "
+                "over axis 1. Lead the path around that place."
+            )
+
+    def _refuse_limits(self, q: FloatArray, qd: FloatArray) -> None:
+        """Extremes between two places are those of the cubic through their angles and rates."""
+        slack, lower, upper = tolerances.LIMIT_SLACK, self.chain.lower, self.chain.upper
+        beyond = np.maximum(lower - q, q - upper)
+        peaks = _peaks(q, qd, 1.0 / KNOTS)
+        over = np.maximum(beyond[:-1], np.maximum(lower - peaks, peaks - upper))
+        over[-1] = np.maximum(over[-1], beyond[-1])
+        if over.max() <= slack:
+            return
+        place = int(np.flatnonzero((over > slack).any(axis=1))[0])
+        axis = int(over[place].argmax())
+        worst = float(np.maximum(beyond, 0.0)[:, axis].max(initial=float(over[:, axis].max())))
+        limit = lower[axis] if q[place, axis] < 0.5 * (lower + upper)[axis] else upper[axis]
+        sigma = float(self._sigma[place])
+        if place > 0 and beyond[place, axis] > slack:
+            passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
+            sigma -= float(passed) / KNOTS
+        raise InputError(
+            f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
+            f"{_at(sigma, self._target(sigma))}, by up to {np.degrees(worst):.2g} deg later on. "
+            "Shift the path, or give it another pitch or roll."
+        )
+
+
+def _at(sigma: float, target: ToolTarget) -> str:
+    x, y, z = (1e3 * target.position).tolist()
+    return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
+def _peaks(q: FloatArray, qd: FloatArray, h: float) -> FloatArray:
+    """(N, n) the extreme inside each piece of length `h`, or its start where it has none."""
+    a, b = q[:-1], q[1:]
+    da, db = h * qd[:-1], h * qd[1:]
+    turns = da * db < 0.0
+    # The cubic of Hermite, a + da t + e t^2 + f t^3, where its rate is 0 between the ends.
+    e, f = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+    root = np.sqrt(np.maximum(e * e - 3.0 * f * da, 0.0))
+    divisor = -e - np.copysign(root, e)
+    found = a
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for t in (da / divisor, divisor / (3.0 * f)):
+            inside = turns & (t > 0.0) & (t < 1.0)
+            t_in = np.where(inside, t, 0.0)
+            found = np.where(inside, a + t_in * (da + t_in * (e + t_in * f)), found)
+    return found

@@ -1,0 +1,391 @@
+"""Plans in the session: on the path and inside every limit, whatever a person does meanwhile."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from app.collision.clearance import STOP
+from app.collision.shape import cylinder, half_space
+from app.collision.world import World, obstacle
+from app.control import commands as cmd
+from app.control.arm import Arm
+from app.control.plans import path_to, plan_along, plan_to
+from app.control.session import TOOL_SPEED, Session
+from app.control.state import JointTarget, Reason, State, Status
+from app.errors import BlockedError, InputError
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import branch_of
+from app.kinematics.forward import forward
+from app.kinematics.freedoms import pitch_and_roll
+from app.kinematics.tool import ToolTarget
+from app.planning.curve import Linear, ToolArc, ToolLine
+from app.planning.jet import Jet
+from app.planning.path import joint_derivatives
+from app.planning.plan import Plan
+from app.planning.tool_path import ToolPath
+from app.robot.collision import world_of
+from app.robot.model import RobotModel
+from app.settings import Settings
+
+TICK = 0.01
+SLIGHTLY = 2e-5  # m
+LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
+"""The fingers a hand's breadth above the table."""
+BEYOND_CUP = LOW - (1.1, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def world(model: RobotModel) -> World:
+    """The arm on its table, a cup before it."""
+    found, _ = world_of(model)
+    assert found is not None
+    cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
+    cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
+    return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def poured(arm: Arm) -> Plan:
+    """A cup lifted, taken round an arc and poured out: three paths with a rest between them."""
+    chain = arm.chain
+    start = np.radians((-20.0, -75.0, 100.0, -25.0, 0.0))
+    branch, at = branch_of(chain, start), ToolTarget.at(chain, start)
+    lifted = ToolTarget(at.position + np.array([0.0, 0.0, 0.08]), at.pitch, at.roll)
+    lift = ToolPath(chain, ToolLine(at, lifted), branch, start)
+    level = Linear(at.pitch, at.pitch), Linear(at.roll, at.roll)
+    arc = ToolArc(lifted.position, np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, *level)
+    carry = ToolPath(chain, arc, branch, lift.end)
+    there = ToolTarget.at(chain, carry.end)
+    out = ToolTarget(there.position, there.pitch, there.roll + 1.9)
+    pour = ToolPath(chain, ToolLine(there, out), branch, carry.end)
+    session = Session(arm, start)
+    return plan_along(arm, None, session.begin(start, 0.0, 0.0), [lift, carry, pour])
+
+
+@pytest.fixture(scope="module")
+def guarded(arm: Arm, world: World) -> Session:
+    return Session(arm, np.array(Settings().ready), world)
+
+
+@pytest.fixture(scope="module")
+def round_cup(arm: Arm, world: World, guarded: Session) -> Plan:
+    """From one side of the cup to the other, where the straight way would hit it."""
+    return plan_to(arm, world, guarded.begin(LOW, 0.0, 0.0), BEYOND_CUP, seed=1)
+
+
+def trace(
+    session: Session, state: State, commands: dict[int, list[cmd.Command]], ticks: int
+) -> list[State]:
+    """The states of ``ticks`` turns of the loop, ``commands`` at some of them."""
+    states = []
+    for tick in range(ticks):
+        state = session.step(state, commands.get(tick, []), state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        states.append(state)
+    return states
+
+
+def run(
+    session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 2000
+) -> list[State]:
+    """Until the arm rests."""
+    states = [session.step(state, commands, state.t + TICK)]
+    while states[-1].moving:
+        states.append(session.step(states[-1], [], states[-1].t + TICK))
+        assert len(states) < ticks, "the arm never came to rest"
+    return states
+
+
+def check_limits(session: Session, states: list[State]) -> None:
+    """Finite differences over a tick are means of the derivative, so they keep its limits."""
+    limits, rounding = session.arm.limits, 1e-12
+    q = np.array([state.setpoint for state in states])
+    for order, limit in enumerate((limits.speed, limits.acceleration, limits.jerk), 1):
+        difference = np.abs(np.diff(q, order, axis=0)) / TICK**order
+        assert (difference <= limit + rounding / TICK**order).all(), order
+    chain = session.arm.chain
+    points = np.array([forward(chain, each)[:3, 3] for each in q])
+    assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= TOOL_SPEED * TICK + 1e-12
+    for before, after in pairwise(states):
+        # The motion that is told is that of the setpoints.
+        mean = 0.5 * (before.motion.qd + after.motion.qd)
+        step = after.setpoint - before.setpoint
+        assert np.abs(step - TICK * mean).max() <= (limits.jerk * TICK**3 / 12.0).max() + 1e-12
+
+
+def off_path(states: list[State], plan: Plan) -> float:
+    """The farthest setpoint from the plan's path at the place it is said to be at [rad]."""
+    worst = 0.0
+    for state in states:
+        assert state.following is not None
+        segment = plan.segments[state.following.number]
+        sigma = segment.scaling.pace(state.following.local).sigma
+        q = np.array([each.c0 for each in segment.path.joints(Jet.variable(sigma))])
+        worst = max(worst, float(np.abs(q - state.setpoint).max()))
+    return worst
+
+
+def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, state: State) -> None:
+    goal = np.array([1.0, -0.8, 0.9, 0.5, 1.2])
+    plan = plan_to(session.arm, None, state, goal)
+    states = run(session, state, [cmd.Follow(plan)])
+    last = states[-1]
+    assert (last.setpoint == goal).all()
+    assert (last.goal == goal).all()
+    assert isinstance(last.target, JointTarget)
+    assert last.status is Status.OK
+    assert last.branch == branch_of(session.arm.chain, goal)
+    assert last.following is not None
+    assert last.following.share == 1.0
+    assert len(states) * TICK == pytest.approx(plan.duration, abs=2 * TICK)
+    assert off_path(states, plan) <= 1e-15
+    check_limits(session, [state, state, state, *states])
+
+
+def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
+    arm: Arm, session: Session, poured: Plan
+) -> None:
+    """Pauses, ways back, stops at any place and changes of speed, at any time."""
+    random = np.random.default_rng(11)
+    commands: dict[int, list[cmd.Command]] = {0: [cmd.Follow(poured)]}
+    for tick in np.cumsum(random.integers(5, 90, 60)).tolist():
+        commands[tick] = [
+            (
+                cmd.Pause(),
+                cmd.Resume(),
+                cmd.Resume(),
+                cmd.GoAlong(float(random.uniform())),
+                cmd.GoAlong(float(random.integers(2))),
+                cmd.SpeedScale(float(random.uniform(0.05, 1.0))),
+            )[random.integers(6)]
+        ]
+    last = max(commands)
+    commands[last + 1] = [cmd.Resume(), cmd.SpeedScale(1.0), cmd.GoAlong(1.0)]
+    start = session.begin(poured.start, 0.0, 0.0)
+    states = trace(session, start, commands, last + 1500)
+    assert states[-1].setpoint == pytest.approx(poured.end, abs=0.0)
+    assert not states[-1].moving
+    assert off_path(states, poured) <= 1e-15
+    check_limits(session, [start, start, start, *states])
+    carried = [
+        forward(arm.chain, state.setpoint)[:3, 3]
+        for state in states
+        if state.following is not None and state.following.number == 1
+    ]
+    lifted = forward(arm.chain, poured.q(poured.begins[1]))[:3, 3]
+    for point in carried:
+        assert math.hypot(*point[:2]) == pytest.approx(math.hypot(*lifted[:2]), abs=1e-12)
+        assert point[2] == pytest.approx(lifted[2], abs=1e-12)
+    held = [pitch_and_roll(arm.chain, state.setpoint) for state in states]
+    pitch, _ = pitch_and_roll(arm.chain, poured.start)
+    assert max(abs(each - pitch) for each, _ in held) < 1e-14
+    visited = {state.following.number for state in states if state.following is not None}
+    assert visited == {0, 1, 2}
+    turned = [state.following.pace.qd[0] < 0.0 for state in states if state.following is not None]
+    assert sum(turned) > 100
+
+
+def test_the_way_goes_by_steps_from_rest_to_rest(session: Session, poured: Plan) -> None:
+    start = session.begin(poured.start, 0.0, 0.0)
+    state = session.step(start, [cmd.Follow(poured), cmd.Pause()], TICK)
+    for begin in poured.begins[1:]:
+        share = begin / poured.span
+        state = run(session, state, [cmd.GoAlong(share), cmd.Resume()])[-1]
+        assert state.following is not None
+        assert state.following.share == pytest.approx(share, abs=1e-12)
+        assert state.motion.at_rest
+        assert state.setpoint == pytest.approx(poured.q(begin), abs=1e-9)
+    back = run(session, state, [cmd.GoAlong(0.0)])[-1]
+    assert (back.setpoint == poured.start).all()
+
+
+def test_a_plan_that_begins_elsewhere_is_refused(session: Session, poured: Plan) -> None:
+    state = session.begin(poured.start + np.array([0.0, 0.0, 0.0, 0.0, 0.01]), 0.0, 0.0)
+    after = session.step(state, [cmd.Follow(poured)], TICK)
+    (finding,) = after.findings
+    assert finding.reason is Reason.NOT_AT_START
+    assert finding.amount == pytest.approx(0.01)
+    assert finding.axis == 4
+    assert after.following is None
+    assert not after.moving
+    gone = session.step(after, [cmd.SetJoints(poured.start)], 2 * TICK)
+    assert gone.findings == ()
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan, "end"])
+def test_orders_that_are_none_are_refused(share: object) -> None:
+    with pytest.raises(InputError, match="share"):
+        cmd.GoAlong(share)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="plan"):
+        cmd.Follow(share)  # type: ignore[arg-type]
+
+
+def test_a_plan_for_another_arm_is_refused(arm: Arm, session: Session, poured: Plan) -> None:
+    S = np.array(arm.chain.S)
+    S[3:, 1] += 0.01 * S[[2, 0, 1], 1]
+    other = Session(replace(arm, chain=replace(arm.chain, S=S)), session.ready)
+    with pytest.raises(InputError, match="another arm"):
+        other.check(cmd.Follow(poured))
+
+
+def test_without_a_plan_there_is_nowhere_to_go_along(session: Session, state: State) -> None:
+    after = session.step(state, [cmd.GoAlong(1.0)], TICK)
+    assert after.setpoint is state.setpoint
+    assert after.following is None
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        cmd.SetJoint(0, 0.3),
+        cmd.Home(),
+        cmd.MoveTool(np.array([0.3, 0.1, 0.0])),
+        cmd.Jog(np.array([0.05, 0.0, 0.0, 0.0, 0.0])),
+        cmd.Reset(),
+    ],
+)
+def test_any_other_motion_ends_it_inside_the_limits(
+    session: Session, poured: Plan, order: cmd.Command
+) -> None:
+    start = session.begin(poured.start, 0.0, 0.0)
+    under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)
+    assert not under_way[-1].motion.at_rest
+    after = run(session, under_way[-1], [order])
+    assert after[-1].following is None
+    assert not after[-1].moving
+    limits, slack = session.arm.limits, 1.0 + 1e-6
+    for a, b in pairwise([under_way[-1], *after]):
+        assert (np.abs(b.motion.qd) <= limits.speed * slack).all()
+        change = np.abs(b.motion.qd - a.motion.qd)
+        assert (change <= limits.acceleration * TICK * slack + 1e-8).all()
+
+
+def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, poured: Plan) -> None:
+    start = session.begin(poured.start, 0.0, 0.0)
+    orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.Settle()]
+    states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 1200)
+    assert (states[-1].setpoint == poured.end).all()
+    assert states[-1].gripper_setpoint == 0.2
+    assert off_path(states, poured) <= 1e-15
+
+
+def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) -> None:
+    start = session.begin(poured.start, 0.0, 0.0)
+    under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)[-1]
+    halted = run(session, under_way, [cmd.Stop()])
+    (finding,) = halted[-1].findings
+    assert finding.reason is Reason.HALTED
+    assert len(halted) * TICK == pytest.approx(finding.time, abs=2 * TICK)
+    way = math.dist(
+        *(forward(session.arm.chain, each.setpoint)[:3, 3] for each in (under_way, halted[-1]))
+    )
+    assert finding.amount == pytest.approx(way, abs=1e-4)
+    assert halted[0].following is None
+    for order in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
+        after = trace(session, halted[-1], {0: [order]}, 20)[-1]
+        assert (after.setpoint == halted[-1].setpoint).all()
+    free = trace(session, halted[-1], {0: [cmd.Release()]}, 50)[-1]
+    assert (free.setpoint == halted[-1].setpoint).all()
+
+
+def clearance(world: World, state: State) -> float:
+    contact = world.nearest(np.append(state.setpoint, state.gripper_setpoint))
+    assert contact is not None
+    return contact.distance
+
+
+def test_it_goes_round_the_cup_where_the_straight_way_is_blocked(
+    arm: Arm, world: World, guarded: Session, round_cup: Plan
+) -> None:
+    state, plan = guarded.begin(LOW, 0.0, 0.0), round_cup
+    assert plan.nearest is not None
+    again = path_to(arm, world, state, BEYOND_CUP, seed=1)
+    sigma = np.linspace(0.0, 1.0, 50)
+    same = joint_derivatives(plan.segments[0].path, sigma) == joint_derivatives(again, sigma)
+    assert same.all()
+    states = run(guarded, state, [cmd.Follow(plan)])
+    assert (states[-1].setpoint == BEYOND_CUP).all()
+    assert not any(each.blocked for each in states)
+    near = min(clearance(world, each) for each in states)
+    assert near >= STOP
+    # The least clearance said is found to a tenth, and holds between the ticks as well.
+    assert 0.89 * plan.nearest.contact.distance - 1e-4 <= near
+    assert near <= plan.nearest.contact.distance * 1.1 + 1e-3
+    check_limits(guarded, [state, state, state, *states])
+
+
+def test_a_stop_beside_the_cup_keeps_clear_of_it(
+    world: World, guarded: Session, round_cup: Plan
+) -> None:
+    """Braked joint by joint the arm would leave its path, and not everywhere is room for that."""
+    start = guarded.begin(LOW, 0.0, 0.0)
+    states = run(guarded, start, [cmd.Follow(round_cup)])
+    along = 0
+    for at in range(60, len(states) - 40, 8):
+        halted = run(guarded, states[at], [cmd.Stop()])
+        along += halted[0].following is not None
+        assert min(clearance(world, each) for each in halted) >= STOP - SLIGHTLY
+        assert halted[-1].motion.at_rest
+        check_limits(guarded, [*states[at - 3 : at + 1], *halted])
+    assert along > 0
+    for at in range(60, len(states) - 40, 60):
+        away = trace(guarded, states[at], {0: [cmd.Home()]}, 100)
+        assert min(clearance(world, each) for each in away) >= STOP - SLIGHTLY
+        assert away[-1].following is None
+
+
+def test_what_was_put_in_the_way_since_is_met_at_rest(
+    arm: Arm, world: World, guarded: Session
+) -> None:
+    cup = len(world.parts) - 1
+    cupless = World(world.linkage, world.parts[:-1], [p for p in world.pairs if cup not in p])
+    start = Session(arm, guarded.ready, cupless).begin(LOW, 0.0, 0.0)
+    plan = plan_to(arm, cupless, start, BEYOND_CUP)
+    states = run(guarded, start, [cmd.Follow(plan)])
+    assert states[-1].status is Status.BLOCKED
+    assert "cup" in (states[-1].findings[0].parts or ())
+    assert min(clearance(world, each) for each in states) >= STOP - SLIGHTLY
+    assert off_path(states, plan) <= 1e-15
+    # Back is free, and so is on when the cup is gone.
+    back = run(guarded, states[-1], [cmd.GoAlong(0.0)])
+    assert (back[-1].setpoint == LOW).all()
+    assert back[-1].status is Status.OK
+    freed = Session(arm, guarded.ready, cupless)
+    assert (run(freed, states[-1], [])[-1].setpoint == BEYOND_CUP).all()
+
+
+def test_a_goal_in_the_table_is_refused(arm: Arm, world: World, guarded: Session) -> None:
+    state = guarded.begin(LOW, 0.0, 0.0)
+    with pytest.raises(BlockedError, match=r"table.*too near"):
+        plan_to(arm, world, state, LOW + np.radians([0.0, 23.0, 0.0, 0.0, 0.0]))
+
+
+def test_a_goal_that_is_none_is_refused(arm: Arm, state: State) -> None:
+    for goal in (np.full(5, math.nan), np.zeros(4), state.setpoint, np.full(5, 9.0)):
+        with pytest.raises(InputError):
+            plan_to(arm, None, state, goal)
+
+
+def test_following_is_a_fold_that_can_be_replayed_to_the_bit(
+    session: Session, poured: Plan
+) -> None:
+    commands: dict[int, list[cmd.Command]] = {
+        0: [cmd.Follow(poured)],
+        70: [cmd.GoAlong(0.0)],
+        150: [cmd.Stop()],
+    }
+    start = session.begin(poured.start, 0.0, 0.0)
+    ends: list[FloatArray] = [trace(session, start, commands, 300)[-1].setpoint for _ in range(2)]
+    assert ends[0].tobytes() == ends[1].tobytes()

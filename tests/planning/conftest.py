@@ -1,0 +1,53 @@
+"""Paths that several tests look at."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from app.control.arm import Arm
+from app.geometry.arrays import FloatArray
+from app.kinematics.branch import Branch, branch_of
+from app.kinematics.tool import ToolTarget
+from app.planning.curve import Linear, ToolArc, ToolLine
+from app.planning.joint_path import JointPath
+from app.planning.path import Path
+from app.planning.tool_path import ToolPath
+from app.settings import Settings
+
+FRONT_UP = Branch("front", "up")
+
+
+@pytest.fixture(scope="session")
+def ready() -> FloatArray:
+    return np.array(Settings().ready)
+
+
+@pytest.fixture(scope="session")
+def circle() -> ToolArc:
+    """The paper's: y^2 + (z + 110)^2 = 100^2, x = 150 mm, from its top; at a pitch of 99 deg."""
+    pitch, roll = Linear(math.radians(99.0), math.radians(99.0)), Linear(0.0, 0.0)
+    top, centre, axis = np.array([[0.15, 0.0, -0.01], [0.15, 0.0, -0.11], [1.0, 0.0, 0.0]])
+    return ToolArc(top, centre, axis, math.tau, pitch, roll)
+
+
+@pytest.fixture(scope="session")
+def paths(arm: Arm, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
+    """One of each kind, by name."""
+    chain = arm.chain
+    at = ToolTarget.at(chain, ready)
+    aside = at.position + np.array([-0.1, -0.2, -0.15])
+    line = ToolLine(at, ToolTarget(aside, at.pitch + 0.3, at.roll + 1.0))
+    pour = ToolLine(at, ToolTarget(at.position, at.pitch, at.roll + 1.6))
+    vias = np.array(
+        [[0.0, -1.0, 1.0, 0.0, 0.0], [1.0, -0.5, 0.5, 0.3, 0.0], [1.2, -1.5, 0.2, 0.3, 1.0]]
+    )
+    return {
+        "circle": ToolPath(arm.chain_to("flange"), circle, FRONT_UP, np.zeros(5)),
+        "line": ToolPath(chain, line, branch_of(chain, ready), ready),
+        "pour": ToolPath(chain, pour, branch_of(chain, ready), ready),
+        "joints": JointPath(chain, vias[:2]),
+        "via": JointPath(chain, vias, np.array([0.8])),
+    }

@@ -1,0 +1,161 @@
+"""Plans: clear on their whole way, or refused with what is in it and where."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from app.collision.clearance import STOP
+from app.collision.shape import box, half_space
+from app.collision.world import World, obstacle
+from app.control.arm import Arm
+from app.errors import BlockedError, InputError
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.planning.joint_path import JointPath
+from app.planning.path import Path
+from app.planning.plan import MARGIN, check_clear, plan
+from app.planning.sampling import way_round
+from app.planning.scaling import Bounds
+from app.planning.sweep import Sweep
+from app.robot.collision import world_of
+from app.robot.model import RobotModel
+
+
+@pytest.fixture(scope="module")
+def bounds(arm: Arm) -> Bounds:
+    return Bounds(arm.limits, 0.5)
+
+
+@pytest.fixture(scope="module")
+def bare(model: RobotModel) -> World:
+    """The arm without anything round it."""
+    found, _ = world_of(model)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="module")
+def world(bare: World) -> World:
+    """The arm on its table, a wall as thin as a sheet beside it."""
+    wall_at = se3.from_rotation_translation(np.eye(3), (0.35, 0.0, 0.16))
+    wall = obstacle("wall", wall_at, box((0.30, 0.001, 0.32)))
+    return bare.with_obstacles([obstacle("table", np.eye(4), half_space()), wall])
+
+
+def brute_force(path: Path, world: World, places: int = 400) -> float:
+    """[m] the least clearance seen at many places."""
+    sweep = Sweep(path)
+    found = (world.nearest(sweep.at(s, 0.0)) for s in np.linspace(0.0, 1.0, places).tolist())
+    return min(contact.distance for contact in found if contact is not None)
+
+
+def across(arm: Arm, lift: float) -> JointPath:
+    """From one side of the wall to the other, in one leg."""
+    q = np.radians([[50.0, -60.0, 80.0, 10.0, 0.0], [-50.0, -60.0, 80.0, 10.0, 0.0]])
+    return JointPath(arm.chain, q + np.array([0.0, lift, 0.0, 0.0, 0.0]))
+
+
+def test_a_wall_thinner_than_any_step_is_not_passed(arm: Arm, world: World) -> None:
+    path = across(arm, 0.0)
+    with pytest.raises(BlockedError, match=r"wall would be .* mm are kept") as told:
+        check_clear(path, world, 0.0)
+    share, *point = map(
+        float, re.findall(r"blocked (\d+) % .*\((-?\d+), (-?\d+), (-?\d+)\)", str(told.value))[0]
+    )
+    sweep = Sweep(path)
+    places = [sweep.at(0.01 * (share + off), 0.0) for off in np.linspace(-0.6, 0.6, 41)]
+    near = [world.nearest(x) for x in places]
+    assert min(contact.distance for contact in near if contact is not None) < MARGIN
+    tools = np.array([1e3 * forward(arm.chain, x[:5])[:3, 3] for x in places])
+    assert np.abs(tools - point).max(axis=1).min() < 3.0
+
+
+def test_the_nearest_clearance_is_that_of_brute_force(
+    arm: Arm, world: World, bounds: Bounds
+) -> None:
+    rng, looked, near = np.random.default_rng(8), 0, 0
+    beside = across(arm, 0.0).start
+    while looked < 5:
+        a = beside + rng.uniform(-0.2, 0.2, 5)
+        path = JointPath(arm.chain, np.array((a, a + rng.uniform((-0.7, 0, 0, 0, 0), 0.1))))
+        seen = brute_force(path, world, 150)
+        try:
+            found = plan([path], bounds, world).nearest
+        except BlockedError:
+            assert seen < MARGIN + 1e-3
+            continue
+        assert found is not None
+        looked += 1
+        near += seen < 0.06
+        assert seen >= MARGIN - 1e-4
+        assert found.contact.distance <= 1.1 * seen + 1e-3
+        assert found.contact.distance >= 0.9 * seen - 1e-3
+    assert near > 0
+
+
+def test_a_way_round_is_clear_and_the_same_again(arm: Arm, world: World) -> None:
+    blocked = across(arm, 0.0)
+    path = way_round(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
+    assert brute_force(path, world) >= MARGIN - 1e-4
+    again = way_round(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
+    assert (path.vias == again.vias).all()
+    assert (path.blend == again.blend).all()
+
+
+def test_an_end_in_the_wall_is_refused(arm: Arm, world: World) -> None:
+    clear, inside = across(arm, 0.0).start, np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
+    with pytest.raises(BlockedError, match=r"At the end .* too near"):
+        way_round(arm.chain, clear, inside, world, 0.0, 0)
+
+
+def test_a_search_that_finds_nothing_ends(
+    arm: Arm, bare: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Past a wall without end the arm would have to reach over itself."""
+    wall_at = se3.from_rotation_translation(np.eye(3), (1.15, 0.0, 0.0))
+    endless = bare.with_obstacles([obstacle("wall", wall_at, box((2.0, 0.01, 6.0)))])
+    monkeypatch.setattr("app.planning.sampling.EFFORT", 5)
+    path = across(arm, 0.0)
+    with pytest.raises(BlockedError, match=r"found in 5 tries from seed 0\. The straight .*wall"):
+        way_round(arm.chain, path.start, path.end, endless, 0.0, 0)
+
+
+def test_a_way_out_of_a_contact_is_allowed_and_deeper_is_not(arm: Arm, world: World) -> None:
+    """As when a thing is put where the arm already is."""
+    touching = np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
+    contact = world.nearest(np.append(touching, 0.0))
+    assert contact is not None
+    assert contact.distance < STOP
+    away = np.radians([0.0, -110.0, 80.0, 10.0, 0.0])
+    check_clear(JointPath(arm.chain, np.array([touching, away])), world, 0.0)
+    with pytest.raises(BlockedError):
+        check_clear(JointPath(arm.chain, np.array([away, touching])), world, 0.0)
+
+
+def test_paths_that_do_not_meet_are_refused(
+    arm: Arm, bounds: Bounds, paths: dict[str, Path], ready: FloatArray
+) -> None:
+    with pytest.raises(InputError, match=r"Path 2 begins .* deg from where path 1 ends"):
+        plan([paths["line"], paths["joints"]], bounds)
+    with pytest.raises(InputError, match="a path at least"):
+        plan([], bounds)
+    there = JointPath(arm.chain, np.array([ready, ready + 0.1]))
+    back = JointPath(arm.chain, np.array([ready + 0.1, ready]))
+    both = plan([there, back], bounds)
+    assert both.nearest is None
+    assert both.begins[1] == both.segments[0].scaling.span
+    assert both.q(both.begins[1]) == pytest.approx(ready + 0.1, abs=1e-14)
+    assert both.postures(3)[[0, -1]] == pytest.approx(np.array([ready, ready]), abs=1e-14)
+    one = both.segments[0]
+    assert both.duration == pytest.approx(2.0 * one.scaling.duration, rel=0.05)
+
+
+def test_the_length_of_the_circle_is_that_of_a_circle(
+    paths: dict[str, Path], bounds: Bounds
+) -> None:
+    found = plan([paths["circle"]], bounds)
+    assert found.length == pytest.approx(0.2 * np.pi, rel=1e-5)

@@ -1,0 +1,139 @@
+"""Time along a path: every limit holds for whatever is made of it, and not much is given away."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from ruckig import InputParameter, Ruckig, Trajectory
+
+from app.control.arm import Arm
+from app.errors import InputError
+from app.planning.pacing import fastest
+from app.planning.path import Path, joint_derivatives, point_derivatives
+from app.planning.scaling import Bounds, Scaling, rest_to_rest
+from tests.planning.time_optimal import least_time
+
+NAMES = ("circle", "line", "pour", "joints", "via")
+
+
+@pytest.fixture(scope="module")
+def bounds(arm: Arm) -> Bounds:
+    return Bounds(arm.limits, 0.5)
+
+
+@pytest.fixture(scope="module")
+def scalings(paths: dict[str, Path], bounds: Bounds) -> dict[str, Scaling]:
+    return {name: fastest(path, bounds) for name, path in paths.items()}
+
+
+def loads(path: Path, scaling: Scaling, bounds: Bounds) -> np.ndarray:
+    """(5,) of speed, acceleration, jerk, tool speed and tool acceleration, the most, to its limit.
+
+    The most that any tau(t) within its bounds can make of them, at places that nobody looked at.
+    """
+    taus = np.random.default_rng(1).uniform(0.0, scaling.span, 4000)
+    paces = [scaling.pace(tau) for tau in np.append(taus, (0.0, scaling.span)).tolist()]
+    sigma = np.array([pace.sigma for pace in paces])
+    f, s, t = np.array([(p.first, p.second, p.third) for p in paces]).T[:, :, None]
+    _, q1, q2, q3 = joint_derivatives(path, sigma)
+    one, two = q1 * f, q2 * f**2 + q1 * s
+    three = q3 * f**3 + 3.0 * q2 * f * s + q1 * t
+    a, j, limits = scaling.acceleration, scaling.jerk, bounds.joints
+    _, p1, p2, _ = point_derivatives(path, sigma)
+    tool, pushed = np.linalg.norm(p1 * f, axis=1), np.linalg.norm(p2 * f**2 + p1 * s, axis=1)
+    jerk = np.abs(three) + 3.0 * np.abs(two) * a + np.abs(one) * j
+    return np.array(
+        [
+            (np.abs(one) / limits.speed).max(),
+            ((np.abs(two) + np.abs(one) * a) / limits.acceleration).max(),
+            (jerk / limits.jerk).max(),
+            tool.max() / bounds.tool_speed,
+            (pushed + a * tool).max() / (bounds.tool_acceleration or math.inf),
+        ]
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_limit_is_passed_however_tau_runs(
+    paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
+) -> None:
+    found = loads(paths[name], scalings[name], bounds)
+    assert found.max() <= 1.0
+    assert found.max() > 0.98
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_takes_at_most_half_as_long_again_as_it_has_to(
+    paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
+) -> None:
+    least = least_time(paths[name], bounds)
+    assert least < scalings[name].duration < 1.5 * least
+
+
+def test_a_straight_line_alone_is_at_its_limits(arm: Arm, paths: dict[str, Path]) -> None:
+    """With nothing but the joints to mind, the optimum is known: one joint's own."""
+    bounds = Bounds(arm.limits, 50.0)
+    scaling = fastest(paths["joints"], bounds)
+    way, limits = np.abs(paths["joints"].end - paths["joints"].start), arm.limits
+    turning = way > 0.0
+    v, a, j = (
+        float((limit[turning] / way[turning]).min())
+        for limit in (limits.speed, limits.acceleration, limits.jerk)
+    )
+    best = rest_to_rest(1.0 / v, a / v, j / v)
+    assert best < scaling.duration < 1.01 * best
+
+
+def test_a_full_cup_is_carried_gently(paths: dict[str, Path], bounds: Bounds) -> None:
+    gentle = replace(bounds, tool_acceleration=0.3)
+    scaling = fastest(paths["line"], gentle)
+    found = loads(paths["line"], scaling, gentle)
+    assert 0.98 < found[4] <= 1.0
+    assert found.max() <= 1.0
+    assert scaling.duration > fastest(paths["line"], bounds).duration
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_pace_is_the_inverse_of_tau_with_its_derivatives(
+    scalings: dict[str, Scaling], name: str
+) -> None:
+    scaling, h = scalings[name], 1e-4
+    assert scaling.pace(0.0).sigma == 0.0
+    assert scaling.pace(scaling.span).sigma == pytest.approx(1.0, abs=1e-15)
+    for tau in np.linspace(2.0 * h, scaling.span - 2.0 * h, 40).tolist():
+        pace = scaling.pace(tau)
+        assert scaling.tau(pace.sigma) == pytest.approx(tau, abs=1e-14)
+        before, after = scaling.pace(tau - h), scaling.pace(tau + h)
+        for low, high, rate in (
+            (before.sigma, after.sigma, pace.first),
+            (before.first, after.first, pace.second),
+            (before.second, after.second, pace.third),
+        ):
+            assert (high - low) / (2.0 * h) == pytest.approx(rate, rel=1e-3, abs=1e-2)
+
+
+@given(st.floats(1e-4, 20.0), st.floats(0.05, 30.0), st.floats(0.05, 200.0))
+def test_the_time_from_rest_to_rest_is_that_of_ruckig(way: float, a: float, j: float) -> None:
+    wanted = InputParameter(1)
+    wanted.target_position = [way]
+    wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = [1.0], [a], [j]
+    trajectory = Trajectory(1)
+    Ruckig(1).calculate(wanted, trajectory)
+    assert rest_to_rest(way, a, j) == pytest.approx(trajectory.duration, rel=1e-6)
+
+
+def test_numbers_that_are_none_are_refused(arm: Arm) -> None:
+    for speed, acceleration in ((0.0, None), (math.nan, None), (0.5, -1.0), (0.5, math.inf)):
+        with pytest.raises(InputError, match="above 0"):
+            Bounds(arm.limits, speed, acceleration)
+    for coefficients, a, j in ((np.ones(3), 1.0, 1.0), (np.zeros(5), 1.0, 1.0)):
+        with pytest.raises(InputError):
+            Scaling(coefficients, a, j)
+    for a, j in ((0.0, 1.0), (1.0, -1.0), (math.nan, 1.0)):
+        with pytest.raises(InputError):
+            Scaling(np.ones(5), a, j)

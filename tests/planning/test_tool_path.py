@@ -1,0 +1,273 @@
+"""Tool paths: the tool is on the curve, exactly and everywhere, or the path is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.control.arm import Arm
+from app.errors import InputError
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.kinematics.arm import arm_of
+from app.kinematics.branch import BRANCHES, Branch, branch_of
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.projection import project
+from app.kinematics.tool import ToolTarget
+from app.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolScrew
+from app.planning.jet import Jet
+from app.planning.path import Path, joint_derivatives, point_derivatives
+from app.planning.pitch import roomiest
+from app.planning.tool_path import ToolPath
+from tests.kinematics.family import random_member
+
+FRONT_UP = Branch("front", "up")
+
+
+def q_at(path: Path, sigma: float) -> FloatArray:
+    return np.array([each.c0 for each in path.joints(Jet.variable(sigma))])
+
+
+def test_the_paper_s_circle_is_a_circle_to_a_trillionth_of_a_millimetre(
+    arm: Arm, paths: dict[str, Path]
+) -> None:
+    path, chain = paths["circle"], arm.chain_to("flange")
+    for number in range(2001):
+        angle = math.tau * number / 2000
+        x, y, z = forward(chain, q_at(path, number / 2000))[:3, 3]
+        wanted = 0.15, -0.1 * math.sin(angle), -0.11 + 0.1 * math.cos(angle)
+        assert math.dist((x, y, z), wanted) < 1e-15
+        assert abs(math.hypot(y, z + 0.11) - 0.1) < 1e-15
+
+
+def test_its_pitch_stays_and_its_end_is_its_start(arm: Arm, paths: dict[str, Path]) -> None:
+    path, chain = paths["circle"], arm.chain_to("flange")
+    for sigma in np.linspace(0.0, 1.0, 50).tolist():
+        target = ToolTarget.at(chain, q_at(path, sigma))
+        assert target.pitch == pytest.approx(math.radians(99.0), abs=1e-15)
+        assert target.roll == 0.0
+    assert path.end == pytest.approx(path.start, abs=1e-14)
+
+
+@pytest.mark.parametrize("tool", ["flange", "grasp", "tcp"])
+def test_a_pitch_that_follows_the_circle_leaves_more_room(
+    arm: Arm, circle: ToolArc, tool: str
+) -> None:
+    """At a constant pitch only the flange gets round, and by 11.9 deg."""
+    chain = arm.chain_to(tool)
+    arc = roomiest(chain, FRONT_UP, circle)
+    q = joint_derivatives(ToolPath(chain, arc, FRONT_UP, np.zeros(5)), np.linspace(0, 1, 500))[0]
+    room = np.minimum(q - chain.lower, chain.upper - q).min()
+    assert room > math.radians({"flange": 28.7, "grasp": 13.9, "tcp": 3.5}[tool])
+    if tool != "flange":
+        with pytest.raises(InputError, match="along it"):
+            ToolPath(chain, circle, FRONT_UP, np.zeros(5))
+
+
+def test_an_arc_no_pitch_makes_possible_is_refused(arm: Arm, circle: ToolArc) -> None:
+    with pytest.raises(InputError, match="No pitch"):
+        roomiest(arm.chain, FRONT_UP, replace(circle, start=np.array([0.15, 0.0, 0.9])))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_lines_of_any_member_are_straight_and_keep_their_branch(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    chain, offsets = random_member(rng)
+    q = rng.uniform(-2.5, 2.5, 5)
+    start, branch = ToolTarget.at(chain, q), branch_of(chain, q)
+    step = 0.1 * offsets.size * rng.normal(size=3)
+    end = ToolTarget(start.position + step, start.pitch + 0.2, start.roll - 0.3)
+    try:
+        path = ToolPath(chain, ToolLine(start, end), branch, q)
+    except InputError:
+        return
+    assert path.start == pytest.approx(q, abs=1e-7)
+    for sigma in rng.uniform(size=4).tolist():
+        found = q_at(path, sigma)
+        wanted, there = start.towards(end, sigma), ToolTarget.at(chain, found)
+        assert there.position == pytest.approx(wanted.position, abs=1e-12)
+        assert math.remainder(there.pitch - wanted.pitch, math.tau) == pytest.approx(0.0, abs=1e-12)
+        assert math.remainder(there.roll - wanted.roll, math.tau) == pytest.approx(0.0, abs=1e-12)
+        assert branch_of(chain, found) == branch
+        assert chain.within_limits(found)
+
+
+@pytest.mark.parametrize("name", ["circle", "line", "pour", "joints", "via"])
+def test_derivatives_are_those_of_differences(paths: dict[str, Path], name: str) -> None:
+    path, h = paths[name], 1e-4
+    joins = (0.0, *path.joins, 1.0)
+    for low, high in pairwise(joins):
+        at = np.linspace(low + 2 * h, high - 2 * h, 9)
+        for derivatives in (joint_derivatives, point_derivatives):
+            before, here, after = (derivatives(path, at + step) for step in (-h, 0.0, h))
+            for order in range(3):
+                measured = (after[order] - before[order]) / (2.0 * h)
+                scale = np.abs(here[order + 1]).max() + 1.0
+                assert measured == pytest.approx(here[order + 1], abs=3e-5 * scale)
+
+
+@pytest.mark.parametrize("name", ["circle", "line", "pour", "joints", "via"])
+def test_one_place_and_many_agree(paths: dict[str, Path], name: str) -> None:
+    at = np.linspace(0.0, 1.0, 23)
+    many = joint_derivatives(paths[name], at)[0]
+    for sigma, q in zip(at.tolist(), many, strict=True):
+        assert q_at(paths[name], sigma) == pytest.approx(q, abs=1e-14)
+
+
+def straight(chain: Chain, q: FloatArray, step: tuple[float, float, float]) -> ToolPath:
+    at = ToolTarget.at(chain, q)
+    line = ToolLine(at, ToolTarget(at.position + step, at.pitch, at.roll))
+    return ToolPath(chain, line, branch_of(chain, q), q)
+
+
+def test_a_line_out_of_reach_is_refused_where_it_leaves(arm: Arm, ready: FloatArray) -> None:
+    with pytest.raises(
+        InputError, match=r"leaves what the arm reaches.* (\d+\.\d) % along"
+    ) as told:
+        straight(arm.chain, ready, (0.6, 0.0, 0.0))
+    share = float(str(told.value).split(" % along")[0].split()[-1]) / 100.0
+    straight(arm.chain, ready, (0.6 * (share - 0.01), 0.0, 0.0))
+    with pytest.raises(InputError, match="reach"):
+        straight(arm.chain, ready, (0.6 * (share + 0.01), 0.0, 0.0))
+
+
+def test_a_line_over_a_limit_names_it(arm: Arm, ready: FloatArray) -> None:
+    at = ToolTarget.at(arm.chain, ready)
+    line = ToolLine(at, ToolTarget(at.position, at.pitch, 4.0))
+    with pytest.raises(InputError, match=r"axis 5 over its limit of 171.5 deg 74\.8 % along"):
+        ToolPath(arm.chain, line, FRONT_UP, ready)
+
+
+def test_a_limit_touched_between_two_places_is_found(arm: Arm, circle: ToolArc) -> None:
+    """The limit is set just below the peak that axis 2 has somewhere between the places."""
+    chain = arm.chain_to("flange")
+    dense = np.linspace(0.0, 1.0, 100001)
+    q = joint_derivatives(ToolPath(chain, circle, FRONT_UP, np.zeros(5)), dense)[0]
+    for axis in (1, 3):
+        for gap, refused in ((1e-8, True), (-1e-8, False)):
+            upper = np.array(chain.upper)
+            upper[axis] = q[:, axis].max() - gap
+            other = replace(chain, upper=upper)
+            if refused:
+                with pytest.raises(InputError, match=f"axis {axis + 1} over its limit"):
+                    ToolPath(other, circle, FRONT_UP, np.zeros(5))
+            else:
+                ToolPath(other, circle, FRONT_UP, np.zeros(5))
+
+
+def test_a_line_through_axis_1_is_refused(arm: Arm) -> None:
+    q = np.radians((0.0, -110.0, 100.0, 60.0, 0.0))
+    x = float(forward(arm.chain, q)[0, 3])
+    with pytest.raises(InputError, match="along it"):
+        straight(arm.chain, q, (-2.0 * x, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("beyond", [1e-7, -1e-12])
+def test_a_curve_that_only_grazes_the_reach_is_refused(arm: Arm, beyond: float) -> None:
+    """Between two of the places that are looked at the arm is stretched, or would have to be."""
+    chain, canonical = arm.chain, arm_of(arm.chain)
+    radius = canonical.l1 + canonical.l2 + canonical.l3 - 0.1 + beyond
+    level, centre = Linear(0.0, 0.0), np.array([0.1, 0.0, 0.0])
+    start = centre + radius * np.array([math.cos(0.7), -math.sin(0.7), 0.0])
+    arc = ToolArc(start, centre, np.array([0.0, 0.0, 1.0]), 1.4031, level, level)
+    with pytest.raises(InputError, match=r"\(631.8, .*links come in line"):
+        ToolPath(chain, arc, FRONT_UP, np.zeros(5))
+    nearer = replace(arc, start=centre + (1.0 - 2e-3) * (start - centre))
+    ToolPath(chain, nearer, FRONT_UP, np.zeros(5))
+
+
+TWISTS = {
+    "about axis 1": (0.0, 0.0, 0.8, 0.0, 0.0, 0.0),
+    "upwards": (0.0, 0.0, 0.0, 0.0, 0.0, 0.1),
+    "climbing": (0.0, 0.0, 0.8, 0.0, 0.0, 0.1),
+}
+
+
+@pytest.mark.parametrize("name", TWISTS)
+def test_a_screw_five_axes_can_follow_is_followed_in_all_six(
+    arm: Arm, ready: FloatArray, name: str
+) -> None:
+    twist = np.array(TWISTS[name])
+    q = ready + np.array([0.2, 0.1, 0.0, 0.1, 0.4])
+    screw = ToolScrew(arm.chain, FRONT_UP, q, twist)
+    path, T = ToolPath(arm.chain, screw, FRONT_UP, q), forward(arm.chain, q)
+    for sigma in np.linspace(0.0, 1.0, 7).tolist():
+        wanted = se3.exp(twist * sigma) @ T
+        assert forward(arm.chain, q_at(path, sigma)) == pytest.approx(wanted, abs=1e-13)
+
+
+def test_any_screw_keeps_the_point_and_turns_as_near_as_the_arm_can(
+    arm: Arm, ready: FloatArray
+) -> None:
+    rng, chain, followed = np.random.default_rng(5), arm.chain, 0
+    for _ in range(16):
+        q = ready + rng.uniform(-0.2, 0.2, 5)
+        T = forward(chain, q)
+        turn = np.concatenate((0.4 * rng.normal(size=3), 0.03 * rng.normal(size=3)))
+        twist = np.concatenate((turn[:3], turn[3:] - np.cross(turn[:3], T[:3, 3])))
+        try:
+            path = ToolPath(chain, ToolScrew(chain, FRONT_UP, q, twist), FRONT_UP, q)
+        except InputError:
+            continue
+        followed += 1
+        for sigma in (0.0, 0.5, 1.0):
+            wanted = se3.exp(twist * sigma) @ T
+            best = project(chain, wanted, branch=FRONT_UP, q_hint=q)
+            assert q_at(path, sigma) == pytest.approx(best.q, abs=1e-7)
+            assert math.dist(forward(chain, q_at(path, sigma))[:3, 3], wanted[:3, 3]) < 1e-14
+    assert followed >= 8
+
+
+def test_a_screw_of_a_tool_beside_the_roll_axis_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    chain = next(c for c, _ in (random_member(rng) for _ in range(50)) if arm_of(c).off_axis == 0.0)
+    M = chain.M @ se3.from_rotation_translation(np.eye(3), (0.02, 0.03, 0.04))
+    with pytest.raises(InputError, match="beside it"):
+        ToolScrew(chain.with_tool(M), FRONT_UP, np.zeros(5), np.ones(6))
+
+
+def test_a_tool_beside_the_roll_axis_follows_lines_exactly() -> None:
+    rng, followed = np.random.default_rng(3), 0
+    for _ in range(20):
+        chain, _ = random_member(rng, lateral=True)
+        M = chain.M @ se3.from_rotation_translation(np.eye(3), rng.normal(size=3) * 0.02)
+        chain = chain.with_tool(M)
+        q = rng.uniform(-2.0, 2.0, 5)
+        start = ToolTarget.at(chain, q)
+        end = ToolTarget(start.position + 0.02 * rng.normal(size=3), start.pitch, start.roll + 0.2)
+        for branch in BRANCHES:
+            try:
+                path = ToolPath(chain, ToolLine(start, end), branch, q)
+            except InputError:
+                continue
+            followed += 1
+            for sigma in (0.0, 0.6):
+                found = ToolTarget.at(chain, q_at(path, sigma)).position
+                assert found == pytest.approx(start.towards(end, sigma).position, abs=1e-12)
+    assert followed > 20
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_numbers_that_are_none_are_refused(arm: Arm, ready: FloatArray, bad: float) -> None:
+    at = ToolTarget.at(arm.chain, ready)
+    still = Linear(0.0, 0.0)
+    for wrong in (
+        lambda: ToolLine(at, ToolTarget(at.position, bad, 0.0)),
+        lambda: ToolArc(at.position, np.zeros(3), np.array([0.0, bad, 0.0]), 1.0, still, still),
+        lambda: ToolArc(at.position, np.zeros(3), np.ones(3), bad, still, still),
+        lambda: ToolArc(at.position, np.zeros(3), np.zeros(3), 1.0, still, still),
+        lambda: ToolScrew(arm.chain, FRONT_UP, ready, np.full(6, bad)),
+        lambda: Linear(bad, 0.0),
+        lambda: Swing(0.0, bad, 0.0, 0.0, 1.0),
+        lambda: ToolPath(arm.chain, ToolLine(at, at), FRONT_UP, np.full(5, bad)),
+    ):
+        with pytest.raises(InputError):
+            wrong()
