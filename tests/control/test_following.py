@@ -160,7 +160,7 @@ def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
     """Pauses, ways back, stops at any place and changes of speed, at any time."""
     random = np.random.default_rng(11)
     commands: dict[int, list[cmd.Command]] = {0: [cmd.Follow(poured)]}
-    for tick in np.cumsum(random.integers(5, 90, 60)).tolist():
+    for tick in np.cumsum(random.integers(5, 90, 40)).tolist():
         commands[tick] = [
             (
                 cmd.Pause(),
@@ -174,7 +174,7 @@ def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
     last = max(commands)
     commands[last + 1] = [cmd.Resume(), cmd.SpeedScale(1.0), cmd.GoAlong(1.0)]
     start = session.begin(poured.start, 0.0, 0.0)
-    states = trace(session, start, commands, last + 1500)
+    states = trace(session, start, commands, last + 1100)
     assert states[-1].setpoint == pytest.approx(poured.end, abs=0.0)
     assert not states[-1].moving
     assert off_path(states, poured) <= 1e-15
@@ -275,7 +275,7 @@ def test_any_other_motion_ends_it_inside_the_limits(
 def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.Settle()]
-    states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 1200)
+    states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 900)
     assert (states[-1].setpoint == poured.end).all()
     assert states[-1].gripper_setpoint == 0.2
     assert off_path(states, poured) <= 1e-15
@@ -333,7 +333,7 @@ def test_a_stop_beside_the_cup_keeps_clear_of_it(
     start = guarded.begin(LOW, 0.0, 0.0)
     states = run(guarded, start, [cmd.Follow(round_cup)])
     along = 0
-    for at in range(60, len(states) - 40, 8):
+    for at in range(60, len(states) - 40, 12):
         halted = run(guarded, states[at], [cmd.Stop()])
         along += halted[0].following is not None
         assert min(clearance(world, each) for each in halted) >= STOP - SLIGHTLY
