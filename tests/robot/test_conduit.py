@@ -31,7 +31,7 @@ def test_it_leaves_one_fitting_and_arrives_at_the_other(model: RobotModel, numbe
     for angle in np.linspace(hinge.lower, hinge.upper, 13):
         urdf.update_cfg({hinge.joint: angle})
         T = urdf.get_transform(stretch.end.link, stretch.start.link)
-        points, tangents = stretch.course(float(angle), DENSE)
+        (points,), (tangents,) = stretch.courses([angle], DENSE)
         end = T[:3, :3] @ stretch.end.point + T[:3, 3]
         assert np.linalg.norm(points[0] - stretch.start.point) < 2e-3
         assert np.linalg.norm(points[-1] - end) < 2e-3
@@ -45,7 +45,7 @@ def test_it_is_as_long_as_it_is_and_never_leaps(model: RobotModel, number: int) 
     stretch = model.stretches[number]
     before = None
     for angle in np.linspace(stretch.hinge.lower, stretch.hinge.upper, 400):
-        points, _ = stretch.course(float(angle), DENSE)
+        (points,), _ = stretch.courses([angle], DENSE)
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         length = steps.sum() * DENSE / (DENSE - 1)
         # Round axis 1 it is drawn out, as a spiral is; elsewhere it only hangs.
