@@ -33,6 +33,13 @@ HALVINGS = 24
 """Of the way the middle may bulge: to less than a micrometre."""
 
 
+EASE = 6.0
+"""How sharply a slack curve becomes a taut one: the length is a norm of both, of this order."""
+
+GIVE = 0.25
+"""Share of its length by which a conduit with ribs can be drawn out or pushed together."""
+
+
 @dataclass(frozen=True, eq=False)
 class End:
     """Where a stretch is held: point (3,) [m] and unit tangent (3,) in the frame of a link."""
@@ -61,8 +68,9 @@ class Hinge(NamedTuple):
 class Stretch:
     """One free run of conduit.
 
-    start, end: its ends; the tangents lead from the first to the second. radius, length: [m].
-    hinge: between the two links. winds: whether the conduit lies about the axis of that.
+    start, end: its ends; the tangents lead from the first to the second. radius, length: [m], the
+    length at rest. hinge: between the two links. winds: whether the conduit lies about the axis of
+    that, where its ribs are pushed together and drawn apart, by no more than GIVE.
     """
 
     start: End
@@ -140,7 +148,8 @@ class Stretch:
         first[:, 1] *= mean
         last[:, 1] *= mean
         outward = np.broadcast_to((1.0, 0.0, 0.0), first.shape)
-        return rolled(_of_length(self.length, first, a_lead, last, b_lead, outward, rolled))
+        least = (1.0 - GIVE) * self.length
+        return rolled(_of_length(least, first, a_lead, last, b_lead, outward, rolled))
 
 
 ZERO = np.zeros(3)
@@ -157,13 +166,20 @@ def _of_length(
 ) -> FloatArray:
     """Curves (A, n, 3) from p to q whose middle bulges outward so far that they are as long.
 
+    One that would be taut is drawn out a little before it is, or its belly would vanish at a snap.
     shown: maps the curves to where their length is measured.
     """
-    low, high = np.zeros(len(p)), np.full(len(p), length)
+
+    def long(bulge: FloatArray) -> FloatArray:
+        curve = shown(_arch(p, a, q, b, bulge[:, None] * outward))
+        return np.asarray(np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1))
+
+    taut = long(np.zeros(len(p)))
+    wanted = (taut**EASE + length**EASE) ** (1.0 / EASE)
+    low, high = np.zeros(len(p)), wanted
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        curve = shown(_arch(p, a, q, b, middle[:, None] * outward))
-        short = np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1) < length
+        short = long(middle) < wanted
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return _arch(p, a, q, b, low[:, None] * outward)
 
