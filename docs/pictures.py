@@ -57,7 +57,7 @@ POSES = {
 }
 """[degrees] Of the gallery."""
 
-BACK = Camera((-0.85, 0.75, 0.55), (0.1, 0.0, 0.28))
+BACK = Camera((-1.24, 0.98, 0.71), (0.0, 0.0, 0.36))
 """The sixth view; the others are the panel's."""
 
 TILE = (880, 800)
