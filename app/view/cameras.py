@@ -37,13 +37,13 @@ class Preset(Enum):
 
 
 LOOKS = {
-    Preset.FREE: Look((1.08, -1.1, 0.86), (0.0, 0.0, 0.36)),
+    Preset.FREE: Look((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
     Preset.FRONT: Look((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
     Preset.SIDE: Look((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
     # Not from straight above: a camera that looks along up has no up.
     Preset.TOP: Look((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
 }
-"""As near as all of the arm is in the picture, however it is posed."""
+"""As near as all of the arm is in the picture, however it is posed; in the first, cup and basin too."""
 
 BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
 """[m] Where the camera rides on the tool, and how far ahead of the tool point it looks."""
