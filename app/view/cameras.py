@@ -43,7 +43,7 @@ LOOKS = {
     # Not from straight above: a camera that looks along up has no up.
     Preset.TOP: Look((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
 }
-"""As near as all of the arm is in the picture, however it is posed; in the first, cup and basin too."""
+"""As near as all of the arm is in the picture, however it is posed; cup and basin in the first."""
 
 BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
 """[m] Where the camera rides on the tool, and how far ahead of the tool point it looks."""
