@@ -11,7 +11,7 @@ import imageio.v3 as imageio
 import numpy as np
 from numpy.typing import NDArray
 
-from app.view.cameras import Preset
+from app.view.cameras import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
 from tests.browser.server import AppServer
@@ -57,7 +57,7 @@ POSES = {
 }
 """[degrees] Of the gallery."""
 
-BACK = Camera((-0.85, 0.75, 0.55), (0.1, 0.0, 0.28))
+BACK = Camera((-1.24, 0.98, 0.71), (0.0, 0.0, 0.36))
 """The sixth view; the others are the panel's."""
 
 TILE = (880, 800)
@@ -101,7 +101,7 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
 
 
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
-    app: Camera((0.98, -0.82, 0.62), (0.17, 0.0, 0.25), math.radians(40.0)),
+    app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }

@@ -143,6 +143,21 @@ def to_quaternion(R: FloatArray) -> FloatArray:
     return -q if q[0] < 0.0 else q
 
 
+def quaternion_product(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
+    """(w, x, y, z) (..., 4) of products of quaternions (..., 4): turns as `q`, then as `p`."""
+    a, b, c, d = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    return np.stack(
+        (
+            a * w - b * x - c * y - d * z,
+            a * x + b * w + c * z - d * y,
+            a * y - b * z + c * w + d * x,
+            a * z + b * y - c * x + d * w,
+        ),
+        axis=-1,
+    )
+
+
 def validated(R: npt.ArrayLike, name: str = "The rotation") -> FloatArray:
     """The rotation nearest to `R` (3, 3), as a copy.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +31,13 @@ FULLNESS = 1.15
 
 HALVINGS = 24
 """Of the way the middle may bulge: to less than a micrometre."""
+
+
+EASE = 6.0
+"""How sharply a slack curve becomes a taut one: the length is a norm of both, of this order."""
+
+GIVE = 0.25
+"""Share of its length by which a conduit with ribs can be drawn out or pushed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +68,9 @@ class Hinge(NamedTuple):
 class Stretch:
     """One free run of conduit.
 
-    start, end: its ends; the tangents lead from the first to the second. radius, length: [m].
-    hinge: between the two links. winds: whether the conduit lies about the axis of that.
+    start, end: its ends; the tangents lead from the first to the second. radius, length: [m], the
+    length at rest. hinge: between the two links. winds: whether the conduit lies about the axis of
+    that, where its ribs are pushed together and drawn apart, by no more than GIVE.
     """
 
     start: End
@@ -72,40 +80,46 @@ class Stretch:
     hinge: Hinge
     winds: bool
 
-    def course(self, angle: float, count: int) -> tuple[FloatArray, FloatArray]:
-        """``count`` points (n, 3) [m] evenly along it and unit tangents (n, 3), joint at ``angle``.
+    @property
+    def angles(self) -> FloatArray:
+        """(ANGLES,) [rad] of its joint that it is worked out for; in between it is led linearly."""
+        return np.linspace(self.hinge.lower, self.hinge.upper, ANGLES)
 
-        In the frame of the first end's link.
+    def between(self, angle: float) -> tuple[int, float]:
+        """The number of the last of ``angles`` before ``angle`` [rad], and the share beyond it."""
+        lower, upper = self.hinge.lower, self.hinge.upper
+        row = (min(max(angle, lower), upper) - lower) / (upper - lower) * (ANGLES - 1)
+        low = min(int(row), ANGLES - 2)
+        return low, row - low
+
+    def courses(self, angles: Iterable[float], count: int) -> tuple[FloatArray, FloatArray]:
+        """``count`` points (A, n, 3) [m] evenly along it and unit tangents (A, n, 3).
+
+        With its joint at each of the A ``angles`` [rad]; in the frame of the first end's link.
         """
-        curves, angles = self._curves
-        at = float(np.clip((angle - angles[0]) / (angles[1] - angles[0]), 0.0, len(angles) - 1.0))
-        low = min(int(at), len(angles) - 2)
-        curve = curves[low] + (at - low) * (curves[low + 1] - curves[low])
-        spots = np.linspace(0.0, len(curve) - 1.0, 2 * count + 1)[1::2]
-        index = np.minimum(spots.astype(int), len(curve) - 2)
-        steps = curve[1:] - curve[:-1]
-        points = curve[index] + (spots - index)[:, None] * steps[index]
+        rows = np.array([sum(self.between(angle)) for angle in angles])
+        curves = _between(self._curves, rows, 0)
+        spots = np.linspace(0.0, curves.shape[1] - 1.0, 2 * count + 1)[1::2]
+        steps = np.diff(curves, axis=1)
         # Between the middles of pieces, or the ribs would stand on edge where pieces meet.
-        leading = np.stack(
-            [np.interp(spots - 0.5, np.arange(len(steps)), steps[:, k]) for k in range(3)], axis=1
-        )
-        return points, leading / np.linalg.norm(leading, axis=1, keepdims=True)
+        leading = _between(steps, np.clip(spots - 0.5, 0.0, steps.shape[1] - 1.0), 1)
+        leading /= np.linalg.norm(leading, axis=2, keepdims=True)
+        return _between(curves, spots, 1), leading
 
     @cached_property
-    def _curves(self) -> tuple[FloatArray, FloatArray]:
-        """(ANGLES, n, 3) points evenly along the conduit, and the ANGLES they are for."""
-        hinge = self.hinge
-        angles = np.linspace(hinge.lower, hinge.upper, ANGLES)
+    def _curves(self) -> FloatArray:
+        """(ANGLES, n, 3) points evenly along the conduit, for each of its angles."""
+        hinge, angles = self.hinge, self.angles
         turns = [se3.from_rotation_translation(so3.exp(hinge.axis * a), ZERO) for a in angles]
         T = hinge.T_start_joint @ np.array(turns) @ hinge.T_joint_end
         q = T[:, :3, :3] @ self.end.point + T[:, :3, 3]
         b = T[:, :3, :3] @ self.end.tangent
         p, a = (np.broadcast_to(v, q.shape) for v in (self.start.point, self.start.tangent))
         if self.winds:
-            return _even(self._wound(p, a, q, b, angles)), angles
+            return _even(self._wound(p, a, q, b, angles))
         chord = q - p
         outward = _across(a - b, chord)
-        return _even(_of_length(self.length, p, a, q, b, outward, lambda curve: curve)), angles
+        return _even(_of_length(self.length, p, a, q, b, outward, lambda curve: curve))
 
     def _wound(
         self, p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray, angles: FloatArray
@@ -134,7 +148,8 @@ class Stretch:
         first[:, 1] *= mean
         last[:, 1] *= mean
         outward = np.broadcast_to((1.0, 0.0, 0.0), first.shape)
-        return rolled(_of_length(self.length, first, a_lead, last, b_lead, outward, rolled))
+        least = (1.0 - GIVE) * self.length
+        return rolled(_of_length(least, first, a_lead, last, b_lead, outward, rolled))
 
 
 ZERO = np.zeros(3)
@@ -151,13 +166,20 @@ def _of_length(
 ) -> FloatArray:
     """Curves (A, n, 3) from p to q whose middle bulges outward so far that they are as long.
 
+    One that would be taut is drawn out a little before it is, or its belly would vanish at a snap.
     shown: maps the curves to where their length is measured.
     """
-    low, high = np.zeros(len(p)), np.full(len(p), length)
+
+    def long(bulge: FloatArray) -> FloatArray:
+        curve = shown(_arch(p, a, q, b, bulge[:, None] * outward))
+        return np.asarray(np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1))
+
+    taut = long(np.zeros(len(p)))
+    wanted = (taut**EASE + length**EASE) ** (1.0 / EASE)
+    low, high = np.zeros(len(p)), wanted
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        curve = shown(_arch(p, a, q, b, middle[:, None] * outward))
-        short = np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1) < length
+        short = long(middle) < wanted
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return _arch(p, a, q, b, low[:, None] * outward)
 
@@ -197,6 +219,14 @@ def _even(curves: FloatArray) -> FloatArray:
         for k in range(3):
             even[:, k] = np.interp(spots, along, curve[:, k])
     return result
+
+
+def _between(rows: FloatArray, spots: FloatArray, axis: int) -> FloatArray:
+    """What ``rows`` come to at ``spots`` (n,), which count them along ``axis`` from 0."""
+    low = np.minimum(spots.astype(int), rows.shape[axis] - 2)
+    share = np.expand_dims(spots - low, (1, 2) if axis == 0 else (0, 2))
+    first, second = rows.take(low, axis), rows.take(low + 1, axis)
+    return np.asarray(first + share * (second - first))
 
 
 def _across(v: FloatArray, chord: FloatArray) -> FloatArray:

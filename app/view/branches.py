@@ -6,6 +6,7 @@ stand, to be clicked.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from html import escape
@@ -25,6 +26,10 @@ COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (2
 """One for each of BRANCHES, told apart by people of every kind of sight; the table has them too."""
 
 OPACITY = 0.25
+
+INTERVAL = 1.0
+"""[s] Between two looks at the branches while the arm moves and none is shown: a look costs more
+than several pictures."""
 
 Find = Callable[[State], tuple[Choice, ...]]
 """The choice on each of BRANCHES."""
@@ -49,6 +54,7 @@ class BranchList:
         self._model = model
         self._listen = listen
         self._seen = state
+        self._seen_at = -math.inf
         self._ghosts: list[GhostNodes] = []
         # The box is ticked in a thread of viser's.
         self._lock = threading.Lock()
@@ -66,11 +72,16 @@ class BranchList:
             )
             listen(button, lambda branch=branch: TakeBranch(branch))  # type: ignore[misc]
 
-    def follow(self, state: State) -> None:
-        """Show what the branches come to from ``state``."""
-        if state is not self._seen:
-            self._seen = state
-            self._show()
+    def follow(self, state: State, now: float) -> None:
+        """Show what the branches come to from ``state`` at time ``now`` [s].
+
+        At once when the arm is at rest or a person watches the ghosts; else after INTERVAL.
+        """
+        watched = self._box.value or not state.moving
+        if state is self._seen or not (watched or now - self._seen_at >= INTERVAL):
+            return
+        self._seen, self._seen_at = state, now
+        self._show()
 
     def _show(self) -> None:
         with self._lock:

@@ -37,12 +37,13 @@ class Preset(Enum):
 
 
 LOOKS = {
-    Preset.FREE: Look((0.98, -0.82, 0.62), (0.17, 0.0, 0.25)),
-    Preset.FRONT: Look((1.55, 0.0, 0.42), (0.0, 0.0, 0.33)),
-    Preset.SIDE: Look((0.2, -1.4, 0.38), (0.2, 0.0, 0.33)),
+    Preset.FREE: Look((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
+    Preset.FRONT: Look((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
+    Preset.SIDE: Look((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
     # Not from straight above: a camera that looks along up has no up.
-    Preset.TOP: Look((0.2, -0.01, 1.75), (0.2, 0.0, 0.2)),
+    Preset.TOP: Look((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
 }
+"""As near as all of the arm is in the picture, however it is posed; cup and basin in the first."""
 
 BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
 """[m] Where the camera rides on the tool, and how far ahead of the tool point it looks."""

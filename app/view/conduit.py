@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import viser
 
+from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.robot.conduit import Stretch
 from app.robot.model import RobotModel
+from app.view.posing import arrange
 from app.view.scene import ArmNodes, Colour
+
+Floats = npt.NDArray[np.float32]
 
 RUBBER: Colour = (4, 4, 5)
 """Of light, not of sRGB as elsewhere: so viser takes the colours of instances."""
@@ -32,56 +35,75 @@ ANGLE_WORTH_SENDING = 2e-3
 """[rad] Moves a rib by less than a third of a millimetre."""
 
 
-@dataclass
 class _Hung:
-    """A stretch as it is drawn: in how many rings, and for which angle [rad]."""
+    """A stretch as it is drawn: the poses of its rings for a row of angles, and the one shown."""
 
-    stretch: Stretch
-    count: int
-    node: viser.BatchedMeshHandle
-    angle: float = 0.0
+    def __init__(self, server: viser.ViserServer, stretch: Stretch, path: str) -> None:
+        """``path``: of its node in the scene."""
+        self.stretch = stretch
+        self._poses = poses(stretch, round(stretch.length / PITCH))
+        self._steps = np.diff(self._poses, axis=0)
+        self._shown = 0.0
+        rings = self._at(0.0)
+        self._node = server.scene.add_batched_meshes_simple(
+            path,
+            *ring(stretch.radius),
+            rings[:, :4],
+            rings[:, 4:],
+            batched_colors=RUBBER,
+            lod="off",
+        )
+
+    def bend(self, angle: float) -> None:
+        """Bend it to the ``angle`` [rad] of its joint."""
+        if abs(angle - self._shown) > ANGLE_WORTH_SENDING:
+            self._shown = angle
+            rings = self._at(angle)
+            arrange(self._node, rings[:, :4], rings[:, 4:])
+
+    def _at(self, angle: float) -> Floats:
+        """(count, 7) the rings' poses in between those worked out."""
+        low, share = self.stretch.between(angle)
+        rings: Floats = self._poses[low] + np.float32(share) * self._steps[low]
+        return rings
 
 
 class Conduits:
     """Hang below the links they start from; sent anew only when the joint between has moved."""
 
     def __init__(self, server: viser.ViserServer, model: RobotModel, arm: ArmNodes) -> None:
-        self._hung: list[_Hung] = []
-        for number, stretch in enumerate(model.stretches):
-            count = round(stretch.length / PITCH)
-            wxyzs, positions = _placed(stretch, 0.0, count)
-            vertices, faces = ring(stretch.radius)
-            node = server.scene.add_batched_meshes_simple(
-                f"{arm.path[stretch.start.link]}/conduit{number}",
-                vertices,
-                faces,
-                wxyzs,
-                positions,
-                batched_colors=RUBBER,
-                lod="off",
-            )
-            self._hung.append(_Hung(stretch, count, node))
+        self._hung = [
+            _Hung(server, stretch, f"{arm.path[stretch.start.link]}/conduit{number}")
+            for number, stretch in enumerate(model.stretches)
+        ]
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Bend it to the joint ``angles`` [rad]."""
         for hung in self._hung:
-            angle = angles[hung.stretch.hinge.joint]
-            if abs(angle - hung.angle) > ANGLE_WORTH_SENDING:
-                hung.angle = angle
-                wxyzs, positions = _placed(hung.stretch, angle, hung.count)
-                hung.node.batched_wxyzs, hung.node.batched_positions = wxyzs, positions
+            hung.bend(angles[hung.stretch.hinge.joint])
 
 
-def _placed(
-    stretch: Stretch, angle: float, count: int
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """(count, 4) wxyz and (count, 3) positions of the rings: the shortest turn of x onto each."""
-    points, t = stretch.course(angle, count)
-    wxyz = np.stack((1.0 + t[:, 0], np.zeros(count), -t[:, 2], t[:, 1]), axis=1)
-    # Straight back along x every half turn across it will do.
+def poses(stretch: Stretch, count: int) -> Floats:
+    """(A, count, 7) wxyz and position [m] of the rings for each of its angles.
+
+    From angle to angle every ring turns the shortest way, so that a pose in between is to be had
+    by leading all seven numbers linearly: its quaternion is then of length 1 to a thousandth.
+    """
+    points, tangents = stretch.courses(stretch.angles, count)
+    wxyz = np.empty((*tangents.shape[:2], 4))
+    wxyz[0] = _shortest_turn(np.broadcast_to((1.0, 0.0, 0.0), tangents[0].shape), tangents[0])
+    for before in range(len(tangents) - 1):
+        turned = _shortest_turn(tangents[before], tangents[before + 1])
+        wxyz[before + 1] = so3.quaternion_product(turned, wxyz[before])
+    return np.concatenate((wxyz, points), axis=2, dtype=np.float32)
+
+
+def _shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
+    """wxyz (n, 4) of the turns of the unit vectors ``a`` onto ``b``, both (n, 3)."""
+    wxyz = np.column_stack((1.0 + (a * b).sum(axis=1), np.cross(a, b)))
+    # Straight back, as from x only: of the half turns that will do, the one about z.
     wxyz[wxyz[:, 0] < BACKWARD] = (0.0, 0.0, 0.0, 1.0)
-    wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
-    return wxyz.astype(np.float32), points.astype(np.float32)
+    return np.asarray(wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True))
 
 
 BACKWARD = 1e-9

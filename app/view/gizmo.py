@@ -21,6 +21,7 @@ from app.geometry.arrays import FloatArray
 from app.kinematics.freedoms import pitch_and_roll, pitched_frame
 from app.robot.model import RobotModel
 from app.view.guard import WORKSPACE
+from app.view.posing import Point, Quaternion, place, turn
 
 SIZE = 0.13
 """[m] Length of the arrows: clear of the gripper, within the picture."""
@@ -31,6 +32,9 @@ RINGS = 1.6
 DISTANCE_WORTH_SENDING = 1e-6
 """[m]"""
 
+TURN_WORTH_SENDING = 1e-7
+"""Of each number of a quaternion."""
+
 
 @dataclass
 class _Turn:
@@ -40,6 +44,15 @@ class _Turn:
     pitch: float
     roll: float
     turned: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """Where the parts of the handle are when nobody holds them, as viser has it."""
+
+    point: Point
+    pitched: Quaternion
+    rolled: Quaternion
 
 
 class Gizmo:
@@ -58,6 +71,7 @@ class Gizmo:
         self._current = current
         self._held: set[str] = set()
         self._turns: dict[str, _Turn] = {}
+        self._aim = _Aim((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
         bounds = ((-WORKSPACE, WORKSPACE),) * 3
         self._move = server.scene.add_transform_controls(
             "/target/move",
@@ -94,17 +108,24 @@ class Gizmo:
         self._held.clear()
         self._turns.clear()
 
-    def follow(self, state: State, T: FloatArray) -> None:
-        """Go where the goal of ``state`` is, ``T`` (4, 4) in the base frame, unless held."""
-        if not self._held:
-            _place(self._move, T[:3, 3])
+    def aim(self, state: State, T: FloatArray) -> None:
+        """Take in where the goal of ``state`` is, ``T`` (4, 4) in the base frame."""
         chain = self._model.arm.chain_to(state.tool)
         pitched = self._model.T_base_shoulder[:3, :3] @ pitched_frame(chain, state.goal)
+        _, roll = pitch_and_roll(chain, state.goal)
+        x, y, z = T[:3, 3].tolist()
+        rolled = pitched @ so3.rotation_x(roll)
+        self._aim = _Aim((x, y, z), _quaternion(pitched), _quaternion(rolled))
+
+    def follow(self) -> None:
+        """Go where the goal is, but for what is held."""
+        aim = self._aim
+        if not self._held and _apart(self._move.position, aim.point) > DISTANCE_WORTH_SENDING:
+            place(self._move, aim.point)
         if "pitch" not in self._held:
-            _turn(self._pitch, pitched)
+            _turn(self._pitch, aim.pitched)
         if "roll" not in self._held:
-            _, roll = pitch_and_roll(chain, state.goal)
-            _turn(self._roll, pitched @ so3.rotation_x(roll))
+            _turn(self._roll, aim.rolled)
 
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
         if event.phase == "start":
@@ -164,13 +185,16 @@ class Gizmo:
         return turn
 
 
-def _place(handle: viser.TransformControlsHandle, position: FloatArray) -> None:
-    if np.abs(np.asarray(handle.position) - position).max() > DISTANCE_WORTH_SENDING:
-        handle.position = position
+def _turn(handle: viser.TransformControlsHandle, wxyz: Quaternion) -> None:
+    if _apart(handle.wxyz, wxyz) > TURN_WORTH_SENDING:
+        turn(handle, wxyz)
 
 
-def _turn(handle: viser.TransformControlsHandle, R: FloatArray) -> None:
-    wxyz = so3.to_quaternion(R)
-    # q and -q are one rotation.
-    if 1.0 - abs(float(np.dot(handle.wxyz, wxyz))) > 1e-13:
-        handle.wxyz = wxyz
+def _apart(there: FloatArray, here: tuple[float, ...]) -> float:
+    known: list[float] = there.tolist()
+    return max(abs(a - b) for a, b in zip(known, here, strict=True))
+
+
+def _quaternion(R: FloatArray) -> Quaternion:
+    w, x, y, z = so3.to_quaternion(R).tolist()
+    return w, x, y, z

@@ -28,7 +28,7 @@ ANGLE_WORTH_SENDING = 2e-6
 """[deg] Rounding on the way to radians and back is less."""
 
 READOUT_INTERVAL = 0.1
-"""[s] People cannot read numbers that change faster."""
+"""[s] People cannot read numbers that change faster, nor need sliders that do."""
 
 FARTHEST = 1000.0
 """[mm] Beyond any tool point of the arm: what a typed position may hold."""
@@ -118,23 +118,27 @@ class Panel:
         ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
         that an older state never takes a slider out of the hand that moves it.
         """
+        if now - self._told_at < READOUT_INTERVAL:
+            return
+        self._told_at = now
         if caught_up:
-            for slider, angle in zip(self._sliders, state.goal, strict=True):
-                _set(slider, math.degrees(angle))
-            if self._gripper is not None:
-                _set(self._gripper, self._opening(state.gripper_goal))
-            _set(self._speed, 100.0 * state.speed)
-            if self._tool.value != state.tool:
-                self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
-            if self._reading.value != READINGS[state.reading]:
-                self._reading.value = READINGS[state.reading]  # type: ignore[misc]  # likewise
-        if now - self._told_at >= READOUT_INTERVAL or not state.moving:
-            self._told_at = now
-            page = readout.page(self._model, state)
-            if page != self._told:
-                self._told = self._readout.content = page
-            self._branches.follow(state)
-            self._why.follow(ledger)
+            self._set_controls(state)
+        page = readout.page(self._model, state)
+        if page != self._told:
+            self._told = self._readout.content = page
+        self._branches.follow(state, now)
+        self._why.follow(ledger)
+
+    def _set_controls(self, state: State) -> None:
+        for slider, angle in zip(self._sliders, state.goal, strict=True):
+            _set(slider, math.degrees(angle))
+        if self._gripper is not None:
+            _set(self._gripper, self._opening(state.gripper_goal))
+        _set(self._speed, 100.0 * state.speed)
+        if self._tool.value != state.tool:
+            self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
+        if self._reading.value != READINGS[state.reading]:
+            self._reading.value = READINGS[state.reading]  # type: ignore[misc]  # likewise
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
         chain = self._model.arm.chain

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,9 @@ import viser
 
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
-from app.robot.model import Body, RobotModel
+from app.robot.model import RobotModel
 from app.robot.visual import Visual
+from app.view.posing import Quaternion, turn
 
 Colour = tuple[int, int, int]
 """Red, green, blue of 255."""
@@ -20,11 +23,29 @@ Colour = tuple[int, int, int]
 ANGLE_WORTH_SENDING = 1e-7
 """[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
 
-SMALL_FOR_VISER = 1e-4
-"""Of a quaternion: above all that viser leaves unsent, which is 1e-5 of each of its numbers."""
-
 GAP_WORTH_SEEING = 1e-3
 """[m]"""
+
+
+@dataclass
+class _Jointed:
+    """A link that turns, as it was last sent.
+
+    straight, across: its quaternions (4,) at the joint's zero and half a turn on; all others are
+    cos(angle / 2) of the one and sin(angle / 2) of the other. angle: that sent [rad].
+    """
+
+    joint: str
+    frame: viser.FrameHandle
+    straight: list[float]
+    across: list[float]
+    angle: float = math.inf
+
+    def at(self, angle: float) -> Quaternion:
+        """Its turn in its parent with the joint at ``angle`` [rad]."""
+        c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        w, x, y, z = (c * a + s * b for a, b in zip(self.straight, self.across, strict=True))
+        return w, x, y, z
 
 
 class FrameTree:
@@ -35,31 +56,28 @@ class FrameTree:
         self._server = server
         self.root = server.scene.add_frame(root, show_axes=False)
         self.path: dict[str, str] = {}
-        self._joints: list[tuple[str, Body, viser.FrameHandle]] = []
-        self._angles: dict[str, float] = {}
+        self._joints: list[_Jointed] = []
         for body in model.bodies:
             parent = root if body.parent is None else self.path[body.parent]
             self.path[body.name] = f"{parent}/{body.name}"
+            straight = so3.to_quaternion(body.T_parent_body[:3, :3])
             frame = server.scene.add_frame(
                 self.path[body.name],
                 show_axes=False,
-                wxyz=so3.to_quaternion(body.T_parent_body[:3, :3]),
+                wxyz=straight,
                 position=body.T_parent_body[:3, 3],
             )
             if body.joint is not None:
-                self._joints.append((body.joint, body, frame))
+                across = so3.quaternion_product(straight, (0.0, *body.axis))
+                self._joints.append(_Jointed(body.joint, frame, straight.tolist(), across.tolist()))
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Turn the links to the joint ``angles`` [rad]; sends only what changed."""
-        for joint, body, frame in self._joints:
-            angle = angles[joint]
-            if abs(angle - self._angles.get(joint, np.inf)) > ANGLE_WORTH_SENDING:
-                self._angles[joint] = angle
-                R = body.T_parent_body[:3, :3] @ so3.exp(body.axis * angle)
-                wxyz = so3.to_quaternion(R)
-                # viser takes a small turn for none; -q is the same turn as q, and no small change.
-                small = np.abs(wxyz - frame.wxyz).max() < SMALL_FOR_VISER
-                frame.wxyz = -wxyz if small else wxyz
+        for jointed in self._joints:
+            angle = angles[jointed.joint]
+            if abs(angle - jointed.angle) > ANGLE_WORTH_SENDING:
+                jointed.angle = angle
+                turn(jointed.frame, jointed.at(angle))
 
 
 class ArmNodes(FrameTree):

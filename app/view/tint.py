@@ -1,35 +1,50 @@
-"""The parts that are about to touch, coated in a warning colour."""
+"""The parts that are about to touch, links and things alike, coated in a warning colour."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import viser
 
 from app.control.state import Reason, State
+from app.geometry.arrays import frozen
 from app.robot.model import RobotModel
+from app.robot.props import Props
+from app.robot.visual import Visual
 from app.view.scene import surface
 
 
 class Tint:
-    """Coats links in the shapes that stand for them where contacts are looked for."""
+    """Coats links in the shapes that stand for them where contacts are looked for, things in their
+    own."""
 
     COLOUR = (224, 49, 49)
     OPACITY = 0.55
 
     def __init__(
-        self, server: viser.ViserServer, model: RobotModel, path: Mapping[str, str]
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        path: Mapping[str, str],
+        props: Props,
     ) -> None:
-        """``path``: the scene node of each link."""
+        """``path``: the scene node of each link; a thing's is its name."""
         self._server = server
-        self._path = path
-        self._shapes = {body.name: body.collisions for body in model.bodies}
+        self._shapes = {body.name: (path[body.name], body.collisions) for body in model.bodies} | {
+            name: (f"/{name}", (Visual(frozen(np.eye(4)), frozen(np.ones(3)), mesh),))
+            for name, mesh in (
+                ("table", props.table.mesh),
+                ("cup", props.cup.mesh),
+                ("basin", props.basin.mesh),
+            )
+        }
         # Made when they are first needed: most runs never touch anything.
         self._coats: dict[str, list[viser.MeshHandle]] = {}
         self._coated: frozenset[str] = frozenset()
 
     def follow(self, state: State) -> None:
-        """Coat the links that ``state`` says are near a contact, and no others."""
+        """Coat the parts that ``state`` says are near a contact, and no others."""
         parts = frozenset(
             part
             for finding in state.findings
@@ -43,15 +58,16 @@ class Tint:
 
     def _coat(self, part: str) -> list[viser.MeshHandle]:
         if part not in self._coats:
+            path, shapes = self._shapes.get(part, ("", ()))
             self._coats[part] = [
                 self._server.scene.add_mesh_simple(
-                    f"{self._path[part]}/contact{number}",
+                    f"{path}/contact{number}",
                     *surface(shape),
                     color=self.COLOUR,
                     opacity=self.OPACITY,
                     cast_shadow=False,
                     receive_shadow=False,
                 )
-                for number, shape in enumerate(self._shapes.get(part, ()))
+                for number, shape in enumerate(shapes)
             ]
         return self._coats[part]

@@ -80,11 +80,12 @@ class View:
         """Set when it shows nothing any more."""
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
         furnish(server)
-        Workcell(server, load_props())
+        props = load_props()
+        Workcell(server, props)
         state = board.snapshot.state
         self._arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self._arm)
-        self._tint = Tint(server, model, self._arm.path)
+        self._tint = Tint(server, model, self._arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: board.snapshot.state)
@@ -92,6 +93,9 @@ class View:
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
         self._cameras = Cameras(server, model)
         shows = Shows(self._show_ellipsoid, self._look_from, cloud)
+        self._goal: FloatArray | None = None
+        self._tool = ""
+        self._T_base_goal = np.eye(4)
         self._panel = Panel(server, model, mailbox.put, find, shows, state)
         self.show(board.snapshot)
 
@@ -170,10 +174,14 @@ class View:
         self._ghost.show(visible, GHOST_COLOURS[state.status])
         if visible:
             self._ghost.move(self._model.joint_angles(state.goal, state.gripper_goal))
-        chain = self._model.arm.chain_to(state.tool)
-        T_base_goal = self._model.T_base_shoulder @ forward(chain, state.goal)
-        self._gizmo.follow(state, T_base_goal)
-        self._gap.show(self._wished(state), T_base_goal[:3, 3])
+        # A goal is never written to: another one is another array.
+        if state.goal is not self._goal or state.tool != self._tool:
+            self._goal, self._tool = state.goal, state.tool
+            chain = self._model.arm.chain_to(state.tool)
+            self._T_base_goal = self._model.T_base_shoulder @ forward(chain, state.goal)
+            self._gizmo.aim(state, self._T_base_goal)
+        self._gizmo.follow()
+        self._gap.show(self._wished(state), self._T_base_goal[:3, 3])
 
     def _wished(self, state: State) -> FloatArray | None:
         """The tool point that was wished, (3,) [m] in the base frame, if one was."""

@@ -83,7 +83,7 @@ class Stretch:
 
 
 STRETCHES = (
-    Stretch("base to shoulder", BASE, SHOULDER, 122.0, winds="axis_1"),
+    Stretch("base to shoulder", BASE, SHOULDER, 230.0, winds="axis_1"),
     Stretch("shoulder to upper arm", SHOULDER, UPPER_IN, 152.0),
     Stretch("upper arm to elbow", UPPER_OUT, ELBOW_IN, 150.0),
     Stretch("elbow to wrist", ELBOW_OUT, WRIST, 150.0),

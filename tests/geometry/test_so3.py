@@ -145,3 +145,16 @@ def test_what_is_no_rotation_is_refused(value: npt.ArrayLike, word: str) -> None
 def test_what_is_no_quaternion_is_refused(value: list[float]) -> None:
     with pytest.raises(InputError, match="quaternion"):
         so3.from_quaternion(value)
+
+
+@repeatable
+@given(rotation_vectors, rotation_vectors)
+def test_a_product_of_quaternions_turns_as_that_of_their_rotations(
+    a: FloatArray, b: FloatArray
+) -> None:
+    A, B = so3.exp(a), so3.exp(b)
+    product = so3.quaternion_product(so3.to_quaternion(A), so3.to_quaternion(B))
+    np.testing.assert_allclose(so3.from_quaternion(product), A @ B, atol=ROUNDING)
+    both = so3.quaternion_product(np.stack((product, [1.0, 0.0, 0.0, 0.0])), product)
+    np.testing.assert_allclose(both[0], so3.quaternion_product(product, product), atol=0.0)
+    np.testing.assert_allclose(both[1], product, atol=0.0)

@@ -108,6 +108,13 @@ def test_pads_hold_the_cup_on_four_lines() -> None:
         assert finger.min_gap(body, 30.0) > 8.0, "the open fingers do not pass the cup"
 
 
+def test_the_grasp_frame_is_on_the_axis_of_the_cup_held() -> None:
+    cup = json.loads(PROPS_PATH.read_text("utf-8"))["cup"]
+    urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
+    pivot, grasp = (urdf.get_transform(link)[:3, 3] for link in ("finger_left_link", "grasp"))
+    np.testing.assert_allclose(grasp - pivot, (cup["held_before_pivot"], 0.0, 0.0), atol=1e-4)
+
+
 def test_a_thicker_cylinder_is_held_wider_open() -> None:
     angles = [pocket(radius)[0] for radius in (15.0, 25.0, 35.0)]
     assert angles == sorted(angles)

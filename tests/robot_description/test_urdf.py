@@ -49,7 +49,7 @@ def test_actuated_joints_are_the_five_axes_and_one_finger(robot: yourdfpy.URDF) 
         ("gripper_link", 0.5136, 0.2745),
         ("flange", 0.5173, 0.2745),
         ("finger_left_link", 0.5476, 0.2745),
-        ("grasp", 0.5863, 0.2745),
+        ("grasp", 0.5978, 0.2745),
         ("tcp", 0.6318, 0.2745),
     ],
 )

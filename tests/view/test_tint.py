@@ -10,8 +10,11 @@ import viser
 
 from app.control.session import Session
 from app.control.state import Finding, Reason, State
+from app.robot.collision import standing_around
 from app.robot.model import RobotModel
+from app.robot.props import load_props
 from app.view.tint import Tint
+from app.view.workcell import Workcell
 
 
 @dataclass
@@ -50,15 +53,14 @@ def touching(state: State, one: str, other: str) -> State:
 def test_both_parts_are_coated_until_they_are_apart(model: RobotModel, state: State) -> None:
     scene = Scene()
     paths = {body.name: f"/{body.name}" for body in model.bodies}
-    tint = Tint(cast(Any, Server(scene)), model, paths)
+    tint = Tint(cast(Any, Server(scene)), model, paths, load_props())
     tint.follow(state)
     assert scene.coats == {}
     tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
     assert scene.coated() == {"finger_left_link", "upper_arm_link"}
     body = next(body for body in model.bodies if body.name == "finger_left_link")
     assert sum("finger_left" in name for name in scene.coats) == len(body.collisions)
-    # The table has no coat of its own.
-    tint.follow(touching(state, "finger_left_link", "table"))
+    tint.follow(touching(state, "finger_left_link", "bench"))
     assert scene.coated() == {"finger_left_link"}
     made = len(scene.coats)
     tint.follow(state)
@@ -68,12 +70,21 @@ def test_both_parts_are_coated_until_they_are_apart(model: RobotModel, state: St
     assert scene.coated() == {"finger_left_link", "upper_arm_link"}
 
 
-def test_viser_takes_the_coats(model: RobotModel, state: State) -> None:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        paths = {body.name: f"/{body.name}" for body in model.bodies}
-        tint = Tint(server, model, paths)
-        tint.follow(touching(state, "wrist_link", "pan_link"))
-        tint.follow(state)
-    finally:
-        server.stop()
+@pytest.mark.parametrize("thing", [part.name for part in standing_around(load_props())])
+def test_a_thing_is_coated_too_where_it_stands(model: RobotModel, state: State, thing: str) -> None:
+    scene = Scene()
+    paths = {body.name: f"/{body.name}" for body in model.bodies}
+    tint = Tint(cast(Any, Server(scene)), model, paths, load_props())
+    tint.follow(touching(state, "gripper_link", thing))
+    assert scene.coated() == {"gripper_link", thing}
+    tint.follow(state)
+    assert scene.coated() == set()
+
+
+def test_viser_takes_the_coats(model: RobotModel, state: State, server: viser.ViserServer) -> None:
+    Workcell(server, load_props())
+    paths = {body.name: f"/{body.name}" for body in model.bodies}
+    tint = Tint(server, model, paths, load_props())
+    tint.follow(touching(state, "wrist_link", "cup"))
+    tint.follow(state)
+    assert not server.scene._handle_from_node_name["/cup/contact0"].visible

@@ -1,0 +1,84 @@
+"""What moves in the scene stands where the joints have it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from app.control.choices import Choice
+from app.control.commands import SetJoints, TakeBranch
+from app.control.session import Session
+from app.control.state import State
+from app.geometry import so3
+from app.robot.conduit import Stretch
+from app.robot.model import RobotModel
+from app.view.branches import INTERVAL, BranchList
+from app.view.conduit import poses
+from app.view.scene import FrameTree
+
+
+def test_every_link_is_turned_as_its_joint_is(model: RobotModel, server: viser.ViserServer) -> None:
+    tree = FrameTree(server, "/tree", model)
+    node = {handle.name: handle for handle in server.scene._handle_from_node_name.values()}
+    random = np.random.default_rng(450)
+    for _ in range(20):
+        angles = model.joint_angles(random.uniform(-4.0, 4.0, 5), random.uniform(-1.0, 1.0))
+        tree.move(angles)
+        for body in model.bodies:
+            R = body.T_parent_body[:3, :3]
+            if body.joint is not None:
+                R = R @ so3.exp(body.axis * angles[body.joint])
+            shown = so3.from_quaternion(node[tree.path[body.name]].wxyz)
+            np.testing.assert_allclose(shown, R, atol=1e-12)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_rings_stand_across_the_conduit_also_between_the_angles_worked_out(
+    model: RobotModel, number: int
+) -> None:
+    stretch: Stretch = model.stretches[number]
+    rings = poses(stretch, 30)
+    between = 0.5 * (rings[1:] + rings[:-1])
+    for angles, shown in (
+        (stretch.angles, rings),
+        (0.5 * (stretch.angles[1:] + stretch.angles[:-1]), between),
+    ):
+        points, tangents = stretch.courses(angles, 30)
+        np.testing.assert_allclose(shown[..., 4:], points, atol=1e-6)
+        # A ring as much smaller as a pixel is of it.
+        np.testing.assert_allclose(np.linalg.norm(shown[..., :4], axis=2), 1.0, atol=6e-3)
+        for row, lead in zip(shown.reshape(-1, 7), tangents.reshape(-1, 3), strict=True):
+            assert so3.from_quaternion(row[:4])[:, 0] @ lead > 0.998
+
+
+def test_branches_are_looked_for_once_a_second_while_the_arm_moves(
+    model: RobotModel, server: viser.ViserServer, session: Session
+) -> None:
+    looked: list[State] = []
+
+    def find(state: State) -> tuple[Choice, ...]:
+        looked.append(state)
+        return session.choices(state)
+
+    def listen(_handle: Any, _say: Callable[[], TakeBranch]) -> None:
+        return
+
+    rest = session.begin(session.ready, 0.0, 0.0)
+    branches = BranchList(server, model, find, listen, rest)
+    looked.clear()
+    state = session.step(rest, [SetJoints(session.ready + 0.3)], 0.01)
+    times = np.arange(0.0, 3.0 * INTERVAL, 0.1)
+    for t in times:
+        state = replace(state, t=t)
+        assert state.moving
+        branches.follow(state, t)
+    assert len(looked) == 3
+    resting = replace(rest, t=9.0)
+    branches.follow(resting, times[-1])
+    branches.follow(resting, times[-1])
+    assert looked[3:] == [resting]

@@ -1,0 +1,71 @@
+"""What is sent without viser's setters is what they send, and the handles know it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+from viser import _messages as wire
+
+from app.view.conduit import ring
+from app.view.posing import arrange, place, turn
+
+TURN = (0.6, 0.0, -0.8, 0.0)
+POINT = (0.1, -0.2, 0.3)
+
+
+def told(server: viser.ViserServer, kind: type[Any], node: str) -> list[Any]:
+    """What a browser that opens the page now is told of a node."""
+    buffer = server._websock_server.get_message_buffer().message_from_id
+    return [each for each in buffer.values() if isinstance(each, kind) and each.name == node]
+
+
+def test_a_pose_goes_as_viser_sends_it(server: viser.ViserServer) -> None:
+    theirs, ours = (server.scene.add_frame(name) for name in ("/theirs", "/ours"))
+    theirs.wxyz, theirs.position = np.array(TURN), np.array(POINT)
+    turn(ours, TURN)
+    place(ours, POINT)
+    for kind in (wire.SetOrientationMessage, wire.SetPositionMessage):
+        (a,), (b,) = told(server, kind, "/theirs"), told(server, kind, "/ours")
+        a.name = b.name
+        assert a.as_serializable_dict() == b.as_serializable_dict()
+    np.testing.assert_array_equal(ours.wxyz, theirs.wxyz)
+    np.testing.assert_array_equal(ours.position, theirs.position)
+
+
+def test_a_turn_too_small_for_visers_setter_is_sent_all_the_same(
+    server: viser.ViserServer,
+) -> None:
+    frame = server.scene.add_frame("/frame", wxyz=TURN)
+    little = (0.600001, 0.0, -0.79999925, 0.0)
+    frame.wxyz = np.array(little)
+    (message,) = told(server, wire.SetOrientationMessage, "/frame")
+    assert message.wxyz == TURN
+    turn(frame, little)
+    (message,) = told(server, wire.SetOrientationMessage, "/frame")
+    assert message.wxyz == little
+
+
+def test_instances_go_in_one_message_that_says_what_visers_two_say(
+    server: viser.ViserServer,
+) -> None:
+    random = np.random.default_rng(450)
+    wxyzs, positions = (random.normal(size=(5, k)).astype(np.float32) for k in (4, 3))
+    theirs, ours = (
+        server.scene.add_batched_meshes_simple(
+            name, *ring(0.01), np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)), np.zeros((5, 3))
+        )
+        for name in ("/theirs", "/ours")
+    )
+    theirs.batched_wxyzs, theirs.batched_positions = wxyzs, positions
+    arrange(ours, wxyzs, positions)
+    (message,) = told(server, wire.SceneNodeUpdateMessage, "/ours")
+    expected: dict[str, Any] = {}
+    for each in told(server, wire.SceneNodeUpdateMessage, "/theirs"):
+        expected |= each.updates
+    assert message.updates.keys() == expected.keys()
+    for name, value in expected.items():
+        assert message.updates[name].dtype == value.dtype
+        np.testing.assert_array_equal(message.updates[name], value)
+        np.testing.assert_array_equal(getattr(ours, name), value)
