@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from app.control.session import Session
+from app.control.things import Hand, Thing
 from app.drivers.simulated import SimulatedDriver
-from app.robot.collision import standing_around, world_of
+from app.robot.collision import hand_of, table, things_of, world_of
 from app.robot.model import RobotModel, load
 from app.robot.props import load_props
 from app.runtime.clock import MonotonicClock
@@ -41,11 +42,14 @@ def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     model = load(urdf, tool)
     world, left_out = world_of(model)
     notes = [*model.notes, *left_out]
+    hand: Hand | None = None
+    things: tuple[Thing, ...] = ()
     if world is None:
         notes.append(UNCHECKED)
     else:
-        world = world.with_obstacles(standing_around(load_props()))
-    session = Session(model.arm, model.ready(settings.ready), world)
+        hand, things = hand_of(model, world), things_of(load_props())
+        world = world.with_obstacles((table(),))
+    session = Session(model.arm, model.ready(settings.ready), world, hand=hand, things=things)
     return Described(model, session, tuple(notes))
 
 

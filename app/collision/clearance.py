@@ -56,28 +56,36 @@ class Advance:
     stopped: bool = False
 
 
-def advance(world: World, x: FloatArray, towards: FloatArray, dt: float) -> Advance:
+def advance(
+    world: World,
+    x: FloatArray,
+    towards: FloatArray,
+    dt: float,
+    keep: FloatArray | None = None,
+) -> Advance:
     """Go from ``x`` (k,) [rad] on the straight line to ``towards``, as far as clearance allows.
 
     The step is the way of one tick of ``dt`` [s]. For each pair of bodies with the distance d the
     step may take away d - STOP times dt / SETTLING; where d is below STOP already, nothing. So
     whatever leads away from a contact is allowed. Nor may bodies pass each other between the ends
     of a step: a distance changes by no more than the bodies travel, so what the ends leave open is
-    looked at in the middle, and again in the halves.
+    looked at in the middle, and again in the halves. keep: (p,) [m] the distance that each pair
+    keeps, in place of STOP.
     """
     if (towards == x).all():
         return Advance(x)
+    least = np.full(len(world.first), STOP) if keep is None else keep
     here = world.at(x)
     travel = world.travel(here, x, towards)
     part = min(dt / SETTLING, 1.0)
     # What is so far away that the whole way does not matter needs no closer look.
-    free = STOP + travel / part
+    free = least + travel / part
     free[travel == 0.0] = -np.inf
     way = _Way(world, x, towards)
     for pair in here.nearer_than(free)[0].tolist():
         before = here.distance(pair)
         if before < free[pair]:
-            way.minded.append(_Minded(pair, float(travel[pair]), before, part))
+            way.minded.append(_Minded(pair, float(travel[pair]), before, part, float(least[pair])))
     if not way.minded:
         return Advance(towards)
     share, held = 1.0, None
@@ -119,19 +127,20 @@ class _Minded:
     """A pair of bodies that a step may bring too near.
 
     pair: its number in the world. travel: at most how far its bodies move against each other on the
-    whole way. before: how far apart they are at its start [m]. part: of what is beyond STOP then,
-    the step may take away so much [1].
+    whole way. before: how far apart they are at its start [m]. part: of what is beyond ``keep``
+    then, the step may take away so much [1]. keep: the distance they keep [m].
     """
 
     pair: int
     travel: float
     before: float
     part: float
+    keep: float
 
     @property
     def spare(self) -> float:
         """[m] How much nearer the step may bring them."""
-        return self.part * max(self.before - STOP, 0.0)
+        return self.part * max(self.before - self.keep, 0.0)
 
     def tight(self, share: float) -> bool:
         """Whether that much of the way could be too much."""
@@ -169,9 +178,9 @@ class _Way:
         ``d_low``, ``d_high``: how far apart its bodies are at both [m].
         """
         travel = (high - low) * minded.travel
-        kept = min(minded.before, STOP)
+        kept = min(minded.before, minded.keep)
         # Bodies that are in each other have nothing left to pass.
-        if kept <= 0.0 or travel <= GRAZE or d_low + d_high - travel >= kept:
+        if minded.before <= 0.0 or travel <= GRAZE or d_low + d_high - travel >= kept:
             return False
         middle = 0.5 * (low + high)
         d_middle = self.at(middle).distance(minded.pair)

@@ -76,6 +76,13 @@ def cylinder(radius: float, length: float) -> Shape:
     )
 
 
+def sphere(radius: float) -> Shape:
+    """A ball about its middle [m]."""
+    _lengths((radius,), 1, "The radius of a sphere")
+    half = frozen((radius, radius, radius))
+    return Shape(coal.Sphere(radius), frozen(np.zeros(3)), radius, -half, half)
+
+
 def half_space() -> Shape:
     """Everything with z <= 0."""
     far = np.full(3, FAR)

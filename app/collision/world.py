@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -156,6 +157,42 @@ class World:
             if distance < best:
                 best, found = distance, pair
         return placed.contact(found)
+
+    def gap(self, x: FloatArray, one: str, other: str) -> float:
+        """How far two parts that may meet are apart at ``x`` (k,) [rad]; else infinitely [m]."""
+        names = [self.parts[number].name for number in self.part_of.tolist()]
+        placed, wanted = self.at(x), {one, other}
+        pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
+        gaps = [
+            placed.distance(pair)
+            for pair, (a, b) in enumerate(pairs)
+            if {names[a], names[b]} == wanted
+        ]
+        return min(gaps, default=np.inf)
+
+    @cached_property
+    def digest(self) -> bytes:
+        """The same for worlds that hold the same bodies and pairs, in any process."""
+        told = hashlib.sha256(repr(self.pairs).encode())
+        for part in self.parts:
+            told.update(f"{part.name} {part.mover}".encode())
+            for T, shape in zip(part.T_mover_shape, part.shapes, strict=True):
+                for each in (T, shape.centre, shape.low, shape.high):
+                    told.update(np.asarray(each, dtype=np.float64).tobytes())
+        return told.digest()
+
+    def with_carried(self, carried: Part) -> World:
+        """This world and what the arm carries, which meets what more than one joint lets meet it.
+
+        What it is held by turns with it, and the next link turns under it.
+        """
+        count = len(self.parts)
+        met = [
+            (number, count)
+            for number, part in enumerate(self.parts)
+            if len(self.linkage.variables_between(part.mover, carried.mover)) > 1
+        ]
+        return World(self.linkage, (*self.parts, carried), (*self.pairs, *met))
 
     def with_obstacles(self, obstacles: Sequence[Part]) -> World:
         """This world and ``obstacles``, which every part that moves may meet."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.control.things import Thing
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
@@ -217,6 +218,24 @@ class Jog:
             raise InputError(f"A jog is along JogFrame.BASE or JogFrame.TOOL, not {self.frame!r}.")
 
 
+@dataclass(frozen=True)
+class Place:
+    """Put a thing where it says, in place of one of its name; what is held stays in the hand."""
+
+    thing: Thing
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.thing, Thing) or self.thing.held:
+            raise InputError(f"What is put somewhere is a thing out of the hand, not {self.thing}.")
+
+
+@dataclass(frozen=True)
+class Remove:
+    """Take the thing of that name away; what is held stays."""
+
+    name: str
+
+
 Command = (
     SetJoint
     | SetJoints
@@ -237,6 +256,8 @@ Command = (
     | Resume
     | Follow
     | GoAlong
+    | Place
+    | Remove
     | SpeedScale
     | Jog
 )

@@ -66,7 +66,8 @@ class Follower:
 
     def _met(self, here: Following, halt: Following, fingers: float) -> Contact | None:
         plan, segment = here.plan, here.segment
-        if self._world is None or (plan.world is self._world and plan.fingers == fingers):
+        world = self._world
+        if world is None or (plan.clear_of == world.digest and plan.fingers == fingers):
             return None
         start, end = (segment.scaling.pace(each.local).sigma for each in (here, halt))
         low, high = min(start, end), max(start, end)
@@ -75,7 +76,7 @@ class Follower:
             known = (segment, fingers, start, start)
         if known[2] <= low and high <= known[3]:
             return None
-        room = Room.about(self._world, STOP, segment.sweep.at(start, fingers))
+        room = Room.about(world, STOP, segment.sweep.at(start, fingers))
         for a, b in ((low, known[2]), (known[3], high)):
             found = segment.sweep.blocked(room, fingers, a, b, GRAZE) if a < b else None
             if found is not None:

@@ -44,10 +44,16 @@ SLOWINGS = 4
 class Mover:
     """Moves one arm. Its methods are pure."""
 
-    def __init__(self, arm: Arm, world: World | None, tool_speed: float) -> None:
-        """``world``: what must not be touched. ``tool_speed``: the most of the tool point [m/s]."""
+    def __init__(
+        self, arm: Arm, world: World | None, tool_speed: float, touch: FloatArray | None = None
+    ) -> None:
+        """``world``: what must not be touched. ``tool_speed``: the most of the tool point [m/s].
+
+        ``touch``: (p,) how far apart the pairs of bodies stay while the fingers move [m].
+        """
         self._arm = arm
         self._world = world
+        self._touch = touch
         self._tool_speed = PLANNED * tool_speed
         self._follower = Follower(world)
         self._any = Limiter(arm.limits)
@@ -75,7 +81,7 @@ class Mover:
         hand = None
         if fingers != state.gripper_setpoint:
             here = np.append(ahead.q, state.gripper_setpoint)
-            hand = advance(self._world, here, np.append(ahead.q, fingers), dt)
+            hand = advance(self._world, here, np.append(ahead.q, fingers), dt, self._touch)
             fingers = float(hand.x[-1])
             if self._met(state, ahead, along, fingers) is not None and not ahead.at_rest:
                 fingers = state.gripper_setpoint
@@ -187,8 +193,7 @@ class Mover:
         assert self._world is not None
         if state.following is not None and along is not None:
             met = self._follower.met(state.following, along, fingers)
-            here = self._world.nearest(np.append(state.setpoint, fingers)) if met else None
-            return None if met is None else _as_far_as(met, here)
+            return None if met is None else self._as_it_is(met, np.append(state.setpoint, fingers))
         limiter, x = self.limiter(state), np.append(state.setpoint, fingers)
         if surely_clear(self._world, x, np.append(limiter.halt(ahead), fingers)):
             return None
@@ -196,20 +201,27 @@ class Mover:
         for a, b in pairwise([state.setpoint, *way]):
             step = advance(self._world, np.append(a, fingers), np.append(b, fingers), SETTLING)
             if step.contact is not None or step.stopped:
-                here = self._world.nearest(x)
-                return here if step.contact is None else _as_far_as(step.contact, here)
+                if step.contact is None:
+                    return self._world.nearest(x)
+                return self._as_it_is(step.contact, x)
         return None
+
+    def _as_it_is(self, met: Contact, x: FloatArray) -> Contact:
+        """The parts that are about to meet, and how far they are apart at ``x`` (k,) [rad]."""
+        assert self._world is not None
+        return replace(met, distance=self._world.gap(x, *met.parts))
 
     def _updated(self, state: State) -> State:
         """``state`` with the distance of the contact it brakes for as it is now."""
         assert self._world is not None
-        here = self._world.nearest(np.append(state.setpoint, state.gripper_setpoint))
-        same = here is not None and any(
-            finding.reason is Reason.CONTACT and finding.parts == here.parts
+        x = np.append(state.setpoint, state.gripper_setpoint)
+        findings = tuple(
+            replace(finding, amount=self._world.gap(x, *finding.parts))
+            if finding.reason is Reason.CONTACT and finding.parts is not None
+            else finding
             for finding in state.findings
         )
-        # Others may be nearer that are not in the way.
-        return _told(state, here) if same else state
+        return replace(state, findings=findings)
 
     def _may_go_on(self, state: State) -> bool:
         """Whether the way of an arm that waits is clear again, at its beginning."""
@@ -224,11 +236,6 @@ class Mover:
         towards = np.append(state.setpoint + share * way, state.gripper_setpoint)
         step = advance(self._world, x, towards, SETTLING)
         return bool((step.x == towards).all())
-
-
-def _as_far_as(met: Contact, here: Contact | None) -> Contact:
-    """The parts that are about to meet, and how far they are apart where they are now."""
-    return here if here is not None and here.parts == met.parts else met
 
 
 def _bent(arm: Arm, elbow: str) -> Limits:

@@ -14,6 +14,7 @@ from app.control.arm import Arm
 from app.control.choices import Choice, choice, choices, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.following import Following
+from app.control.grip import gripped
 from app.control.mover import Mover
 from app.control.state import (
     Finding,
@@ -26,6 +27,7 @@ from app.control.state import (
     Target,
     ToolTarget,
 )
+from app.control.things import MOST, Hand, Surroundings, Thing
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
@@ -40,7 +42,7 @@ TOOL_SPEED = 0.5
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
-SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale)
+SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Place, cmd.Remove)
 """What counts while a stop holds the arm."""
 
 AT_START = 1e-6
@@ -60,15 +62,22 @@ class Session:
         ready: FloatArray,
         world: World | None = None,
         tool_speed: float = TOOL_SPEED,
+        hand: Hand | None = None,
+        things: tuple[Thing, ...] = (),
     ) -> None:
         """``ready``: (n,) the posture [rad] that Home drives to, inside the limits.
 
         ``world``: what the arm must not touch; without one nothing keeps it from touching.
-        ``tool_speed``: the most of the tool point [m/s].
+        ``tool_speed``: the most of the tool point [m/s]. ``hand``: what takes things; ``things``:
+        those that stand around at the beginning.
         """
         self.arm = arm
         self.world = world
-        self._mover = Mover(arm, world, tool_speed)
+        self.surroundings = Surroundings(world, hand)
+        self._things = things
+        self._tool_speed = tool_speed
+        # Of the things there are at present: no state, but what follows from them.
+        self._made: tuple[tuple[Thing, ...], World | None, Mover] | None = None
         self.ready = frozen(arm.chain.check_q(ready))
         if not arm.chain.within_limits(self.ready):
             raise InputError("The ready posture lies outside the joint limits.")
@@ -87,7 +96,23 @@ class Session:
             tool=self.arm.default_tool,
             target=JointTarget(q),
             branch=branch_of(self.arm.chain, q),
+            things=self._things,
         )
+
+    def world_at(self, state: State) -> World | None:
+        """What the arm must not touch, with the things of ``state``."""
+        return self._for(state)[1]
+
+    def _for(self, state: State) -> tuple[tuple[Thing, ...], World | None, Mover]:
+        if self._made is None or self._made[0] is not state.things:
+            world = self.surroundings.world(state.things)
+            touch = None if world is None else self.surroundings.touch(world, state.things)
+            mover = Mover(self.arm, world, self._tool_speed, touch)
+            self._made = (state.things, world, mover)
+        return self._made
+
+    def _mover(self, state: State) -> Mover:
+        return self._for(state)[2]
 
     def check(self, command: cmd.Command) -> None:
         """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
@@ -106,7 +131,7 @@ class Session:
 
     def choices(self, state: State) -> tuple[Choice, ...]:
         """What there is to choose from on each branch."""
-        return choices(self.arm, state, self.world)
+        return choices(self.arm, state, self.world_at(state))
 
     def step(self, state: State, commands: Iterable[cmd.Command], t: float) -> State:
         """Take the commands in order, then move the setpoints on by the time that has passed.
@@ -122,7 +147,8 @@ class Session:
         if isinstance(state.target, ToolTarget) and state.since is not None:
             state = self._follow(state, state.target, state.since)
         dt = min(t - state.t, LONGEST_STEP)
-        state = self._mover.step(replace(state, t=max(t, state.t)), dt)
+        state = self._mover(state).step(replace(state, t=max(t, state.t)), dt)
+        state = gripped(self.surroundings, self.world_at(state), state)
         return state if state.jogging is None else self._jogged(state)
 
     @staticmethod
@@ -153,7 +179,7 @@ class Session:
             case cmd.Stop():
                 return self._halt(state)
             case cmd.Release():
-                goal = self._mover.halt(state)[0]
+                goal = self._mover(state).halt(state)[0]
                 free = replace(state, halted=None, goal=goal, target=JointTarget(goal))
                 return _leaving(self._without(free, Reason.HALTED))
             case cmd.Pause():
@@ -185,7 +211,7 @@ class Session:
             case cmd.Reset():
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 held = self._without(held, Reason.CONTACT)
-                return self._aim(held, JointTarget(self._mover.halt(state)[0]))
+                return self._aim(held, JointTarget(self._mover(state).halt(state)[0]))
             case cmd.MoveTool(position=position):
                 return self._drag(state, replace(wish(self.arm, state), position=position))
             case cmd.TurnTool(pitch=pitch, roll=roll):
@@ -206,6 +232,11 @@ class Session:
                 return self._reread(replace(state, reading=reading))
             case cmd.TakeBranch(branch=branch):
                 return self._take_branch(state, branch)
+            case cmd.Place(thing=thing):
+                return replace(state, things=_placed(state.things, thing))
+            case cmd.Remove(name=name):
+                things = tuple(each for each in state.things if each.held or each.name != name)
+                return replace(state, things=things)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
 
@@ -297,9 +328,9 @@ class Session:
         if state.halted is not None:
             return state
         if state.following is not None:
-            left = None if self._mover.may_leave(state) else _leaving(state).following
+            left = None if self._mover(state).may_leave(state) else _leaving(state).following
             state = replace(state, following=left)
-        goal, way, time = self._mover.halt(state)
+        goal, way, time = self._mover(state).halt(state)
         halted = replace(
             state,
             halted=Halt(way, time),
@@ -316,7 +347,7 @@ class Session:
     def _jogged(self, state: State) -> State:
         """The goal is where the jog would come to rest, so that it does when no more comes."""
         assert state.jogging is not None
-        goal = self._mover.halt(state)[0]
+        goal = self._mover(state).halt(state)[0]
         chain = self.arm.chain_to(state.tool)
         contact = tuple(f for f in state.findings if f.reason is Reason.CONTACT)
         jogging: Jogging | None = state.jogging
@@ -354,11 +385,20 @@ class Session:
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper
-        goal = min(max(angle, limits.lower), limits.upper)
+        lower = limits.lower if state.grip is None else state.grip
+        goal = min(max(angle, lower), limits.upper)
         others = tuple(f for f in state.findings if f.reason is not Reason.GRIPPER_LIMIT)
         beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
         held = (Finding(Reason.GRIPPER_LIMIT, goal),) if beyond else ()
         return replace(state, gripper_goal=goal, findings=others + held)
+
+
+def _placed(things: tuple[Thing, ...], thing: Thing) -> tuple[Thing, ...]:
+    """``things`` with ``thing`` in place of the one of its name, or as one more."""
+    known = [each.name for each in things]
+    if thing.name not in known:
+        return (*things, thing) if len(things) < MOST else things
+    return tuple(thing if each.name == thing.name and not each.held else each for each in things)
 
 
 def _leaving(state: State) -> State:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from app.control.following import Following
+from app.control.things import Thing
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
 from app.kinematics.reading import Reading
@@ -71,6 +72,7 @@ class Reason(Enum):
     PITCH_CHANGED = "pitch changed"
     ROLL_CHANGED = "roll changed"
     NOT_AT_START = "not at the start"
+    LOPSIDED = "one finger only"
     INTERNAL = "internal error"
 
 
@@ -136,6 +138,8 @@ class State:
         jogging: the jog under way, if one is.
         since: how far along its way the target has been followed, while the goal is still on its
             way to it; None once it is there. Until then the findings are those from before.
+        things: what stands around or is held, and can be put elsewhere.
+        grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
         let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
         following: the plan the arm is on and where on it, until it is told to go elsewhere; None
             when it is on none.
@@ -161,6 +165,8 @@ class State:
     since: ToolTarget | None = None
     let_go: bool = False
     following: Following | None = None
+    things: tuple[Thing, ...] = ()
+    grip: float | None = None
 
     @property
     def status(self) -> Status:

@@ -27,6 +27,7 @@ UNITS = {
     Reason.YAW_FIXED: "rad",
     Reason.PITCH_CHANGED: "rad",
     Reason.ROLL_CHANGED: "rad",
+    Reason.LOPSIDED: "m",
     Reason.NOT_AT_START: "rad",
 }
 """Of the amounts; the other reasons have none."""

@@ -82,13 +82,13 @@ class Nearest:
 class Plan:
     """Segments in their order, tau running through them all.
 
-    world, fingers: what it is known to be clear of, with the finger joint at that angle [rad]; None
-    when nothing was looked at. nearest: the least clearance on the whole way; None where nothing
-    can meet or nothing was looked at.
+    clear_of, fingers: the digest of the world it is known to be clear of, with the finger joint at
+    that angle [rad]; None when nothing was looked at. nearest: the least clearance on the whole
+    way; None where nothing can meet or nothing was looked at.
     """
 
     segments: tuple[Segment, ...]
-    world: World | None = None
+    clear_of: bytes | None = None
     fingers: float = 0.0
     nearest: Nearest | None = None
 
@@ -157,7 +157,7 @@ def plan(
             )
     clearances = [None if world is None else _clearance(p, world, fingers, margin) for p in paths]
     segments = tuple(Segment(path, fastest(path, bounds)) for path in paths)
-    found = Plan(segments, world, fingers)
+    found = Plan(segments, None if world is None else world.digest, fingers)
     each = [
         Nearest(clearance.contact, begin + segment.scaling.tau(clearance.sigma))
         for clearance, segment, begin in zip(clearances, segments, found.begins, strict=False)

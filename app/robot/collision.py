@@ -6,8 +6,9 @@ import numpy as np
 
 from app.collision.linkage import GROUND, Linkage, Mover
 from app.collision.pairs import pairs_that_meet
-from app.collision.shape import Shape, cylinder, half_space, hull
+from app.collision.shape import Shape, half_space, hull
 from app.collision.world import Part, World, obstacle
+from app.control.things import Form, Hand, Thing
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
@@ -49,24 +50,39 @@ def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
     return World(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(notes)
 
 
-def standing_around(props: Props) -> tuple[Part, ...]:
-    """Table, cup and basin as obstacles: a half-space, and a cylinder round each vessel."""
-    return (
-        obstacle("table", np.eye(4), half_space()),
-        *(
-            obstacle(
-                name,
-                se3.from_rotation_translation(
-                    np.eye(3), (at[0], at[1], at[2] + 0.5 * vessel.height)
-                ),
-                cylinder(vessel.outer_radius, vessel.height),
-            )
-            for name, vessel, at in (
-                ("cup", props.cup, CUP_AT),
-                ("basin", props.basin, BASIN_AT),
-            )
-        ),
+def table() -> Part:
+    """What everything stands on, as a half-space."""
+    return obstacle("table", np.eye(4), half_space())
+
+
+def things_of(props: Props) -> tuple[Thing, ...]:
+    """Cup and basin where they stand at first, as the cylinders round them."""
+    return tuple(
+        Thing(
+            name,
+            Form.CYLINDER,
+            (vessel.outer_radius, vessel.height),
+            se3.from_rotation_translation(np.eye(3), at),
+            can_be_held=name == "cup",
+        )
+        for name, vessel, at in (("cup", props.cup, CUP_AT), ("basin", props.basin, BASIN_AT))
     )
+
+
+def standing_around(props: Props) -> tuple[Part, ...]:
+    """The table and ``things_of`` as obstacles that stay where they are."""
+    things = things_of(props)
+    return (table(), *(obstacle(each.name, each.T_shape, each.shape) for each in things))
+
+
+def hand_of(model: RobotModel, world: World) -> Hand | None:
+    """The fingers and what they hang on; None for an arm without."""
+    driven = {body.name for body in model.bodies if body.joint in model.fingers}
+    fingers = [part for part in world.parts if part.name in driven]
+    if not fingers:
+        return None
+    palm = int(world.linkage.parent[fingers[0].mover])
+    return Hand(palm, tuple(part.name for part in fingers))
 
 
 def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:

@@ -60,6 +60,14 @@ def _contact(finding: Finding) -> str:
     )
 
 
+def _lopsided(finding: Finding) -> str:
+    finger, thing = finding.parts or ("a finger", "something")
+    return (
+        f"{part(finger)} is {_short(1e3 * finding.amount)} mm from {part(thing)}, which the other "
+        "touches: open, put the gripper about its middle, close again"
+    )
+
+
 REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.HALTED: lambda f: (
         f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
@@ -82,6 +90,7 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"pitch gives way by {_short(math.degrees(f.amount))}° to keep the position"
     ),
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
+    Reason.LOPSIDED: _lopsided,
     Reason.NOT_AT_START: lambda f: (
         f"the plan begins elsewhere: {axis(f.axis)} is {_short(math.degrees(f.amount))}° off, "
         "or the arm still moves; go to its start first"

@@ -1,0 +1,66 @@
+"""What the fingers feel: a thing between both is held, and let go when they open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.collision.world import World
+from app.control.state import Finding, Reason, State
+from app.control.things import Surroundings, Thing
+from app.geometry.arrays import FloatArray
+
+TOUCHING = 3e-4
+"""[m] A finger that is no farther touches: as far as the sensors in the pads are soft."""
+
+CENTRED = 3e-3
+"""[m] When one finger touches and the other is no farther, the thing slides between them."""
+
+OPENED = 0.02
+"""[rad] By as much the fingers open before what they held is free: 1 mm at the pads."""
+
+
+def gripped(surroundings: Surroundings, world: World | None, state: State) -> State:
+    """``state`` after what the fingers did in this tick."""
+    if world is None or surroundings.hand is None or not state.things:
+        return state
+    x = np.append(state.setpoint, state.gripper_setpoint)
+    if state.grip is not None:
+        if state.gripper_setpoint <= state.grip + OPENED:
+            return state
+        things = tuple(surroundings.left(t, x) if t.held else t for t in state.things)
+        return replace(state, things=things, grip=None)
+    if state.gripper_goal >= state.gripper_setpoint:
+        return _without(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
+    for thing in state.things:
+        if thing.can_be_held:
+            felt = _felt(surroundings.hand.fingers, world, thing, x)
+            if min(felt.values()) <= TOUCHING:
+                return _closed(surroundings, state, thing, felt, x)
+    return state
+
+
+def _felt(fingers: tuple[str, ...], world: World, thing: Thing, x: FloatArray) -> dict[str, float]:
+    """How far each finger is from ``thing`` [m]."""
+    return {finger: world.gap(x, finger, thing.name) for finger in fingers}
+
+
+def _closed(
+    surroundings: Surroundings, state: State, thing: Thing, felt: dict[str, float], x: FloatArray
+) -> State:
+    """The fingers have closed on ``thing``: they stop there, and hold it if both have."""
+    state = _without(_without(state, Reason.CONTACT), Reason.LOPSIDED)
+    stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
+    far = max(felt, key=lambda finger: felt[finger])
+    if felt[far] > CENTRED:
+        lopsided = Finding(Reason.LOPSIDED, felt[far], parts=(far, thing.name))
+        return replace(stopped, findings=(*stopped.findings, lopsided))
+    taken = surroundings.taken(thing, x)
+    things = tuple(taken if each is thing else each for each in state.things)
+    return replace(stopped, things=things, grip=state.gripper_setpoint)
+
+
+def _without(state: State, reason: Reason) -> State:
+    findings = tuple(finding for finding in state.findings if finding.reason is not reason)
+    return replace(state, findings=findings)

@@ -1,0 +1,162 @@
+"""What stands around the arm and can be put elsewhere, and what its gripper holds of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from app.collision.clearance import STOP
+from app.collision.shape import Shape, box, cylinder, sphere
+from app.collision.world import Part, World, obstacle
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray, finite_array, frozen
+
+MOST = 24
+"""Things at a time."""
+
+FARTHEST = 2.0
+"""[m] Along any axis, from the base."""
+
+LARGEST, SMALLEST = 2.0, 1e-3
+"""[m] Of a thing, along any of its sides."""
+
+LONGEST_NAME = 40
+
+
+class Form(Enum):
+    """What a thing counts as where contacts are looked for; ``size`` [m] is of a form its own."""
+
+    BOX = "box"
+    """size: along x, y, z."""
+    CYLINDER = "cylinder"
+    """size: radius, height."""
+    SPHERE = "sphere"
+    """size: radius."""
+
+    @property
+    def numbers(self) -> int:
+        """How many a size has."""
+        return {Form.BOX: 3, Form.CYLINDER: 2, Form.SPHERE: 1}[self]
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """Something that stands on z = 0 of a frame of its own.
+
+    Attributes:
+        name: no other thing or link has it.
+        form, size: see ``Form``.
+        T: (4, 4) where it stands, in the base frame; while it is held, in that of the hand.
+        can_be_held: whether the fingers may touch it, and take it when both do.
+        held: whether they have.
+    """
+
+    name: str
+    form: Form
+    size: tuple[float, ...]
+    T: FloatArray
+    can_be_held: bool = False
+    held: bool = False
+
+    def __post_init__(self) -> None:
+        if not (self.name.isprintable() and 0 < len(self.name) <= LONGEST_NAME):
+            raise InputError(f"A thing's name has 1 to {LONGEST_NAME} characters to be printed.")
+        what = f"The size of {self.name!r}"
+        size = finite_array(self.size, (self.form.numbers,), what)
+        if not ((size >= SMALLEST) & (size <= LARGEST)).all():
+            raise InputError(f"{what} has to be from {SMALLEST} to {LARGEST:g} m, not {self.size}.")
+        object.__setattr__(self, "size", tuple(size.tolist()))
+        T = frozen(se3.validated(self.T, f"The pose of {self.name!r}"))
+        if np.abs(T[:3, 3]).max() > FARTHEST:
+            raise InputError(f"{self.name!r} would be more than {FARTHEST:g} m away.")
+        object.__setattr__(self, "T", T)
+
+    @property
+    def height(self) -> float:
+        """[m]"""
+        return 2.0 * self.size[0] if self.form is Form.SPHERE else self.size[-1]
+
+    @property
+    def shape(self) -> Shape:
+        """About its middle."""
+        match self.form:
+            case Form.BOX:
+                return box(self.size)
+            case Form.CYLINDER:
+                return cylinder(*self.size)
+        return sphere(self.size[0])
+
+    @property
+    def T_shape(self) -> FloatArray:
+        """(4, 4) its middle, in the frame of ``T``."""
+        up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, 0.5 * self.height))
+        return self.T @ up
+
+
+@dataclass(frozen=True)
+class Hand:
+    """What the arm takes things with.
+
+    palm: the piece of the linkage that fingers hang on. fingers: their names among the parts.
+    """
+
+    palm: int
+    fingers: tuple[str, ...]
+
+
+class Surroundings:
+    """The world for any things that stand around, and where these are."""
+
+    def __init__(self, world: World | None, hand: Hand | None) -> None:
+        """``world``: the arm, and what cannot be moved. ``hand``: None where nothing is held."""
+        self._world = world
+        self.hand = hand
+
+    def world(self, things: Sequence[Thing]) -> World | None:
+        """With ``things``; None where nothing is looked at."""
+        if self._world is None:
+            return None
+        standing = [
+            obstacle(thing.name, thing.T_shape, thing.shape) for thing in things if not thing.held
+        ]
+        world = self._world.with_obstacles(standing) if standing else self._world
+        for thing in things:
+            if thing.held and self.hand is not None:
+                part = Part(thing.name, self.hand.palm, (frozen(thing.T_shape),), (thing.shape,))
+                world = world.with_carried(part)
+        return world
+
+    def touch(self, world: World, things: Sequence[Thing]) -> FloatArray:
+        """(p,) how far apart each pair of ``world`` stays while the fingers move [m]."""
+        holdable = {thing.name for thing in things if thing.can_be_held and not thing.held}
+        fingers = set(() if self.hand is None else self.hand.fingers)
+        names = [world.parts[number].name for number in world.part_of.tolist()]
+        touching = [
+            bool({names[a], names[b]} & holdable and {names[a], names[b]} & fingers)
+            for a, b in zip(world.first.tolist(), world.second.tolist(), strict=True)
+        ]
+        return np.where(touching, 0.0, STOP)
+
+    def pose(self, thing: Thing, x: FloatArray) -> FloatArray:
+        """(4, 4) of ``thing`` in the base frame, at ``x`` (k,): joints and finger joint [rad]."""
+        return thing.T if not thing.held else self._palm(x) @ thing.T
+
+    def taken(self, thing: Thing, x: FloatArray) -> Thing:
+        """``thing`` in the hand, where it is."""
+        return replace(thing, T=se3.inverse(self._palm(x)) @ thing.T, held=True)
+
+    def left(self, thing: Thing, x: FloatArray) -> Thing:
+        """``thing`` out of the hand: it comes down upright on the table below."""
+        T = self.pose(thing, x)
+        yaw = float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
+        at = (T[0, 3], T[1, 3], 0.0)
+        return replace(thing, T=se3.from_rotation_translation(so3.rotation_z(yaw), at), held=False)
+
+    def _palm(self, x: FloatArray) -> FloatArray:
+        assert self._world is not None
+        assert self.hand is not None
+        return np.asarray(self._world.linkage.poses(x)[self.hand.palm])

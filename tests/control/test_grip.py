@@ -1,0 +1,264 @@
+"""Cup in hand: fingers feel it, take it, carry it, and let it stand again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.plans import plan_along, plan_to
+from app.control.session import Session
+from app.control.state import Reason, State
+from app.control.things import MOST, Form, Thing
+from app.errors import InputError
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.kinematics.inverse import inverse
+from app.kinematics.tool import ToolTarget
+from app.planning.curve import ToolLine
+from app.planning.tool_path import ToolPath
+from app.robot.collision import hand_of, table, things_of, world_of
+from app.robot.model import RobotModel
+from app.robot.props import load_props
+from app.settings import Settings
+
+OPEN = 0.3
+PITCH = np.deg2rad(40.0)
+HEIGHT = 0.07
+"""[m] At which the cup is taken, above the table."""
+
+BEFORE, AT = 0.08, 0.016
+"""[m] Of the cup's axis: where the open fingers come from, and where they close. Tilted as it is,
+the palm would be in the cup if the grasp frame came any nearer."""
+
+
+@pytest.fixture(scope="module")
+def session(model: RobotModel) -> Session:
+    world, _ = world_of(model)
+    assert world is not None
+    return Session(
+        model.arm,
+        model.ready(Settings().ready),
+        world.with_obstacles((table(),)),
+        hand=hand_of(model, world),
+        things=things_of(load_props()),
+    )
+
+
+def run(session: Session, state: State, *commands: cmd.Command, seconds: float = 12.0) -> State:
+    """Tick until the arm rests."""
+    state = session.step(state, commands, state.t + 0.01)
+    state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    for _ in range(int(100 * seconds)):
+        if not state.moving:
+            return state
+        state = session.step(state, (), state.t + 0.01)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    raise AssertionError(f"still on its way: {state.findings}")
+
+
+def cup_of(session: Session, state: State) -> tuple[Thing, FloatArray]:
+    (cup,) = (thing for thing in state.things if thing.name == "cup")
+    return cup, session.surroundings.pose(cup, np.append(state.q, state.gripper))
+
+
+def before_cup(
+    session: Session, model: RobotModel, state: State, back: float, beside: float = 0.0
+) -> FloatArray:
+    """(5,) joints with the grasp frame ``back`` [m] before the cup's axis, along the tool.
+
+    beside: [m] to the left of it.
+    """
+    chain = model.arm.chain_to("grasp")
+    _, T = cup_of(session, state)
+    p = T[:3, 3] - model.T_base_shoulder[:3, 3] + [0.0, 0.0, HEIGHT]
+    azimuth = np.arctan2(p[1], p[0])
+    out = np.array((np.cos(azimuth), np.sin(azimuth), 0.0))
+    p = p - back * (np.cos(PITCH) * out - np.sin(PITCH) * np.array((0.0, 0.0, 1.0)))
+    p = p + beside * np.array((-out[1], out[0], 0.0))
+    azimuth = np.arctan2(p[1], p[0])
+    pose = ToolTarget(p, PITCH, 0.0).pose(chain, azimuth)
+    (best,) = (
+        each.q
+        for each in inverse(chain, pose)
+        if each.within_limits and str(each.branch) == "front-up"
+    )
+    return best
+
+
+@pytest.fixture(scope="module")
+def holding(session: Session, model: RobotModel) -> State:
+    """With the cup between the fingers, on the table."""
+    state = session.begin(session.ready, 0.0, 0.0)
+    state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
+    before = before_cup(session, model, state, BEFORE)
+    state = run(
+        session, state, cmd.Follow(plan_to(model.arm, session.world_at(state), state, before))
+    )
+    at = before_cup(session, model, state, AT)
+    state = run(session, state, cmd.Follow(plan_to(model.arm, session.world_at(state), state, at)))
+    np.testing.assert_allclose(state.q, at, rtol=0, atol=1e-9)
+    return run(session, state, cmd.SetGripper(-0.44))
+
+
+def test_fingers_that_close_on_the_cup_hold_it_where_it_stands(
+    session: Session, holding: State
+) -> None:
+    cup, T = cup_of(session, holding)
+    assert cup.held
+    assert holding.grip == holding.gripper_setpoint
+    let_go = session.surroundings.world([replace(cup, held=False, T=T)])
+    assert let_go is not None
+    x = np.append(holding.q, holding.gripper)
+    for finger in ("finger_left_link", "finger_right_link"):
+        assert 0.0 <= let_go.gap(x, finger, "cup") <= 0.003
+    (stood,) = (thing.T for thing in things_of(load_props()) if thing.name == "cup")
+    np.testing.assert_allclose(T, stood, rtol=0, atol=1e-12)
+    assert holding.status.value == "ok"
+
+
+def lifted(session: Session, model: RobotModel, state: State, by: float) -> State:
+    """With the tool ``by`` [m] higher, pitch and roll as they are."""
+    chain = model.arm.chain_to("grasp")
+    at = ToolTarget.at(chain, state.q)
+    up = replace(at, position=at.position + np.array((0.0, 0.0, by)))
+    way = ToolPath(chain, ToolLine(at, up), state.branch, state.q)
+    return run(
+        session,
+        state,
+        cmd.Follow(plan_along(model.arm, session.world_at(state), state, [way])),
+    )
+
+
+def test_what_is_held_goes_with_the_hand_and_is_looked_at_for_contacts(
+    session: Session, model: RobotModel, holding: State
+) -> None:
+    up = lifted(session, model, holding, 0.12)
+    _, T = cup_of(session, holding)
+    _, T_up = cup_of(session, up)
+    np.testing.assert_allclose(T_up[:3, :3], T[:3, :3], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-9)
+    # Back down by more than there is room for: cup, not fingers, meets the table.
+    chain = model.arm.chain_to("grasp")
+    at = ToolTarget.at(chain, up.q)
+    down = run(session, up, cmd.MoveTool(at.position - [0.0, 0.0, 0.2]))
+    (met,) = (f for f in down.findings if f.reason is Reason.CONTACT)
+    assert met.parts is not None
+    assert set(met.parts) == {"cup", "table"}
+    assert 0.005 <= met.amount < 0.01
+    cup, T = cup_of(session, down)
+    # The way down tilted it a little: what is lowest is an edge of its foot.
+    lowest = T[2, 3] - cup.size[0] * np.sqrt(1.0 - T[2, 2] ** 2)
+    assert met.amount == pytest.approx(lowest, abs=1e-5)
+
+
+def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
+    session: Session, holding: State
+) -> None:
+    tight = run(session, holding, cmd.SetGripper(-0.44))
+    assert tight.gripper == holding.grip
+    stopped = run(session, session.step(tight, [cmd.SetJoint(0, 0.3)], tight.t + 0.01), cmd.Stop())
+    cup, _ = cup_of(session, stopped)
+    assert cup.held
+    assert stopped.halted is not None
+
+
+def test_fingers_that_open_let_the_cup_stand_on_the_table(
+    session: Session, model: RobotModel, holding: State
+) -> None:
+    up = lifted(session, model, holding, 0.03)
+    _, T_up = cup_of(session, up)
+    left = run(session, up, cmd.SetGripper(OPEN))
+    cup, T = cup_of(session, left)
+    assert not cup.held
+    assert left.grip is None
+    np.testing.assert_allclose(T[:2, 3], T_up[:2, 3], rtol=0, atol=1e-12)
+    assert T[2, 3] == 0.0
+    np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=1e-12)
+    # And what stands between open fingers may be left behind.
+    back = before_cup(session, model, left, BEFORE)
+    away = run(session, left, cmd.SetJoints(back))
+    np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
+
+
+def test_one_finger_that_touches_holds_nothing_and_says_which_does_not(
+    session: Session, model: RobotModel
+) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
+    for back in (BEFORE, AT):
+        q = before_cup(session, model, state, back, beside=0.008)
+        plan = plan_to(model.arm, session.world_at(state), state, q)
+        state = run(session, state, cmd.Follow(plan))
+    closed = run(session, state, cmd.SetGripper(-0.44))
+    assert not cup_of(session, closed)[0].held
+    (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
+    assert lopsided.parts is not None
+    assert lopsided.parts[1] == "cup"
+    assert lopsided.amount > 0.003
+    opened = run(session, closed, cmd.SetGripper(OPEN))
+    assert not any(f.reason is Reason.LOPSIDED for f in opened.findings)
+
+
+def thing(name: str = "box", **changed: Any) -> Thing:
+    given: dict[str, Any] = {
+        "name": name, "form": Form.BOX, "size": (0.05, 0.05, 0.05),
+        "T": se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0)),
+    }  # fmt: skip
+    return Thing(**(given | changed))
+
+
+def test_a_thing_put_in_the_way_is_met_at_rest_and_gone_once_taken_away(session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    high = thing(size=(0.05, 0.4, 0.6), T=se3.from_rotation_translation(np.eye(3), (0.2, 0.35, 0)))
+    state = session.step(state, [cmd.Place(high)], 0.01)
+    met = run(session, state, cmd.SetJoint(0, 1.2))
+    (contact,) = (f for f in met.findings if f.reason is Reason.CONTACT)
+    assert contact.parts is not None
+    assert "box" in contact.parts
+    free = run(session, met, cmd.Remove("box"))
+    assert free.q[0] == pytest.approx(1.2)
+
+
+def test_things_are_put_elsewhere_by_name_and_bounded_in_number(session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    commands: list[cmd.Command] = [cmd.Place(thing(f"box {n}")) for n in range(2 * MOST)]
+    state = session.step(state, commands, 0.01)
+    assert len(state.things) == MOST
+    moved = se3.from_rotation_translation(np.eye(3), (0.1, 0.4, 0.0))
+    state = session.step(state, [cmd.Place(thing("cup", T=moved))], 0.02)
+    assert len(state.things) == MOST
+    np.testing.assert_array_equal(cup_of(session, state)[1], moved)
+
+
+def test_what_is_held_cannot_be_put_elsewhere_nor_taken_away(
+    session: Session, holding: State
+) -> None:
+    state = session.step(
+        holding, [cmd.Place(thing("cup")), cmd.Remove("cup"), cmd.Remove("basin")], holding.t + 0.01
+    )
+    assert [each.name for each in state.things] == ["cup"]
+    assert cup_of(session, state)[0].held
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"name": ""},
+        {"name": "x" * 99},
+        {"name": "a\nb"},
+        {"size": (0.1, 0.1)},
+        {"size": (0.1, 0.1, np.nan)},
+        {"size": (0.1, 0.1, 0.0)},
+        {"size": (0.1, 0.1, 99.0)},
+        {"T": np.zeros((4, 4))},
+        {"T": se3.from_rotation_translation(np.eye(3), (0.0, 9.0, 0.0))},
+        {"T": np.full((4, 4), np.nan)},
+    ],
+)
+def test_a_thing_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError):
+        thing(**wrong)
