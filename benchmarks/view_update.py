@@ -108,7 +108,7 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     settings, model = Settings(), load()
     loop, session, mailbox, clock = loop_of(model, settings)
     server, bare = quiet_server(), quiet_server()
-    view = View(server, model, loop.board, mailbox, session.choices, settings.frame_rate)
+    view = View(server, model, loop.board, mailbox, session, settings.frame_rate)
     nodes = BareNodes(bare, model.arm.chain.n)
     ours: list[float] = []
     floor: list[float] = []

@@ -197,7 +197,24 @@ class Loop(Answer, frozen=True, kw_only=True):
     lost: int
 
 
-AnyAnswer = Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop
+class Thing(msgspec.Struct, frozen=True, kw_only=True):
+    """Something that stands around or is held; ``T`` (4, 4) in the base frame. See ``place``."""
+
+    name: str
+    form: str
+    size: Numbers
+    T: list[Numbers]
+    can_be_held: bool
+    held: bool
+
+
+class Things(Answer, frozen=True, kw_only=True):
+    """All of them."""
+
+    things: list[Thing]
+
+
+AnyAnswer = Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop | Things
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
 

@@ -55,6 +55,14 @@ class Frame(Enum):
     """On the table under the control box."""
 
 
+class Form(Enum):
+    """What a thing counts as where contacts are looked for."""
+
+    BOX = "box"
+    CYLINDER = "cylinder"
+    SPHERE = "sphere"
+
+
 class Request(
     msgspec.Struct,
     frozen=True,
@@ -156,10 +164,12 @@ class Joints(Request, frozen=True, kw_only=True):
 class Servo(Request, frozen=True, kw_only=True):
     """One of a stream of joint angles, followed under the limits of speed, acceleration and jerk.
 
-    When no other comes for 0.2 s the arm comes to rest.
+    ``qd`` says how fast they change; without it that is seen from the stream, less exactly. When no
+    other comes for 0.2 s the arm comes to rest.
     """
 
     q: Annotated[list[float], Meta(min_length=1, max_length=16)]
+    qd: Annotated[list[float], Meta(min_length=1, max_length=16)] | None = None
 
 
 class Pose(Request, frozen=True, kw_only=True):
@@ -232,6 +242,28 @@ class Resume(Request, frozen=True):
     """Go on."""
 
 
+class Place(Request, frozen=True, kw_only=True):
+    """Put a thing somewhere: a new one, or one that is there, of which only ``T`` need be given.
+
+    ``form`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
+    cylinder (radius, height) or sphere (radius). Its frame is in the middle of its underside.
+    ``can_be_held``: the fingers may touch it, and hold it when both do.
+    """
+
+    name: Name
+    T: Matrix4
+    frame: Frame = Frame.BASE
+    form: Form | None = None
+    size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
+    can_be_held: bool | None = None
+
+
+class Remove(Request, frozen=True, kw_only=True):
+    """Take a thing away."""
+
+    name: Name
+
+
 class Watch(Request, frozen=True, kw_only=True):
     """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less."""
 
@@ -239,9 +271,10 @@ class Watch(Request, frozen=True, kw_only=True):
 
 
 class Look(Request, frozen=True, kw_only=True):
-    """Tell something once: the state, what arm it is, what held it back, its branches, the loop."""
+    """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
+    the things around it."""
 
-    at: Literal["state", "arm", "ledger", "branches", "loop"] = "state"
+    at: Literal["state", "arm", "ledger", "branches", "loop", "things"] = "state"
 
 
 AnyRequest = (
@@ -273,6 +306,8 @@ AnyRequest = (
     | Hold
     | Pause
     | Resume
+    | Place
+    | Remove
     | Watch
     | Look
 )

@@ -18,6 +18,7 @@ READABLE = {
     "ledger": answers.Ledger,
     "branches": answers.Branches,
     "loop": answers.Loop,
+    "things": answers.Things,
 }
 
 

@@ -141,15 +141,24 @@ def _serve(
         from app.exchange.reachability_file import load_map
         from app.gateway.motion import Motion
         from app.runtime.link import FrontEnd
+        from app.runtime.navigator import Navigator
         from app.view.view import View
 
         stored = None if workspace is None else load_map(workspace)
         model, session, _ = described(settings, *robot)
         link = FrontEnd(pipe, session.check)
+        navigator = Navigator(session, link.board, link)
         view = View(
-            gateway.viser, model, link.board, link, session.choices, settings.frame_rate, stored
+            gateway.viser,
+            model,
+            link.board,
+            navigator,
+            session,
+            settings.frame_rate,
+            stored,
         )
-        gateway.attach(Motion(model, session, link, view.let_go))
+        navigator.tell = gateway.announce
+        gateway.attach(Motion(model, session, link, navigator, view.let_go))
         link.start()
         view.start()
         telling.send(READY)

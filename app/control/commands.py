@@ -51,6 +51,22 @@ class SetJoints:
 
 
 @dataclass(frozen=True, eq=False)
+class Servo:
+    """Keep up with ``q``, (n,) [rad], which is one of a stream; for JOG_TIME after the last.
+
+    qd: (n,) how fast it changes [rad/s]; without it that is seen from the stream.
+    """
+
+    q: FloatArray
+    qd: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", _vector("The joint vector", self.q, None))
+        if self.qd is not None:
+            object.__setattr__(self, "qd", _vector("The joint rates", self.qd, self.q.size))
+
+
+@dataclass(frozen=True, eq=False)
 class MoveTool:
     """Bring the tool point to ``position``, (3,) [m] in {S}; pitch and roll stay as wished."""
 
@@ -239,6 +255,7 @@ class Remove:
 Command = (
     SetJoint
     | SetJoints
+    | Servo
     | MoveTool
     | TurnTool
     | SetPose

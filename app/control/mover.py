@@ -16,6 +16,7 @@ from app.collision.clearance import SETTLING, advance, surely_clear
 from app.collision.contact import Contact
 from app.collision.world import LONGEST_WAY, World
 from app.control.arm import Arm
+from app.control.commands import JOG_TIME
 from app.control.follower import Follower
 from app.control.following import Following
 from app.control.state import Finding, Jogging, Reason, State
@@ -152,6 +153,10 @@ class Mover:
             if state.jogging is not None:
                 rates = share * _rates(chain, motion.q, state.jogging, dt)
                 ahead = self._any.at_rate(motion, rates, dt)
+            elif state.servo is not None:
+                late = min(state.t - state.servo.t, JOG_TIME)
+                now = chain.clamp(state.servo.q + late * state.servo.qd)
+                ahead = limiter.beside(motion, now, state.servo.qd, dt, share)
             else:
                 ahead = limiter.towards(motion, state.goal, dt, share)
             speed = tool_speed(chain, ahead.q, ahead.qd)
@@ -170,7 +175,7 @@ class Mover:
     def _share(self, chain: Chain, state: State) -> float:
         """Of the joints' speeds, how much the tool may have on its way to the goal."""
         way = state.goal - state.setpoint
-        if state.jogging is not None or not way.any():
+        if state.jogging is not None or state.servo is not None or not way.any():
             return 1.0
         fastest = way / float(np.max(np.abs(way) / chain.speed))
         # Where the arm is by the time it could have slowed down the tool may be farther out.

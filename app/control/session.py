@@ -23,11 +23,12 @@ from app.control.state import (
     JointTarget,
     PoseTarget,
     Reason,
+    Servoing,
     State,
     Target,
     ToolTarget,
 )
-from app.control.things import MOST, Hand, Surroundings, Thing
+from app.control.things import Hand, Surroundings, Thing, placed
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
@@ -47,6 +48,9 @@ SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Place, cmd.Remove)
 
 AT_START = 1e-6
 """[rad] An arm that is no farther from the start of a plan stands there: no encoder tells it."""
+
+SEEN = 0.06
+"""[s] Over which it is seen how fast a stream changes."""
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -120,7 +124,7 @@ class Session:
         match command:
             case cmd.SetJoint(axis=axis) if axis >= n:
                 raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
-            case cmd.SetJoints(q=q) if q.shape != (n,):
+            case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
                 raise InputError(f"This arm has {n} joints, the command {q.size}.")
             case cmd.SetTool(name=name):
                 self.arm.chain_to(name)
@@ -146,6 +150,8 @@ class Session:
             state = self._take(state, command)
         if isinstance(state.target, ToolTarget) and state.since is not None:
             state = self._follow(state, state.target, state.since)
+        if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
+            state = self._aim(state, JointTarget(self._mover(state).halt(state)[0]))
         dt = min(t - state.t, LONGEST_STEP)
         state = self._mover(state).step(replace(state, t=max(t, state.t)), dt)
         state = gripped(self.surroundings, self.world_at(state), state)
@@ -168,6 +174,7 @@ class Session:
             since=None,
             let_go=False,
             jogging=None,
+            servo=None,
             following=None,
         )
         return replace(held, findings=(Finding(Reason.INTERNAL),))
@@ -204,6 +211,8 @@ class Session:
                 return self._aim(state, JointTarget(frozen(q)))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
+            case cmd.Servo(q=q, qd=qd):
+                return self._keep_up(state, q, qd)
             case cmd.Home():
                 return self._aim(state, JointTarget(self.ready))
             case cmd.Stretch():
@@ -231,9 +240,9 @@ class Session:
             case cmd.SetReading(reading=reading):
                 return self._reread(replace(state, reading=reading))
             case cmd.TakeBranch(branch=branch):
-                return self._take_branch(state, branch)
+                return self.taken(state, branch)
             case cmd.Place(thing=thing):
-                return replace(state, things=_placed(state.things, thing))
+                return replace(state, things=placed(state.things, thing))
             case cmd.Remove(name=name):
                 things = tuple(each for each in state.things if each.held or each.name != name)
                 return replace(state, things=things)
@@ -252,6 +261,19 @@ class Session:
         )
         findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
         return self._gone(state, target, best.q, findings)
+
+    def _keep_up(self, state: State, q: FloatArray, qd: FloatArray | None) -> State:
+        """Take ``q`` (n,) for the newest of a stream, and ``qd`` (n,) for how fast it changes."""
+        before, chain = state.servo, self.arm.chain
+        aimed = self._aim(state, JointTarget(q))
+        if qd is None:
+            qd = np.zeros(chain.n) if before is None else before.qd
+            if before is not None and state.t > before.t:
+                dt = state.t - before.t
+                # Streams come unevenly.
+                qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
+        qd = frozen(np.clip(qd, -chain.speed, chain.speed))
+        return replace(aimed, servo=Servoing(aimed.goal, qd, state.t))
 
     def _reread(self, state: State) -> State:
         """Go for what is wished in the reading there is now."""
@@ -320,6 +342,7 @@ class Session:
             since=None,
             let_go=False,
             jogging=None,
+            servo=None,
         )
         return _leaving(aimed)
 
@@ -341,6 +364,7 @@ class Session:
             since=None,
             let_go=False,
             jogging=None,
+            servo=None,
         )
         return replace(halted, findings=(Finding(Reason.HALTED, way, time=time),))
 
@@ -367,7 +391,7 @@ class Session:
     def _without(state: State, reason: Reason) -> State:
         return replace(state, findings=tuple(f for f in state.findings if f.reason is not reason))
 
-    def _take_branch(self, state: State, branch: Branch) -> State:
+    def taken(self, state: State, branch: Branch) -> State:
         """Leap to ``branch`` with the tool where it is wished."""
         best = choice(self.arm, state, branch)
         target: Target = JointTarget(best.q)
@@ -376,7 +400,7 @@ class Session:
         elif isinstance(state.target, ToolTarget):
             target = wish_on(self.arm, state, branch)
         findings = of_projection(
-            self.arm.chain,
+            self.arm.chain_to(state.tool),
             best,
             state.reading,
             yaw_was_wished=isinstance(target, PoseTarget),
@@ -391,14 +415,6 @@ class Session:
         beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
         held = (Finding(Reason.GRIPPER_LIMIT, goal),) if beyond else ()
         return replace(state, gripper_goal=goal, findings=others + held)
-
-
-def _placed(things: tuple[Thing, ...], thing: Thing) -> tuple[Thing, ...]:
-    """``things`` with ``thing`` in place of the one of its name, or as one more."""
-    known = [each.name for each in things]
-    if thing.name not in known:
-        return (*things, thing) if len(things) < MOST else things
-    return tuple(thing if each.name == thing.name and not each.held else each for each in things)
 
 
 def _leaving(state: State) -> State:

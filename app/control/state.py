@@ -118,6 +118,16 @@ class Jogging:
 
 
 @dataclass(frozen=True, eq=False)
+class Servoing:
+    """A stream of joint angles: the last of them, q (n,) [rad], how fast they change, qd (n,)
+    [rad/s], and when it came, t [s]."""
+
+    q: FloatArray
+    qd: FloatArray
+    t: float
+
+
+@dataclass(frozen=True, eq=False)
 class State:
     """Everything the session knows after a tick.
 
@@ -136,6 +146,7 @@ class State:
         paused: whether the arm waits on its way because a person wants it to.
         speed: the share of every greatest speed that is allowed, above 0 and up to 1.
         jogging: the jog under way, if one is.
+        servo: the stream that is kept up with, if one is.
         since: how far along its way the target has been followed, while the goal is still on its
             way to it; None once it is there. Until then the findings are those from before.
         things: what stands around or is held, and can be put elsewhere.
@@ -162,6 +173,7 @@ class State:
     paused: bool = False
     speed: float = 1.0
     jogging: Jogging | None = None
+    servo: Servoing | None = None
     since: ToolTarget | None = None
     let_go: bool = False
     following: Following | None = None
@@ -201,6 +213,7 @@ class State:
             (self.setpoint != self.goal).any()
             or not self.motion.at_rest
             or self.jogging is not None
+            or self.servo is not None
             or (self.following is not None and not self.following.there)
             or self.gripper_setpoint != self.gripper_goal
         )

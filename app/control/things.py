@@ -97,6 +97,17 @@ class Thing:
         return self.T @ up
 
 
+def placed(things: tuple[Thing, ...], thing: Thing) -> tuple[Thing, ...]:
+    """``things`` with ``thing`` in place of the one of its name, or as one more if there is room.
+
+    What is held stays.
+    """
+    known = [each.name for each in things]
+    if thing.name not in known:
+        return (*things, thing) if len(things) < MOST else things
+    return tuple(thing if each.name == thing.name and not each.held else each for each in things)
+
+
 @dataclass(frozen=True)
 class Hand:
     """What the arm takes things with.

@@ -86,6 +86,7 @@ class Gateway:
         )
         self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
         self._started = threading.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self) -> None:
         """Answer from now on."""
@@ -96,6 +97,12 @@ class Gateway:
     def attach(self, arm: Motion) -> None:
         """From now on the arm can be driven."""
         self._hub.arm = arm
+
+    def announce(self, why: str) -> None:
+        """Tell everybody why something that was asked is not done. For any thread."""
+        loop = self._loop
+        if loop is not None:
+            loop.call_soon_threadsafe(self._hub.announce, why)
 
     def stop(self) -> None:
         """Close every socket and the port; viser is left to its view."""
@@ -108,6 +115,7 @@ class Gateway:
         asyncio.run(self._serve())
 
     async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
         watch = asyncio.create_task(self._watch())
         try:
             async with self._lines.open(self._lines_at):

@@ -17,6 +17,7 @@ from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
 from app.control.ledger import Entry
 from app.control.state import State
+from app.control.things import Surroundings
 from app.errors import LeaseError
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
@@ -55,10 +56,16 @@ class Arm(Protocol):
     def lateness(self) -> Lateness: ...
 
     @property
+    def surroundings(self) -> Surroundings: ...
+
+    @property
     def ledger(self) -> Sequence[Entry]: ...
 
     @property
     def caught_up(self) -> bool: ...
+
+    @property
+    def busy(self) -> bool: ...
 
     def beat(self) -> None: ...
 
@@ -117,7 +124,6 @@ class Hub:
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
         self._jogged = -JOG_TIME
-        self._servoed: float | None = None
         self._looked = clock()
 
     # Coming and going
@@ -178,6 +184,11 @@ class Hub:
         """All that are open, the oldest first."""
         return sorted(self._windows.values(), key=lambda window: window.number)
 
+    def announce(self, why: str) -> None:
+        """Tell everybody why something that was asked is not done. For any thread."""
+        for window in self.windows:
+            window.tell({"is": "refused", "why": why})
+
     # What people do
 
     def stop(self, name: str) -> None:
@@ -235,22 +246,13 @@ class Hub:
         arm = self._check_runs()
         self._grasp(window)
         arm.jog(rates, frame)
-        self._servoed = None
         self._jogged = self.clock() if any(rates) else -JOG_TIME
 
     def move(self, window: Window, command: cmd.Command) -> int:
         """Any other command of whoever drives; its ticket."""
         arm = self._check_runs()
         self._grasp(window)
-        ticket = arm.put(command)
-        self._servoed = None
-        return ticket
-
-    def servo(self, window: Window, command: cmd.Command) -> int:
-        """One of a stream of commands: when no other comes for JOG_TIME the arm comes to rest."""
-        ticket = self.move(window, command)
-        self._servoed = self.clock()
-        return ticket
+        return arm.put(command)
 
     def set_speed(self, window: Window, speed: float) -> None:
         self._grasp(window)
@@ -267,8 +269,6 @@ class Hub:
         # When this thread was held up itself, what came in the meantime is read first.
         if not late:
             self._listen_for_silence(t)
-        if self._servoed is not None and t - self._servoed > JOG_TIME:
-            self._hold()
         if self.arm is not None:
             self.arm.beat()
             self.journal.follow(self.arm.ledger, self._who())
@@ -319,7 +319,6 @@ class Hub:
         for _, drags in self._pictures.values():
             drags.clear()
         self._jogged = -JOG_TIME
-        self._servoed = None
 
     def _hold(self) -> None:
         self._let_go()

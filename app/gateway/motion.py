@@ -12,6 +12,7 @@ from app.control.choices import Choice
 from app.control.ledger import Entry
 from app.control.session import Session
 from app.control.state import State
+from app.control.things import Surroundings
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
@@ -19,6 +20,7 @@ from app.robot.model import RobotModel
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.link import FrontEnd
+from app.runtime.navigator import Navigator
 
 
 class Motion:
@@ -29,6 +31,7 @@ class Motion:
         model: RobotModel,
         session: Session,
         link: FrontEnd,
+        navigator: Navigator,
         let_go: Callable[[], None],
     ) -> None:
         """``let_go`` takes the handles of the view out of every hand."""
@@ -36,7 +39,7 @@ class Motion:
         self._session = session
         self._link = link
         self._board = link.board
-        self._mailbox = link
+        self._navigator = navigator
         self._let_go = let_go
 
     @property
@@ -50,6 +53,11 @@ class Motion:
         return self._session.ready
 
     @property
+    def surroundings(self) -> Surroundings:
+        """Knows where things are."""
+        return self._session.surroundings
+
+    @property
     def lateness(self) -> Lateness:
         """How well the control loop keeps its period."""
         return self._board.lateness
@@ -60,7 +68,7 @@ class Motion:
 
     def put(self, command: cmd.Command) -> int:
         """Any command; its ticket. Raises InputError for one that cannot be."""
-        return self._mailbox.put(command)
+        return self._navigator.put(command)
 
     @property
     def state(self) -> State:
@@ -77,18 +85,23 @@ class Motion:
         """Whether the newest state has every command in it."""
         return self.snapshot.ticket == self._link.last_ticket
 
+    @property
+    def busy(self) -> bool:
+        """Whether a way is being worked out that the arm will then go."""
+        return self._navigator.busy
+
     def beat(self) -> None:
         """Tell the arm that somebody watches over it."""
         self._link.beat()
 
     def stop(self) -> None:
         """Rest as fast as the arm can; it obeys nothing until it is released."""
-        self._mailbox.put(cmd.Stop())
+        self._navigator.put(cmd.Stop())
         self._let_go()
 
     def release(self) -> None:
         """After a stop: obey again. Nothing moves by this."""
-        self._mailbox.put(cmd.Release())
+        self._navigator.put(cmd.Release())
 
     def hold(self) -> None:
         """Come to rest and forget every target; no hand holds a handle any more."""
@@ -105,7 +118,7 @@ class Motion:
 
     def _put(self, command: cmd.Command) -> None:
         try:
-            self._mailbox.put(command)
+            self._navigator.put(command)
         except InputError:
             # The mailbox is full: what is asked again and again is, and a stop always has room.
             return

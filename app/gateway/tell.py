@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from app.api import answers
 from app.control import state as control
 from app.control.choices import Choice
@@ -50,7 +52,7 @@ def state(hub: Hub) -> answers.State:
         branch=(now.branch.shoulder, now.branch.elbow),
         reading=now.reading.value,
         status=now.status.value,
-        moving=now.moving,
+        moving=now.moving or arm.busy,
         why=sentence(now),
         findings=[finding(each) for each in now.findings],
         speed=now.speed,
@@ -103,6 +105,26 @@ def choice(choice: Choice) -> answers.Choice:
         time=badge.time,
         smallest_singular_value=badge.smallest_singular_value,
         contact=None if contact is None else contact.parts,
+    )
+
+
+def things(hub: Hub) -> answers.Things:
+    """What stands around or is held. Raises LeaseError while there is no arm yet."""
+    arm = hub.present()
+    now = arm.state
+    x = np.append(now.q, now.gripper)
+    return answers.Things(
+        things=[
+            answers.Thing(
+                name=each.name,
+                form=each.form.value,
+                size=list(each.size),
+                T=arm.surroundings.pose(each, x).tolist(),
+                can_be_held=each.can_be_held,
+                held=each.held,
+            )
+            for each in now.things
+        ]
     )
 
 

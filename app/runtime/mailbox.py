@@ -13,7 +13,15 @@ from app.errors import InputError
 CAPACITY = 256
 """Commands that may wait for one tick: far more than people make in 10 ms, few enough to do."""
 
-STREAMS = (cmd.SetJoint, cmd.SetJoints, cmd.MoveTool, cmd.TurnTool, cmd.SetPose, cmd.SetGripper)
+STREAMS = (
+    cmd.SetJoint,
+    cmd.SetJoints,
+    cmd.Servo,
+    cmd.MoveTool,
+    cmd.TurnTool,
+    cmd.SetPose,
+    cmd.SetGripper,
+)
 """Commands of which the last one is enough when several of a kind follow each other."""
 
 

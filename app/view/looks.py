@@ -20,11 +20,12 @@ PERSONAL = ("View", "Theme")
 class Shows:
     """What the controls call.
 
-    ellipsoid: shows or hides it. look_from: turns one browser's camera. reachability: the map, if
-    one was given.
+    ellipsoid, handles: show or hide them. look_from: turns one browser's camera. reachability: the
+    map, if one was given.
     """
 
     ellipsoid: Callable[[bool], None]
+    handles: Callable[[bool], None]
     look_from: Callable[[viser.ClientHandle, Preset], None]
     reachability: ReachabilityCloud | None
 
@@ -59,6 +60,12 @@ def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
         hint="How fast the tool point can go in each direction: flat where one is lost",
     )
     box.on_update(lambda _: shows.ellipsoid(box.value))
+    handles = gui.add_checkbox(
+        "Handles on things",
+        initial_value=False,
+        hint="Arrows by which cup and basin can be put elsewhere on the table",
+    )
+    handles.on_update(lambda _: shows.handles(handles.value))
     cloud = shows.reachability
     if cloud is not None:
         names = tuple(cut.value for cut in Cut)

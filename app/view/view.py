@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from app.control.commands import Command
+from app.control.session import Session
 from app.control.state import PoseTarget, State, Status, ToolTarget
 from app.errors import InputError
 from app.exchange.reachability_file import StoredMap
@@ -21,7 +22,6 @@ from app.robot.model import RobotModel
 from app.robot.props import load_props
 from app.runtime.board import Board, Snapshot
 from app.runtime.mailbox import CommandSink
-from app.view.branches import Find
 from app.view.cameras import Cameras, Preset
 from app.view.conduit import Conduits
 from app.view.ellipsoid import Ellipsoid
@@ -31,6 +31,7 @@ from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
+from app.view.things import ThingNodes
 from app.view.tint import Tint
 from app.view.workcell import Workcell
 
@@ -61,12 +62,12 @@ class View:
         model: RobotModel,
         board: Board,
         mailbox: CommandSink,
-        find: Find,
+        session: Session,
         frame_rate: float,
         stored: StoredMap | None = None,
     ) -> None:
-        """``find``: the branches to choose from. ``frame_rate``: most updates a second [Hz].
-        ``stored``: a workspace that can be shown.
+        """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
+        second [Hz]. ``stored``: a workspace that can be shown.
 
         Raises ConfigurationError for the map of another arm.
         """
@@ -82,6 +83,7 @@ class View:
         furnish(server)
         props = load_props()
         Workcell(server, props)
+        self._things = ThingNodes(server, props, session.surroundings, self._put_from_gizmo)
         state = board.snapshot.state
         self._arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self._arm)
@@ -92,11 +94,11 @@ class View:
         self._ellipsoid = Ellipsoid(server, model)
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
         self._cameras = Cameras(server, model)
-        shows = Shows(self._show_ellipsoid, self._look_from, cloud)
+        shows = Shows(self._show_ellipsoid, self._things.show_handles, self._look_from, cloud)
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
-        self._panel = Panel(server, model, mailbox.put, find, shows, state)
+        self._panel = Panel(server, model, mailbox.put, session.choices, shows, state)
         self.show(board.snapshot)
 
     def start(self) -> None:
@@ -115,6 +117,7 @@ class View:
     def let_go(self) -> None:
         """Take the handle out of every hand: what is dragged on with it moves nothing."""
         self._gizmo.let_go()
+        self._things.let_go()
 
     def _put_from_gizmo(self, command: Command) -> None:
         try:
@@ -156,6 +159,7 @@ class View:
             angles = self._model.joint_angles(state.q, state.gripper)
             self._arm.move(angles)
             self._conduits.move(angles)
+            self._things.follow(state)
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)

@@ -33,7 +33,10 @@ while (t = toc (begun)) < seconds
   angle = 2 * pi * (share - sin (2 * pi * share) / (2 * pi));
   angles(end + 1, 1) = angle;
   asked(end + 1, :) = joints (angle);
-  katana_say (arm, struct ("do", "servo", "q", asked(end, :)));
+  rate = 2 * pi / seconds * (1 - cos (2 * pi * share));
+  ahead = joints (angle + 1e-4) - joints (angle - 1e-4);
+  request = struct ("do", "servo", "q", asked(end, :), "qd", rate * ahead / 2e-4);
+  katana_say (arm, request);
   state = katana_hear (arm, "state");
   traced(end + 1, :) = state.T(1:3, 4)';
 end

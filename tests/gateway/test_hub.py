@@ -15,6 +15,7 @@ from app.control.lease import LOST_AFTER, Lease, Role
 from app.control.ledger import Entry
 from app.control.session import Session
 from app.control.state import Finding, Halt, Reason, State
+from app.control.things import Surroundings
 from app.errors import LeaseError
 from app.gateway import tell
 from app.gateway.door import Visitor
@@ -37,6 +38,7 @@ class FakeArm:
     snapshot: Snapshot
     ready: FloatArray
     lateness: Lateness
+    surroundings: Surroundings
 
     def __init__(self, state: State) -> None:
         self.rest = state
@@ -60,6 +62,10 @@ class FakeArm:
     @property
     def caught_up(self) -> bool:
         return True
+
+    @property
+    def busy(self) -> bool:
+        return False
 
     def beat(self) -> None:
         self.beats += 1

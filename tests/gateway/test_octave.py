@@ -45,4 +45,4 @@ def test_octave_goes_round_the_papers_circle(model: RobotModel) -> None:
         nearest = min(np.abs(each.q - asked).max() for each in inverse(chain, T))
         assert nearest < 1e-9
     assert told["states"] > 200
-    assert told["largest_error_mm"] < 10.0
+    assert told["largest_error_mm"] < 5.0
