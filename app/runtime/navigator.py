@@ -44,8 +44,8 @@ class Navigator:
 
     @property
     def busy(self) -> bool:
-        """Whether a way is under work."""
-        return self._work is not None
+        """Whether a way is under work, or found and not begun yet."""
+        return self._work is not None or self._board.snapshot.ticket < self.last_ticket
 
     def put(self, command: cmd.Command) -> int:
         """See ``CommandSink``; the command that follows a way found later has no ticket."""
