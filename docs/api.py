@@ -88,7 +88,8 @@ def page() -> str:
         parts += [_kind(kind, tag) for kind in schema.kinds(union)]
     parts.append("### In answers\n")
     parts += [
-        _kind(kind, None) for kind in (answers.Finding, answers.Line, answers.Choice, answers.Thing)
+        _kind(kind, None)
+        for kind in (answers.Finding, answers.Water, answers.Line, answers.Choice, answers.Thing)
     ]
     return "\n".join(parts)
 

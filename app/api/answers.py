@@ -74,6 +74,16 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float | None = None
 
 
+class Water(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the water is [ml], and how far the cup's lip is above it [m], negative as it flows."""
+
+    cup_ml: float
+    basin_ml: float
+    air_ml: float
+    spilled_ml: float
+    margin_to_rim: float
+
+
 class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
@@ -89,6 +99,7 @@ class State(Answer, frozen=True, kw_only=True):
         speed: share of full speed.
         holder: name of who holds the arm. stopped: why nothing moves after a STOP.
         windows: how many pages and programs are open.
+        water: of the cup; null where there is none.
     """
 
     t: float
@@ -112,6 +123,7 @@ class State(Answer, frozen=True, kw_only=True):
     holder: str | None
     stopped: str | None
     windows: int
+    water: Water | None
 
 
 class Arm(Answer, frozen=True, kw_only=True):

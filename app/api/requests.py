@@ -264,6 +264,12 @@ class Remove(Request, frozen=True, kw_only=True):
     name: Name
 
 
+class Fill(Request, frozen=True, kw_only=True):
+    """Fill the cup with so many ml of water, and wipe up what is elsewhere."""
+
+    ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
+
+
 class Watch(Request, frozen=True, kw_only=True):
     """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less."""
 
@@ -308,6 +314,7 @@ AnyRequest = (
     | Resume
     | Place
     | Remove
+    | Fill
     | Watch
     | Look
 )

@@ -16,6 +16,7 @@ from app.drivers.simulated import SimulatedDriver
 from app.robot.collision import hand_of, table, things_of, world_of
 from app.robot.model import RobotModel, load
 from app.robot.props import load_props
+from app.robot.water import around_of
 from app.runtime.clock import MonotonicClock
 from app.runtime.link import ArmEnd
 from app.runtime.loop import ControlLoop
@@ -42,14 +43,22 @@ def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     model = load(urdf, tool)
     world, left_out = world_of(model)
     notes = [*model.notes, *left_out]
+    props = load_props()
     hand: Hand | None = None
     things: tuple[Thing, ...] = ()
     if world is None:
         notes.append(UNCHECKED)
     else:
-        hand, things = hand_of(model, world), things_of(load_props())
+        hand, things = hand_of(model, world), things_of(props)
         world = world.with_obstacles((table(),))
-    session = Session(model.arm, model.ready(settings.ready), world, hand=hand, things=things)
+    session = Session(
+        model.arm,
+        model.ready(settings.ready),
+        world,
+        hand=hand,
+        things=things,
+        around=around_of(props) if things else None,
+    )
     return Described(model, session, tuple(notes))
 
 

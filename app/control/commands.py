@@ -246,6 +246,16 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Fill:
+    """Fill the cup with ``volume`` [m^3] of water, and wipe up what is elsewhere."""
+
+    volume: float
+
+    def __post_init__(self) -> None:
+        _check_finite("The volume", self.volume)
+
+
+@dataclass(frozen=True)
 class Remove:
     """Take the thing of that name away; what is held stays."""
 
@@ -275,6 +285,7 @@ Command = (
     | GoAlong
     | Place
     | Remove
+    | Fill
     | SpeedScale
     | Jog
 )

@@ -16,6 +16,7 @@ from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.following import Following
 from app.control.grip import gripped
 from app.control.mover import Mover
+from app.control.pouring import Pouring
 from app.control.state import (
     Finding,
     Halt,
@@ -36,6 +37,7 @@ from app.kinematics.projection import project
 from app.kinematics.tracker import track
 from app.motion.limiter import Motion
 from app.planning.plan import Plan
+from app.water.around import Around
 
 TOOL_SPEED = 0.5
 """[m/s] The most of the tool point, unless somebody says otherwise: a person can follow it."""
@@ -43,7 +45,7 @@ TOOL_SPEED = 0.5
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
-SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Place, cmd.Remove)
+SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Place, cmd.Remove, cmd.Fill)
 """What counts while a stop holds the arm."""
 
 AT_START = 1e-6
@@ -68,17 +70,20 @@ class Session:
         tool_speed: float = TOOL_SPEED,
         hand: Hand | None = None,
         things: tuple[Thing, ...] = (),
+        around: Around | None = None,
     ) -> None:
         """``ready``: (n,) the posture [rad] that Home drives to, inside the limits.
 
         ``world``: what the arm must not touch; without one nothing keeps it from touching.
         ``tool_speed``: the most of the tool point [m/s]. ``hand``: what takes things; ``things``:
-        those that stand around at the beginning.
+        those that stand around at the beginning. ``around``: what water is in and falls on; without
+        it there is none.
         """
         self.arm = arm
         self.world = world
         self.surroundings = Surroundings(world, hand)
         self._things = things
+        self.pouring = None if around is None else Pouring(around, self.surroundings)
         self._tool_speed = tool_speed
         # Of the things there are at present: no state, but what follows from them.
         self._made: tuple[tuple[Thing, ...], World | None, Mover] | None = None
@@ -128,6 +133,10 @@ class Session:
                 raise InputError(f"This arm has {n} joints, the command {q.size}.")
             case cmd.SetTool(name=name):
                 self.arm.chain_to(name)
+            case cmd.Fill(volume=volume):
+                if self.pouring is None:
+                    raise InputError("There is no cup to fill.")
+                self.pouring.check(volume)
             case cmd.Follow(plan=plan):
                 chains = [segment.path.chain for segment in plan.segments]
                 if any(not np.array_equal(chain.S, self.arm.chain.S) for chain in chains):
@@ -155,6 +164,9 @@ class Session:
         dt = min(t - state.t, LONGEST_STEP)
         state = self._mover(state).step(replace(state, t=max(t, state.t)), dt)
         state = gripped(self.surroundings, self.world_at(state), state)
+        if self.pouring is not None and state.poured is not None:
+            x = np.append(state.setpoint, state.gripper_setpoint)
+            state = replace(state, poured=self.pouring.step(state.poured, state.things, x, dt))
         return state if state.jogging is None else self._jogged(state)
 
     @staticmethod
@@ -246,8 +258,15 @@ class Session:
             case cmd.Remove(name=name):
                 things = tuple(each for each in state.things if each.held or each.name != name)
                 return replace(state, things=things)
+            case cmd.Fill(volume=volume):
+                return self._fill(state, volume)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
+
+    def _fill(self, state: State, volume: float) -> State:
+        assert self.pouring is not None
+        x = np.append(state.setpoint, state.gripper_setpoint)
+        return replace(state, poured=self.pouring.fill(volume, state.things, x))
 
     def _aim(self, state: State, target: JointTarget | PoseTarget) -> State:
         """Make ``target`` the target, and the nearest the arm can do the goal."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from app.control.following import Following
+from app.control.pouring import Poured
 from app.control.things import Thing
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
@@ -151,6 +152,7 @@ class State:
             way to it; None once it is there. Until then the findings are those from before.
         things: what stands around or is held, and can be put elsewhere.
         grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
+        poured: the water of the cup; None where there is none.
         let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
         following: the plan the arm is on and where on it, until it is told to go elsewhere; None
             when it is on none.
@@ -179,6 +181,7 @@ class State:
     following: Following | None = None
     things: tuple[Thing, ...] = ()
     grip: float | None = None
+    poured: Poured | None = None
 
     @property
     def status(self) -> Status:

@@ -96,6 +96,8 @@ class Desk:
                 return cmd.SetGripper(angle)
             case requests.Place():
                 return cmd.Place(self._thing(request))
+            case requests.Fill(ml=ml):
+                return cmd.Fill(1e-6 * ml)
             case requests.Remove(name=name):
                 self._out_of_the_hand(name)
                 return cmd.Remove(name)

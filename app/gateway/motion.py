@@ -10,6 +10,7 @@ from app.api.requests import Rates
 from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.ledger import Entry
+from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import State
 from app.control.things import Surroundings
@@ -56,6 +57,11 @@ class Motion:
     def surroundings(self) -> Surroundings:
         """Knows where things are."""
         return self._session.surroundings
+
+    @property
+    def pouring(self) -> Pouring | None:
+        """Knows where water is."""
+        return self._session.pouring
 
     @property
     def lateness(self) -> Lateness:

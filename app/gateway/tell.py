@@ -7,6 +7,7 @@ import numpy as np
 from app.api import answers
 from app.control import state as control
 from app.control.choices import Choice
+from app.control.pouring import Pouring
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
@@ -14,6 +15,7 @@ from app.kinematics.tool import ToolTarget
 from app.robot.model import RobotModel
 from app.runtime.lateness import Lateness
 from app.view.texts import sentence, told
+from app.water.units import MILLILITRE
 
 
 def finding(found: control.Finding) -> answers.Finding:
@@ -59,6 +61,21 @@ def state(hub: Hub) -> answers.State:
         holder=None if holder is None else holder.name,
         stopped=None if stopped is None else stopped.why,
         windows=len(hub.windows),
+        water=water(arm.pouring, now),
+    )
+
+
+def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
+    """Where it is."""
+    if pouring is None or now.poured is None:
+        return None
+    water = now.poured.water
+    return answers.Water(
+        cup_ml=water.cup / MILLILITRE,
+        basin_ml=water.basin / MILLILITRE,
+        air_ml=water.air / MILLILITRE,
+        spilled_ml=water.spilled / MILLILITRE,
+        margin_to_rim=pouring.margin_to_rim(now.poured, now.things),
     )
 
 

@@ -95,4 +95,6 @@ def _differs(a: State, b: State) -> bool:
         or a.goal is not b.goal
         or a.target is not b.target
         or a.findings != b.findings
+        or a.things is not b.things
+        or a.poured is not b.poured
     )

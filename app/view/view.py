@@ -33,7 +33,9 @@ from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
 from app.view.things import ThingNodes
 from app.view.tint import Tint
+from app.view.water import WaterNodes
 from app.view.workcell import Workcell
+from app.water.around import Around
 
 log = logging.getLogger(__name__)
 
@@ -72,6 +74,7 @@ class View:
         Raises ConfigurationError for the map of another arm.
         """
         self._server = server
+        self._session = session
         self._model = model
         self._board = board
         self._mailbox = mailbox
@@ -95,6 +98,9 @@ class View:
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
         self._cameras = Cameras(server, model)
         shows = Shows(self._show_ellipsoid, self._things.show_handles, self._look_from, cloud)
+        # Made when there is water.
+        self._water: WaterNodes | None = None
+        self._around: Around | None = None
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
@@ -160,6 +166,7 @@ class View:
             self._arm.move(angles)
             self._conduits.move(angles)
             self._things.follow(state)
+            self._show_water(state)
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
@@ -171,6 +178,20 @@ class View:
                 caught_up=snapshot.ticket == self._mailbox.last_ticket,
             )
         self._server.flush()
+
+    def _show_water(self, state: State) -> None:
+        pouring = self._session.pouring
+        if pouring is None or state.poured is None:
+            if self._water is not None:
+                self._water.hide()
+            return
+        around = pouring.around(state.things)
+        if self._water is None:
+            self._water = WaterNodes(self._server, around)
+        elif around is not self._around:
+            self._water.stand(around)
+        self._around = around
+        self._water.show(state.poured.water)
 
     def _show_goal(self, state: State) -> None:
         away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM

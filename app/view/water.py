@@ -62,10 +62,15 @@ class WaterNodes:
         corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
         self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
         self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
-        x, y, z = around.basin.at
-        self._basin.position = (x, y, z + around.basin.floor)
+        self.stand(around)
         # Made when they are first needed: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
+
+    def stand(self, around: Around) -> None:
+        """From now on cup and basin are as ``around`` says."""
+        self._around, self._flow = around, Flow(around)
+        x, y, z = around.basin.at
+        self._basin.position = (x, y, z + around.basin.floor)
 
     def show(self, water: Water) -> None:
         """Draw ``water``."""

@@ -154,7 +154,7 @@ def test_everything_there_is_to_ask_for_has_an_answer(arm: Client) -> None:
         requests.Tool(name="tcp"), requests.Joint(axis=5, value=0.1), requests.Pause(),
         requests.Resume(), requests.Settle(), requests.Hold(), requests.Stretch(),
         requests.Home(), requests.Jog(rates=(0.0, 0.0, 0.05, 0.0, 0.0)),
-        requests.Servo(q=READY.tolist()), requests.Look(at="loop"),
+        requests.Servo(q=READY.tolist()), requests.Fill(ml=150.0), requests.Look(at="loop"),
         requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
         *(requests.Read(reading=each) for each in reversed(Reading)),
     ]  # fmt: skip

@@ -13,6 +13,7 @@ from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.lease import LOST_AFTER, Lease, Role
 from app.control.ledger import Entry
+from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import Finding, Halt, Reason, State
 from app.control.things import Surroundings
@@ -39,6 +40,7 @@ class FakeArm:
     ready: FloatArray
     lateness: Lateness
     surroundings: Surroundings
+    pouring: Pouring | None
 
     def __init__(self, state: State) -> None:
         self.rest = state

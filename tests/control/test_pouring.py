@@ -1,0 +1,122 @@
+"""Water in the cup that the arm holds: it stays level, is carried, poured, and kept count of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.state import State
+from app.control.things import Thing
+from app.errors import InputError
+from app.geometry import se3
+from app.geometry.arrays import FloatArray
+from app.robot.collision import hand_of, table, things_of, world_of
+from app.robot.model import RobotModel
+from app.robot.props import load_props
+from app.robot.water import around_of
+from app.settings import Settings
+from app.water.units import counted
+
+ML = 1e-6
+FULL = counted(200.0 * ML)
+
+
+@pytest.fixture(scope="module")
+def session(model: RobotModel) -> Session:
+    world, _ = world_of(model)
+    assert world is not None
+    props = load_props()
+    return Session(
+        model.arm,
+        model.ready(Settings().ready),
+        world.with_obstacles((table(),)),
+        hand=hand_of(model, world),
+        things=things_of(props),
+        around=around_of(props),
+    )
+
+
+def tick(session: Session, state: State, *commands: cmd.Command, times: int = 1) -> State:
+    for number in range(times):
+        given = commands if number == 0 else ()
+        state = session.step(state, given, state.t + 0.01)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    return state
+
+
+@pytest.fixture
+def full(session: Session) -> State:
+    return tick(session, session.begin(session.ready, 0.0, 0.0), cmd.Fill(200.0 * ML))
+
+
+def held_level(session: Session, state: State) -> State:
+    """With the cup in the hand, upright where the grasp frame is."""
+    x = np.append(state.setpoint, state.gripper_setpoint)
+    palm = session.surroundings.pose(replace(state.things[0], T=np.eye(4), held=True), x)
+    (cup,) = (each for each in state.things if each.name == "cup")
+    T = se3.from_rotation_translation(np.eye(3), palm[:3, 3] + [0.1, 0.0, 0.0])
+    held = session.surroundings.taken(replace(cup, T=T), x)
+    things: tuple[Thing, ...] = tuple(held if each is cup else each for each in state.things)
+    return tick(session, replace(state, things=things, grip=-0.03))
+
+
+def test_water_at_rest_is_no_news(session: Session, full: State) -> None:
+    assert full.poured is not None
+    assert full.poured.water.cup == FULL
+    assert tick(session, full, times=3).poured is full.poured
+
+
+def test_a_cup_put_elsewhere_takes_its_water_along(session: Session, full: State) -> None:
+    (cup,) = (each for each in full.things if each.name == "cup")
+    T: FloatArray = se3.from_rotation_translation(np.eye(3), (0.3, 0.1, 0.0))
+    moved = tick(session, full, cmd.Place(replace(cup, T=T)), times=50)
+    assert moved.poured is not None
+    assert moved.poured.water.cup == FULL
+    np.testing.assert_array_equal(moved.poured.water.T_base_cup, T)
+    assert moved.poured.still
+
+
+def test_a_cup_turned_over_in_the_hand_loses_all_of_it_and_none_is_lost(
+    session: Session, full: State
+) -> None:
+    state = held_level(session, full)
+    state = tick(session, state, cmd.SetJoint(4, 2.6), times=600)
+    assert state.poured is not None
+    water = state.poured.water
+    assert water.total == FULL
+    assert water.cup < 2 * 10**12
+    assert water.spilled + water.basin > 197 * 10**12
+
+
+def test_a_stop_in_mid_pour_leaves_what_the_tilt_holds(session: Session, full: State) -> None:
+    state = held_level(session, full)
+    state = tick(session, state, cmd.SetJoint(4, 2.6), times=100)
+    assert state.poured is not None
+    assert 0 < state.poured.water.cup < FULL
+    state = tick(session, state, cmd.Stop(), times=500)
+    assert state.halted is not None
+    assert state.poured is not None
+    assert state.poured.water.cup > 0
+    assert state.poured.water.total == FULL
+    assert not state.poured.water.parcels
+    later = tick(session, state, times=100)
+    assert later.poured is not None
+    assert later.poured.water.cup == state.poured.water.cup
+
+
+def test_more_than_the_cup_holds_is_refused(session: Session) -> None:
+    for volume in (300.0 * ML, -1.0):
+        with pytest.raises(InputError, match="cannot hold"):
+            session.check(cmd.Fill(volume))
+    with pytest.raises(InputError):
+        cmd.Fill(np.nan)
+
+
+def test_without_a_cup_there_is_nothing_to_fill(session: Session, full: State) -> None:
+    gone = tick(session, full, cmd.Remove("cup"), times=2)
+    assert gone.poured is None
+    assert tick(session, gone, cmd.Fill(100.0 * ML)).poured is None
