@@ -61,7 +61,7 @@ def held_level(session: Session, state: State) -> State:
     T = se3.from_rotation_translation(np.eye(3), palm[:3, 3] + [0.1, 0.0, 0.0])
     held = session.surroundings.taken(replace(cup, T=T), x)
     things: tuple[Thing, ...] = tuple(held if each is cup else each for each in state.things)
-    return tick(session, replace(state, things=things, grip=0.0))
+    return tick(session, replace(state, things=things, grip=0.0), cmd.Fill(200.0 * ML))
 
 
 def test_water_at_rest_is_no_news(session: Session, full: State) -> None:
