@@ -74,6 +74,26 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float | None = None
 
 
+class Program(msgspec.Struct, frozen=True, kw_only=True):
+    """The program that is planned or runs, or ran last.
+
+    ``by``: who sent it. ``status``: planning, refused, ready, running, paused, blocked, done,
+    stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and ``share``
+    of its ``task`` is done. ``seconds``: all motions at full speed. ``why``: what is wrong with it.
+    """
+
+    name: str
+    by: str
+    status: str
+    step: int = 0
+    steps: int = 0
+    line: int = 0
+    task: str = ""
+    share: float = 0.0
+    seconds: float = 0.0
+    why: str = ""
+
+
 class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
@@ -89,6 +109,7 @@ class State(Answer, frozen=True, kw_only=True):
         speed: share of full speed.
         holder: name of who holds the arm. stopped: why nothing moves after a STOP.
         windows: how many pages and programs are open.
+        program: the one that is planned or runs, or ran last.
     """
 
     t: float
@@ -112,6 +133,7 @@ class State(Answer, frozen=True, kw_only=True):
     holder: str | None
     stopped: str | None
     windows: int
+    program: Program | None = None
 
 
 class Arm(Answer, frozen=True, kw_only=True):

@@ -15,6 +15,7 @@ from app.control.state import State
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
+from app.programs.bench import Rig
 from app.robot.model import RobotModel
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
@@ -48,6 +49,12 @@ class Motion:
     def ready(self) -> FloatArray:
         """(n,) the posture that Home drives to [rad]."""
         return self._session.ready
+
+    @property
+    def rig(self) -> Rig:
+        """What programs are planned for."""
+        arm, ready = self.model.arm, self._session.ready
+        return Rig(arm, self._session.world, ready, self.model.T_base_shoulder)
 
     @property
     def lateness(self) -> Lateness:

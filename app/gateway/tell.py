@@ -57,6 +57,7 @@ def state(hub: Hub) -> answers.State:
         holder=None if holder is None else holder.name,
         stopped=None if stopped is None else stopped.why,
         windows=len(hub.windows),
+        program=hub.performer.told(),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.control.state import State
@@ -32,9 +33,16 @@ class Program:
         return sum(task.order.plan.duration for task in self.tasks if isinstance(task.order, Go))
 
 
-def compiled(script: Script, rig: Rig, state: State, speed: float = 1.0) -> Program:
+def compiled(
+    script: Script,
+    rig: Rig,
+    state: State,
+    speed: float = 1.0,
+    check: Callable[[], None] | None = None,
+) -> Program:
     """``script`` for ``rig`` from where ``state`` has it, at ``speed`` of its own.
 
+    ``check``: asked before each step; what it raises ends the planning, as a step's own reason.
     Raises ScriptError with the line of the step that cannot be, and why.
     """
     if script.bare and rig.arm.gripper.moves:
@@ -56,6 +64,8 @@ def compiled(script: Script, rig: Rig, state: State, speed: float = 1.0) -> Prog
             bench.orders, bench.state = known[key]
         else:
             try:
+                if check is not None:
+                    check()
                 placed.step.lay(bench)
             except InputError as error:
                 problem = Problem(placed.line, placed.column, str(error))

@@ -90,6 +90,11 @@ def halted(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:
     return replace(run, phase=Phase.STOPPED, why=why), (cmd.Reset(), cmd.Resume())
 
 
+def ended(run: Run, phase: Phase, why: str) -> Run:
+    """With ``phase`` and ``why``; one that has ended stays as it is."""
+    return run if run.phase is not Phase.RUNNING else replace(run, phase=phase, why=why)
+
+
 def stepping(run: Run) -> tuple[Run, tuple[cmd.Command, ...]]:
     """On, to the end of the step."""
     return replace(run, single=True), (cmd.Resume(),)

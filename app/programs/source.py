@@ -7,6 +7,7 @@ Anchors are not understood either, so that a small text stays small.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import yaml
 
@@ -106,7 +107,6 @@ def read(text: str) -> Value:
 def _check_bounds(text: str) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
-        mark = event.start_mark
         said = ""
         if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
             depth += 1
@@ -121,11 +121,15 @@ def _check_bounds(text: str) -> None:
         elif count > MOST_VALUES:
             said = f"A script holds at most {MOST_VALUES} values."
         if said:
-            raise ScriptError((Problem(mark.line + 1, mark.column + 1, said),))
+            raise ScriptError((Problem(*_place(event.start_mark), said),))
+
+
+def _place(mark: Any) -> tuple[int, int]:
+    return mark.line + 1, mark.column + 1
 
 
 def _value(node: yaml.Node) -> Value:
-    line, column = node.start_mark.line + 1, node.start_mark.column + 1
+    line, column = _place(node.start_mark)
     if isinstance(node, yaml.MappingNode):
         fields = tuple((_value(key), _value(value)) for key, value in node.value)
         return Value(line, column, fields, "mapping")

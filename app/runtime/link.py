@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from app.control import commands as cmd
@@ -182,7 +182,7 @@ class FrontEnd:
         self._check(command)
         with self._sending:
             self._number += 1
-            self._send(Told(self._number, command))
+            self._send(Told(self._number, _portable(command)))
             return self._number
 
     def beat(self) -> None:
@@ -206,6 +206,13 @@ class FrontEnd:
                     self.board.pin(news.snapshot, news.ledger)
         except GONE:
             self.cut.set()
+
+
+def _portable(command: cmd.Command) -> cmd.Command:
+    """``command`` without what stays in this process: the arm looks with bodies of its own."""
+    if isinstance(command, cmd.Follow):
+        return cmd.Follow(replace(command.plan, world=None))
+    return command
 
 
 def _heard(pipe: Connection) -> News:
