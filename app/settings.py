@@ -26,6 +26,7 @@ class Settings:
         insecure: other machines may come in unasked.
         tls_cert, tls_key: files of a certificate and its key, for https.
         public_url: what people type when a reverse proxy stands in front.
+        bare: whether the arm is without its gripper.
         lines: TCP port of this machine for programs that speak JSON lines; None without.
     """
 
@@ -41,3 +42,4 @@ class Settings:
     tls_key: Path | None = None
     public_url: str | None = None
     lines: int | None = None
+    bare: bool = False

@@ -84,6 +84,26 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
     margin_to_rim: float
 
 
+class Program(msgspec.Struct, frozen=True, kw_only=True):
+    """The program that is planned or runs, or ran last.
+
+    ``by``: who sent it. ``status``: planning, refused, ready, running, paused, blocked, done,
+    stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and ``share``
+    of its ``task`` is done. ``seconds``: all motions at full speed. ``why``: what is wrong with it.
+    """
+
+    name: str
+    by: str
+    status: str
+    step: int = 0
+    steps: int = 0
+    line: int = 0
+    task: str = ""
+    share: float = 0.0
+    seconds: float = 0.0
+    why: str = ""
+
+
 class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
@@ -100,6 +120,7 @@ class State(Answer, frozen=True, kw_only=True):
         holder: name of who holds the arm. stopped: why nothing moves after a STOP.
         windows: how many pages and programs are open.
         water: of the cup; null where there is none.
+        program: the one that is planned or runs, or ran last.
     """
 
     t: float
@@ -124,6 +145,7 @@ class State(Answer, frozen=True, kw_only=True):
     stopped: str | None
     windows: int
     water: Water | None
+    program: Program | None = None
 
 
 class Arm(Answer, frozen=True, kw_only=True):

@@ -32,6 +32,9 @@ FASTEST_ANGULAR = 3.0
 SLOWEST, FASTEST = 0.05, 1.0
 """Share of full speed."""
 
+LEAST_SHARE = 0.01
+"""Of its own speed that a program can be run at."""
+
 MOST_STATES = 100
 """States a second that one can be told: as many as there are."""
 
@@ -270,6 +273,39 @@ class Fill(Request, frozen=True, kw_only=True):
     ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
 
+class Order(Enum):
+    """What a program can be told."""
+
+    RUN = "run"
+    STEP = "step"
+    """Run one step, then wait."""
+    PAUSE = "pause"
+    RESUME = "resume"
+    HALT = "halt"
+    """Come to rest and end it."""
+
+
+class Program(Request, frozen=True, kw_only=True):
+    """A part of a script, of docs/programs.md; after the last one it is planned.
+
+    All but the last say ``more``. ``speed``: share of the script's own. The state tells when it is
+    planned, or what is wrong with it, line by line.
+    """
+
+    text: Annotated[str, Meta(max_length=LARGEST)]
+    more: bool = False
+    speed: Annotated[float, Meta(ge=LEAST_SHARE, le=1.0)] = 1.0
+
+
+class Steer(Request, frozen=True, kw_only=True):
+    """Run, step, pause, resume or halt the program that is planned.
+
+    It drives by itself, under its own name; whoever started it stays connected.
+    """
+
+    order: Order
+
+
 class Watch(Request, frozen=True, kw_only=True):
     """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less."""
 
@@ -315,6 +351,8 @@ AnyRequest = (
     | Place
     | Remove
     | Fill
+    | Program
+    | Steer
     | Watch
     | Look
 )

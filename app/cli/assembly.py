@@ -13,6 +13,7 @@ from typing import NamedTuple
 from app.control.session import Session
 from app.control.things import Hand, Thing
 from app.drivers.simulated import SimulatedDriver
+from app.robot.bare import bare
 from app.robot.collision import hand_of, table, things_of, world_of
 from app.robot.model import RobotModel, load
 from app.robot.props import load_props
@@ -41,6 +42,8 @@ class Described(NamedTuple):
 def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``."""
     model = load(urdf, tool)
+    if settings.bare:
+        model = bare(model)
     world, left_out = world_of(model)
     notes = [*model.notes, *left_out]
     props = load_props()

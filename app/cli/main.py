@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.cli.access_options import add_access_options
+from app.cli.programs_options import add_demo_options, add_run_options
 from app.cli.version import version
 from app.cli.workspace_options import add_workspace_options
 from app.errors import KatanaError
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 tls_key=options.tls_key,
                 public_url=options.public_url,
                 lines=options.lines,
+                bare=options.bare,
             )
             return serve(settings, options.urdf, options.tool, options.workspace)
         if options.command == "access":
@@ -48,6 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli.workspace import workspace
 
             return workspace(options)
+        if options.command in ("run", "demo"):
+            from app.cli import programs
+
+            return programs.run(options) if options.command == "run" else programs.demo(options)
         from app.cli.lines import Kinematics, answer_lines
 
         in_base_frame = options.frame == "base"
@@ -120,6 +126,11 @@ def _parser() -> argparse.ArgumentParser:
         help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
     )
     serve.add_argument(
+        "--bare",
+        action="store_true",
+        help="the arm without its gripper, as in the paper's circle",
+    )
+    serve.add_argument(
         "--lines",
         type=_port,
         metavar="PORT",
@@ -153,6 +164,8 @@ def _parser() -> argparse.ArgumentParser:
     add_access_options(
         commands.add_parser("access", help="give people links by which they may come in")
     )
+    add_run_options(commands.add_parser("run", help="run a script of your own"))
+    add_demo_options(commands.add_parser("demo", help="run an experiment of the paper"))
     for command in with_an_arm:
         command.add_argument(
             "--urdf",

@@ -74,6 +74,10 @@ class Desk:
                 hub.jog(window, rates, frame)
             case requests.Speed(value=value):
                 hub.set_speed(window, value)
+            case requests.Program(text=text, more=more, speed=speed):
+                hub.performer.script(window, text, more=more, speed=speed)
+            case requests.Steer(order=order):
+                hub.performer.steer(window, order)
 
     def _command(self, request: requests.AnyRequest) -> cmd.Command | None:
         """What the arm is told, where the request is one for the arm."""

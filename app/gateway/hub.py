@@ -22,8 +22,10 @@ from app.control.things import Surroundings
 from app.errors import LeaseError
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
+from app.gateway.performer import Performer
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
+from app.programs.bench import Rig
 from app.robot.model import RobotModel
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
@@ -52,6 +54,9 @@ class Arm(Protocol):
 
     @property
     def ready(self) -> FloatArray: ...
+
+    @property
+    def rig(self) -> Rig: ...
 
     @property
     def lateness(self) -> Lateness: ...
@@ -123,6 +128,7 @@ class Hub:
         self.arm: Arm | None = None
         """None until the arm is there."""
         self.journal = Journal()
+        self.performer = Performer(self)
         self._windows: dict[str, Window] = {}
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
@@ -155,6 +161,7 @@ class Hub:
         if not for_good:
             return
         self._remembered.pop(person.key, None)
+        self.performer.leave(window)
         if self.lease.holder == person:
             if self.stopped is None and self._moves(self.clock()):
                 self._halt(Stopped(None, f"{person.name} left while the arm moved."))
@@ -277,6 +284,7 @@ class Hub:
             self.arm.beat()
             self.journal.follow(self.arm.ledger, self._who())
             self._agree_with(self.arm)
+            self.performer.tick()
 
     def _agree_with(self, arm: Arm) -> None:
         """What is stopped here is stopped there, and the other way round."""

@@ -17,6 +17,7 @@ from app.control.things import Surroundings
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
+from app.programs.bench import Rig
 from app.robot.model import RobotModel
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
@@ -62,6 +63,11 @@ class Motion:
     def pouring(self) -> Pouring | None:
         """Knows where water is."""
         return self._session.pouring
+
+    @property
+    def rig(self) -> Rig:
+        """What programs are planned for."""
+        return Rig(self._session, self.model.T_base_shoulder)
 
     @property
     def lateness(self) -> Lateness:

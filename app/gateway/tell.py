@@ -62,6 +62,7 @@ def state(hub: Hub) -> answers.State:
         stopped=None if stopped is None else stopped.why,
         windows=len(hub.windows),
         water=water(arm.pouring, now),
+        program=hub.performer.told(),
     )
 
 

@@ -10,6 +10,7 @@ from app.errors import InputError
 _HINT = "give plain finite numbers"
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 def real_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:

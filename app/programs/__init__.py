@@ -1,0 +1,1 @@
+"""Scripts for people, the programs they become, and how those are run. Pure."""

@@ -1,0 +1,48 @@
+"""The script of the circle demo, for any circle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CircleDemo:
+    """centre: [mm] in the shoulder frame. normal: as a script has it. radius: [mm].
+
+    pitch: [deg], keep or roomiest; None for the one that suits the tool. tool: its frame; on the
+    flange the arm is without its gripper.
+    """
+
+    centre: tuple[float, float, float] = (150.0, 0.0, -110.0)
+    normal: str = "x"
+    radius: float = 100.0
+    turns: float = 1.0
+    pitch: str | None = None
+    tool: str = "flange"
+
+    @property
+    def text(self) -> str:
+        """The script."""
+        x, y, z = self.centre
+        bare = self.tool == "flange"
+        pitch = self.pitch or ("99" if bare else "roomiest")
+        return f"""\
+name: Circle
+gripper: {"none" if bare else "fitted"}
+tool: {self.tool}
+steps:
+  - circle:
+      centre: {{x: {x:g}, y: {y:g}, z: {z:g}}}
+      normal: {self.normal}
+      radius: {self.radius:g}
+      turns: {self.turns:g}
+      pitch: {pitch}
+      roll: 0
+  - home
+expect:
+  max_position_error_mm: {{at_most: 1.0e-12}}
+  max_orientation_error_deg: {{at_most: 1.0e-9}}
+  executed_position_error_mm: {{at_most: 1.0e-6}}
+  greatest_speed_share: {{at_most: 1.000001}}
+  margin_to_limits_deg: {{at_least: 0.1}}
+"""

@@ -1,0 +1,75 @@
+"""A program: a script for one arm as it stands, everything planned before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from app.control.state import State
+from app.errors import InputError
+from app.geometry.arrays import FloatArray
+from app.programs.bench import Bench, Rig
+from app.programs.order import Go, Order, Pace, Task
+from app.programs.script import Script
+from app.programs.source import Problem, ScriptError
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """name: for people. speed: share of full speed. start: (5,) where the arm has to stand [rad].
+
+    tasks: what is done, in its order. steps: how many steps they belong to.
+    """
+
+    name: str
+    speed: float
+    start: FloatArray
+    tasks: tuple[Task, ...]
+    steps: int
+
+    @property
+    def duration(self) -> float:
+        """[s] of all motions at full speed."""
+        return sum(task.order.plan.duration for task in self.tasks if isinstance(task.order, Go))
+
+
+def compiled(
+    script: Script,
+    rig: Rig,
+    state: State,
+    speed: float = 1.0,
+    check: Callable[[], None] | None = None,
+) -> Program:
+    """``script`` for ``rig`` from where ``state`` has it, at ``speed`` of its own.
+
+    ``check``: asked before each step; what it raises ends the planning, as a step's own reason.
+    Raises ScriptError with the line of the step that cannot be, and why.
+    """
+    if script.bare and rig.arm.gripper.moves:
+        raise InputError(
+            f"{script.name} is for an arm without its gripper (`gripper: none`). Start the server "
+            "with --bare."
+        )
+    bench = Bench(rig, state)
+    bench.state = bench.standing(state.setpoint)
+    whole = script.speed * speed
+    tasks = [Task(0, 1, "speed", Pace(1.0))]
+    # A repetition from where it began is planned already.
+    known: dict[tuple[int, bytes, float, str], tuple[list[tuple[str, Order]], State]] = {}
+    for number, placed in enumerate(script.steps):
+        now = bench.state
+        key = id(placed.step), now.setpoint.tobytes(), now.gripper_setpoint, now.tool
+        bench.orders = []
+        if key in known:
+            bench.orders, bench.state = known[key]
+        else:
+            try:
+                if check is not None:
+                    check()
+                placed.step.lay(bench)
+            except InputError as error:
+                problem = Problem(placed.line, placed.column, str(error))
+                raise ScriptError((problem,)) from error
+            known[key] = bench.orders, bench.state
+        tasks += [Task(number, placed.line, name, order) for name, order in bench.orders]
+    return Program(script.name, whole, state.setpoint, tuple(tasks), len(script.steps))

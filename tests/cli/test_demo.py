@@ -1,0 +1,140 @@
+"""``katana450 demo`` and ``katana450 run`` as a person starts them, without a server."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.kinematics.forward import forward
+from app.programs.circle import CircleDemo
+from app.programs.script import parse
+from app.robot.model import load
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def katana450(*options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "app", *options],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=60,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("matplotlib")
+    out = tmp_path_factory.mktemp("demo") / "report"
+    done = katana450("demo", "circle", "--headless", "--report", str(out))
+    assert done.returncode == 0, done.stderr
+    assert "without its gripper" in done.stdout
+    return out
+
+
+def test_the_circle_is_traced_as_exactly_as_the_paper_has_it(out: Path) -> None:
+    found = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert next(iter(found)) == "max_position_error_mm"
+    assert 0.0 < found["max_position_error_mm"] < 1e-12
+    assert 0.0 < found["executed_position_error_mm"] < 1e-9
+    # Between two ticks a drive cuts the corner: v^2 dt^2 / (8 r), about 0.19 m/s and 100 mm.
+    assert 1e-3 < found["between_ticks_error_mm"] < 1e-2
+    assert found["path_length_mm"] == pytest.approx(200.0 * math.pi, rel=1e-5)
+    assert found["margin_to_limits_deg"] > 5.0
+    assert found["smallest_singular_value"] > 0.1
+    assert found["greatest_speed_share"] <= 1.0
+    assert found["nearest_clearance_mm"] > 6.0
+    assert found["bounds_held"]
+    assert found["gripper"] == "none"
+
+
+def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
+    """As the paper's equation has it, by the arm's own chain on the joints of every tick."""
+    with (out / "trace.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    on_circle = [row for row in rows if row["task"] == "circle"]
+    assert len(on_circle) > 200
+    flange = load().arm.chain_to("flange")
+    for row in on_circle:
+        q = [math.radians(float(row[f"theta{axis}_deg"])) for axis in range(1, 6)]
+        x, y, z = 1e3 * forward(flange, q)[:3, 3]
+        # The table has nine digits of each angle.
+        assert x == pytest.approx(150.0, abs=1e-5)
+        assert math.hypot(y, z + 110.0) == pytest.approx(100.0, abs=1e-5)
+    found = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert float(rows[-1]["t_s"]) == found["duration_s"]
+
+
+def test_figures_and_page_are_there(out: Path) -> None:
+    for name in ("path.png", "joints.png", "speeds.png"):
+        assert (out / name).read_bytes().startswith(b"\x89PNG")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3
+    assert "Every bound is held." in page
+    assert "viewport" in page
+    assert "http" not in page.replace("http-equiv", "")
+
+
+def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
+    done = katana450("demo", "circle", "--headless", "--report", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+
+    def lines(directory: Path) -> list[str]:
+        text = (directory / "report.json").read_text(encoding="utf-8")
+        return [line for line in text.splitlines() if '"written"' not in line]
+
+    assert lines(tmp_path) == lines(out)
+    for name in ("trace.csv", "path.png", "joints.png", "speeds.png"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_a_bound_that_is_missed_is_told(tmp_path: Path) -> None:
+    script = tmp_path / "impossible.yaml"
+    script.write_text(
+        "gripper: none\nsteps:\n  - joints: [0, -60, 80, 8, 0]\n"
+        "expect:\n  duration_s: {at_most: 0.1}\n  path_length_mm: {at_least: 1}\n"
+    )
+    done = katana450("run", str(script), "--headless")
+    assert done.returncode == 1
+    assert "duration_s is" in done.stderr
+    assert "path_length_mm was not measured" in done.stderr
+
+
+def test_what_is_wrong_with_a_script_is_told_like_a_compiler_does(tmp_path: Path) -> None:
+    script = tmp_path / "wrong.yaml"
+    script.write_text("steps:\n  - hme\n  - wait: x\n")
+    done = katana450("run", str(script), "--headless")
+    assert done.returncode == 1
+    assert f"{script}:2:5: There is no step 'hme'; did you mean 'home'?" in done.stderr
+    assert f"{script}:3:11: " in done.stderr
+    assert "Traceback" not in done.stderr
+    assert katana450("run", str(tmp_path / "none.yaml"), "--headless").returncode == 1
+
+
+def test_a_dry_run_only_plans() -> None:
+    done = katana450("demo", "circle", "--dry-run", "--radius", "50", "--turns", "2")
+    assert done.returncode == 0, done.stderr
+    assert "628 mm" in done.stdout
+    assert "3 steps" in done.stdout
+
+
+def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:
+    done = katana450("demo", "circle", "--dry-run", "--centre", "900,0,0")
+    assert done.returncode == 1
+    assert "demo circle:5:5: " in done.stderr
+    assert "reach" in done.stderr
+
+
+def test_the_script_that_comes_along_is_the_demo() -> None:
+    path = ROOT / "app" / "programs" / "library" / "circle.yaml"
+    stored, demo = parse(path.read_text(encoding="utf-8")), parse(CircleDemo().text)
+    assert stored.expected == demo.expected
+    assert [repr(a.step) for a in stored.steps] == [repr(b.step) for b in demo.steps]

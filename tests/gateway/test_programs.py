@@ -1,0 +1,195 @@
+"""Programs run by a real server, as its Python client asks for them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.api import answers, requests
+from app.api.requests import Order
+from app.client import Client, RefusedError, connect
+from tests.browser.server import AppServer
+
+ROOT = Path(__file__).resolve().parents[2]
+READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
+
+THERE_AND_BACK = """\
+name: There and back
+steps:
+  - joints: [25, -60, 85, 8, 0]
+  - line: {by: {z: 20}}
+  - home
+"""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def arm(server: AppServer) -> Iterator[Client]:
+    with connect(server.url, "Test") as arm:
+        yield arm
+        state = arm.look(answers.State)
+        if state.program is not None and state.program.status in ("running", "paused"):
+            arm.ask(requests.Steer(order=Order.HALT))
+        arm.ask(requests.Reset())
+        arm.go(requests.Resume())
+        arm.go(requests.Home())
+        arm.ask(requests.Release())
+
+
+def planned(arm: Client, text: str) -> answers.Program:
+    """Once it is, or refused."""
+    for at in range(0, len(text), 100):
+        more = at + 100 < len(text)
+        arm.ask(requests.Program(text=text[at : at + 100], more=more))
+    return wait(arm, lambda program: program.status != "planning")
+
+
+def wait(
+    arm: Client, until: Callable[[answers.Program], bool], seconds: float = 20.0
+) -> answers.Program:
+    due = time.monotonic() + seconds
+    while time.monotonic() < due:
+        program = arm.look(answers.State).program
+        assert program is not None
+        if until(program):
+            return program
+        time.sleep(0.02)
+    raise AssertionError(f"still {program}")
+
+
+def run(arm: Client, order: Order = Order.RUN) -> None:
+    assert planned(arm, THERE_AND_BACK).status == "ready"
+    arm.ask(requests.Steer(order=order))
+
+
+def test_a_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
+    run(arm)
+    during = arm.look(answers.State)
+    assert during.holder is not None
+    assert during.holder.startswith("There and back")
+    lines = set()
+    while (program := arm.look(answers.State).program) is not None and program.status == "running":
+        lines.add(program.line)
+        time.sleep(0.02)
+    assert program is not None
+    assert (program.status, program.why) == ("done", "")
+    assert {3, 4, 5} <= lines
+    after = arm.look(answers.State)
+    assert after.holder is None
+    assert np.abs(np.array(after.q) - READY).max() < 1e-9
+
+
+def test_stop_ends_it_in_the_middle(arm: Client) -> None:
+    run(arm)
+    wait(arm, lambda program: program.line == 3 and program.share > 0.3)
+    arm.ask(requests.Stop())
+    program = wait(arm, lambda program: program.status != "running", 1.0)
+    assert program.status == "stopped"
+    assert "STOP" in program.why
+    time.sleep(0.5)
+    state = arm.look(answers.State)
+    assert not state.moving
+    assert np.abs(state.qd).max() == 0.0
+    with pytest.raises(RefusedError, match="reset"):
+        arm.ask(requests.Steer(order=Order.RUN))
+
+
+def test_it_pauses_steps_and_is_halted(arm: Client) -> None:
+    run(arm, Order.STEP)
+    assert wait(arm, lambda program: program.status == "paused").line == 4
+    arm.ask(requests.Steer(order=Order.RESUME))
+    wait(arm, lambda program: program.line == 5 and program.share > 0.1)
+    arm.ask(requests.Steer(order=Order.PAUSE))
+    assert wait(arm, lambda program: program.status == "paused").line == 5
+    arm.ask(requests.Steer(order=Order.HALT))
+    state = arm.look(answers.State)
+    assert state.program is not None
+    assert state.program.status == "stopped"
+    assert state.holder is None
+
+
+def test_the_arm_can_be_taken_from_it(server: AppServer, arm: Client) -> None:
+    run(arm)
+    with connect(server.url, "Boss") as boss:
+        boss.ask(requests.Take())
+        program = wait(boss, lambda program: program.status != "running", 1.0)
+        assert program.status == "stopped"
+        assert "taken" in program.why
+        boss.ask(requests.Release())
+
+
+def test_it_ends_when_whoever_started_it_leaves(server: AppServer) -> None:
+    with connect(server.url, "Guest") as guest:
+        run(guest)
+    with connect(server.url, "Watcher") as watcher:
+        program = wait(watcher, lambda program: program.status != "running", 2.0)
+        assert program.status == "stopped"
+        assert "left" in program.why
+        watcher.go(requests.Home())
+        watcher.ask(requests.Release())
+
+
+def test_what_is_wrong_is_told_with_its_lines(arm: Client) -> None:
+    program = planned(arm, "steps:\n  - hme\n  - wait: x\n")
+    assert program.status == "refused"
+    assert "line 2, column 5" in program.why
+    assert "line 3, column 11" in program.why
+    program = planned(arm, "steps:\n  - home\n  - line: {by: {z: -285}}\n")
+    assert "line 3" in program.why
+    assert "table" in program.why
+    program = planned(arm, "gripper: none\nsteps: [home]\n")
+    assert "--bare" in program.why
+    with pytest.raises(RefusedError, match="no program"):
+        arm.ask(requests.Steer(order=Order.RUN))
+
+
+def test_a_script_that_is_too_long_is_refused(arm: Client) -> None:
+    part = "#" * 900 + "\n"
+    for _ in range(72):
+        arm.ask(requests.Program(text=part, more=True))
+    with pytest.raises(RefusedError, match="at most 64 KB"):
+        arm.ask(requests.Program(text=part, more=True))
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_from_the_command_line(server: AppServer, tmp_path: Path, interrupted: bool) -> None:
+    script = tmp_path / "script.yaml"
+    script.write_text(THERE_AND_BACK)
+    command = [sys.executable, "-m", "app", "run", str(script), "--url", server.url]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        assert process.stdout is not None
+        said = ""
+        for line in process.stdout:
+            said += line
+            if interrupted and "line 3" in line:
+                time.sleep(0.4)
+                os.kill(process.pid, signal.SIGINT)
+        assert process.stderr is not None
+        error = process.stderr.read()
+        process.wait(timeout=10)
+    assert process.returncode == (130 if interrupted else 0), error
+    assert "Traceback" not in error
+    assert ("the arm holds" in error) if interrupted else ("Done." in said)
+    with connect(server.url, "Watcher") as watcher:
+        state = watcher.look(answers.State)
+        assert state.program is not None
+        assert state.program.status == ("stopped" if interrupted else "done")
+        assert state.holder is None
+        watcher.go(requests.Home())
+        assert not watcher.look(answers.State).moving
+        watcher.ask(requests.Release())

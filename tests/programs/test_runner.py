@@ -1,0 +1,194 @@
+"""Programs run on the real session: planned first, then followed, paused, stepped, stopped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import app.programs
+from app.control import commands as cmd
+from app.control.state import State
+from app.kinematics.forward import forward
+from app.programs import runner
+from app.programs.order import Go
+from app.programs.program import Program, compiled
+from app.programs.runner import Phase, Run
+from app.programs.script import parse
+from app.programs.source import ScriptError
+from tests.programs.conftest import Stage
+
+LIBRARY = sorted((Path(app.programs.__file__).parent / "library").glob("*.yaml"))
+
+SHORT = """\
+tool: tcp
+frame: base
+poses:
+  here: {x: 320, y: -40, z: 150, pitch: 50, roll: 0}
+steps:
+  - move: here
+  - line: {by: {y: 60}}
+  - gripper: open
+  - wait: 0.2
+  - arc: {centre: {x: 320, y: 20, z: 130}, axis: y, angle: 40, pitch: 60}
+  - screw: {point: {x: 300, y: 0, z: 150}, axis: z, angle: 10, climb: 20}
+  - via: {through: [{joints: [10, -60, 80, 10, 0]}, here]}
+"""
+
+
+@pytest.fixture(scope="module")
+def program(stage: Stage) -> Program:
+    return compiled(parse(SHORT), stage.rig, stage.begin())
+
+
+def point(stage: Stage, state: State) -> np.ndarray:
+    """The tool point in the base frame [mm]."""
+    T = stage.rig.T_base_shoulder @ forward(stage.rig.arm.chain_to("tcp"), state.q)
+    return np.asarray(1e3 * T[:3, 3])
+
+
+def test_it_does_what_the_script_says(stage: Stage, program: Program) -> None:
+    run, states = stage.play(program, stage.begin())
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    rests = [
+        point(stage, a) for a, b in pairwise(states) if a.motion.at_rest and not b.motion.at_rest
+    ]
+    assert np.allclose(rests[1], [320, -40, 150], atol=1e-6)
+    assert np.allclose(rests[2], [320, 20, 150], atol=1e-6)
+    # 40 deg about y, seen from its centre: x = 20 sin 40, z = 20 cos 40.
+    turned = [320 + 20 * np.sin(np.radians(40)), 20, 130 + 20 * np.cos(np.radians(40))]
+    assert np.allclose(rests[3], turned, atol=1e-6)
+    a = np.radians(10.0)
+    R = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
+    centre = np.array([300.0, 0.0, 150.0])
+    assert np.allclose(rests[4], centre + R @ (rests[3] - centre) + [0, 0, 20], atol=1e-6)
+    assert np.allclose(point(stage, states[-1]), [320, -40, 150], atol=1e-6)
+    assert states[-1].gripper == stage.rig.arm.gripper.upper
+
+
+def test_every_plan_is_clear_and_meets_the_next(program: Program) -> None:
+    q = program.start
+    for task in program.tasks:
+        if isinstance(task.order, Go):
+            plan = task.order.plan
+            assert np.abs(plan.start - q).max() < 1e-6
+            assert plan.clear_of is not None
+            assert plan.nearest is not None
+            assert plan.nearest.contact.distance > 5e-3
+            q = plan.end
+
+
+def test_a_run_is_the_same_each_time(stage: Stage, program: Program) -> None:
+    one, other = (stage.play(program, stage.begin())[1] for _ in range(2))
+    assert len(one) == len(other)
+    assert all((a.q == b.q).all() for a, b in zip(one, other, strict=True))
+
+
+def test_a_pause_keeps_to_the_way_and_waits_no_time_away(stage: Stage, program: Program) -> None:
+    whole = stage.play(program, stage.begin())[1]
+    state, run = stage.begin(), Run(0.0)
+    for _ in range(100):
+        run, state = stage.tick(program, run, state)
+    state = stage.session.step(state, [cmd.Pause()], state.t + 0.01)
+    for _ in range(200):
+        run, state = stage.tick(program, run, state)
+    assert runner.progress(program, run, state).status == "paused"
+    assert state.motion.at_rest
+    state = stage.session.step(state, [cmd.Resume()], state.t + 0.01)
+    while run.phase is Phase.RUNNING:
+        run, state = stage.tick(program, run, state)
+    assert run.phase is Phase.DONE
+    assert np.array_equal(state.q, whole[-1].q)
+
+
+def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
+    state, run, rests = stage.begin(), Run(0.0, single=True), []
+    for _ in range(4000):
+        run, state = stage.tick(program, run, state)
+        if state.paused and state.motion.at_rest:
+            rests.append(program.tasks[run.number].line)
+            run, commands = runner.stepping(run)
+            state = stage.session.step(state, commands, state.t + 0.01)
+        if run.phase is not Phase.RUNNING:
+            break
+    assert run.phase is Phase.DONE
+    assert rests == [6, 7, 8, 9, 10, 11, 12]
+
+
+def test_stop_ends_it_and_so_does_a_person(stage: Stage, program: Program) -> None:
+    for end in ("stop", "halt", "elsewhere"):
+        state, run = stage.begin(), Run(0.0)
+        for _ in range(60):
+            run, state = stage.tick(program, run, state)
+        assert state.moving
+        if end == "stop":
+            state = stage.session.step(state, [cmd.Stop()], state.t + 0.01)
+        elif end == "elsewhere":
+            state = stage.session.step(state, [cmd.Stretch()], state.t + 0.01)
+        else:
+            run, commands = runner.halted(run, "Enough.")
+            state = stage.session.step(state, commands, state.t + 0.01)
+        for _ in range(300):
+            run, state = stage.tick(program, run, state)
+        assert run.phase is (Phase.FAILED if end == "elsewhere" else Phase.STOPPED)
+        assert run.why
+        assert state.motion.at_rest
+        assert not (state.q == program.start).all()
+
+
+def test_an_arm_that_stands_elsewhere_does_not_begin(stage: Stage, program: Program) -> None:
+    state = stage.session.begin(stage.session.ready + 0.01, 0.0, 0.0)
+    run, states = stage.play(program, state)
+    assert run.phase is Phase.FAILED
+    assert "stand" in run.why
+    assert (states[-1].q == state.q).all()
+
+
+def test_speed_is_a_share_of_the_scripts_own(stage: Stage) -> None:
+    script = parse("speed: 0.5\nsteps:\n  - joints: [20, -60, 85, 8, 0]")
+    fast, slow = (compiled(script, stage.rig, stage.begin(), speed) for speed in (1.0, 0.5))
+    assert (fast.speed, slow.speed) == (0.5, 0.25)
+    ticks = [len(stage.play(program, stage.begin())[1]) for program in (fast, slow)]
+    assert 1.5 < ticks[1] / ticks[0] < 2.0
+
+
+@pytest.mark.parametrize(
+    ("steps", "line", "said"),
+    [
+        ("  - wait: 1\n  - joints: [0, 0, 0, 0, 500]", 3, "beyond its limit"),
+        ("  - move: {x: 900, y: 0, z: 0}", 2, "cannot be at"),
+        ("  - line: {by: {x: 500}}", 2, "reach"),
+        ("  - home\n  - line: {by: {z: -285}}", 3, "table"),
+        ("  - gripper: 90", 2, "fingers go from"),
+        ("  - tool: hammer", 2, "no tool"),
+        ("  - circle: {centre: [900, 0, 0], normal: x, radius: 50}", 2, "reach"),
+    ],
+)
+def test_a_step_that_cannot_be_is_refused_with_its_line(
+    stage: Stage, steps: str, line: int, said: str
+) -> None:
+    with pytest.raises(ScriptError, match=said) as told:
+        compiled(parse("steps:\n" + steps), stage.rig, stage.begin())
+    assert told.value.problems[0].line == line
+
+
+def test_repetitions_are_planned_once(stage: Stage) -> None:
+    text = (
+        "steps:\n  - repeat: {times: 40, steps: [{joints: [20, -60, 85, 8, 0]}, home, "
+        "{gripper: open}, {gripper: closed}]}"
+    )
+    program = compiled(parse(text), stage.rig, stage.begin())
+    plans = {id(task.order.plan) for task in program.tasks if isinstance(task.order, Go)}
+    # The fingers are neither open nor closed at first, so that round is one of its own.
+    assert len(plans) == 4
+    assert program.steps == 160
+
+
+@pytest.mark.parametrize("path", LIBRARY, ids=lambda path: path.stem)
+def test_the_scripts_that_come_along_can_be_read(path: Path) -> None:
+    script = parse(path.read_text(encoding="utf-8"))
+    assert script.name
+    assert replace(script, name="x").steps

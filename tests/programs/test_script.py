@@ -1,0 +1,170 @@
+"""What a script may say, and how a person is told what is wrong with one."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from app.errors import InputError
+from app.programs.script import MOST_STEPS, parse
+from app.programs.source import DEEPEST, LARGEST, Problem, ScriptError
+from app.programs.steps import STEPS, Circle, Line, Move
+
+GOOD = """\
+name: Try
+frame: base
+tool: tcp
+speed: 0.5
+poses:
+  up: {x: 300, y: 0, z: 200, pitch: 45}
+  same: up
+  folded: {joints: [0, -68, 85, 8, 0]}
+steps:
+  - home
+  - move: up
+  - repeat:
+      times: 3
+      steps:
+        - line: {by: {z: -50}, pitch: 60}
+        - wait: 0.5
+  - circle: {centre: [150, 0, -110], normal: -x, radius: 100, pitch: roomiest}
+"""
+
+
+def test_numbers_are_read_in_degrees_and_millimetres() -> None:
+    script = parse(GOOD)
+    assert (script.name, script.speed, script.bare) == ("Try", 0.5, False)
+    assert len(script.steps) == 1 + 2 + 3 * 2 + 1
+    move, line, circle = (script.steps[i].step for i in (2, 3, -1))
+    assert isinstance(move, Move)
+    assert move.place.position is not None
+    assert move.place.position.tolist() == [0.3, 0.0, 0.2]
+    assert move.place.pitch == math.radians(45.0)
+    assert move.place.in_base
+    assert isinstance(line, Line)
+    assert line.by is not None
+    assert line.by.tolist() == [0.0, 0.0, -0.05]
+    assert isinstance(circle, Circle)
+    assert circle.normal.tolist() == [-1.0, 0.0, 0.0]
+    assert [placed.line for placed in script.steps[1:4]] == [10, 11, 15]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line", "said"),
+    [
+        ("steps: []", 1, "list of steps"),
+        ("", 1, "empty"),
+        ("just words", 1, "names with values"),
+        ("steps:\n  - fly: 3", 2, "no step 'fly'"),
+        ("steps:\n  - hme", 2, "did you mean 'home'"),
+        ("steps:\n  - home: 3", 2, "nothing stands behind"),
+        ("steps:\n  - wait: .nan", 2, "number"),
+        ("steps:\n  - wait: nan", 2, "number"),
+        ("steps:\n  - wait: -1", 2, "not between"),
+        ("steps:\n  - wait: yes", 2, "number"),
+        ("steps:\n  - joints: [1, 2, 3]", 2, "list of 5"),
+        ("steps:\n  - joints: [1, 2, 3, 4, x]", 2, "'x'"),
+        ("steps:\n  - line: {to: {x: 1, y: 2}}", 2, "needs 'z'"),
+        ("steps:\n  - line: {to: [1, 2, 3], by: [1, 2, 3]}", 2, "`to` a point or `by`"),
+        ("steps:\n  - arc:\n      axis: x\n      angle: 20", 3, "needs 'centre'"),
+        ("steps:\n  - arc: {centre: [1, 2, 3], axis: [0, 0, 0], angle: 3}", 2, "not zero"),
+        ("steps:\n  - move: nowhere", 2, "no pose 'nowhere'"),
+        ("steps:\n  - {home: , wait: 1}", 2, "one name"),
+        ("steps:\n  - repeat: {times: 1001, steps: [home]}", 2, "not between"),
+        ("steps:\n  - repeat: {times: 0.5, steps: [home]}", 2, "not between"),
+        ("steps: [home]\nsteps: [home]", 2, "given twice"),
+        ("steps: [home]\nspeeed: 1", 2, "did you mean 'speed'"),
+        ("a: &x 1\nsteps: [home]", 1, "Anchors"),
+        ("steps: !!python/object:os.system [home]", 1, "Tags"),
+        ("steps: [home", 1, "cannot be read"),
+        ("steps:\n\t- home", 2, "cannot be read"),
+        ("steps: [home]\n\x07", 2, "cannot be read"),
+        ("steps: [home]\nexpect: {speed: 1}", 2, "no 'speed'"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(wrong: str, line: int, said: str) -> None:
+    with pytest.raises(ScriptError, match="line") as told:
+        parse(wrong)
+    assert said in str(told.value)
+    assert any(problem.line == line for problem in told.value.problems), str(told.value)
+
+
+def test_all_that_is_wrong_is_told_at_once() -> None:
+    with pytest.raises(ScriptError) as told:
+        parse("speed: 3\nframe: moon\nsteps:\n  - wait: x\n  - line: {too: 1}\n  - home\n  - fly")
+    assert [problem.line for problem in told.value.problems] == [1, 2, 4, 5, 7]
+
+
+def test_size_depth_and_repetitions_are_bounded() -> None:
+    with pytest.raises(ScriptError, match="at most 64 KB"):
+        parse("steps: [home]\n#" + "x" * LARGEST)
+    with pytest.raises(ScriptError, match="levels deep"):
+        parse("steps: " + "[" * 5000)
+    nested = "home"
+    for _ in range(DEEPEST // 3):
+        nested = f"{{repeat: {{times: 99, steps: [{nested}]}}}}"
+    with pytest.raises(ScriptError, match=f"at most {MOST_STEPS}|levels deep"):
+        parse(f"steps: [{nested}]")
+    many = "steps:\n" + "  - home\n" * (MOST_STEPS + 1)
+    with pytest.raises(ScriptError, match=f"at most {MOST_STEPS}"):
+        parse(many)
+
+
+WORDS = st.sampled_from(
+    [*STEPS, "repeat", "steps", "times", "poses", "x", "y", "z", "by", "to", "pitch", "radius"]
+)
+LEAVES = st.none() | st.booleans() | st.floats() | st.integers() | WORDS | st.text(max_size=5)
+TREES = st.recursive(
+    LEAVES,
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(WORDS, inner, max_size=4),
+    max_leaves=12,
+)
+
+
+def wrong_with(text: str) -> tuple[Problem, ...]:
+    """What is, or nothing; whatever else is raised fails the test."""
+    try:
+        script = parse(text)
+    except ScriptError as error:
+        return error.problems
+    # A script that can be read has something to do.
+    return () if script.steps else (Problem(0, 0, "no steps"),)
+
+
+@settings(max_examples=150, deadline=None)
+@given(TREES)
+def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
+    text = json.dumps({"steps": tree})
+    problems = wrong_with(text)
+    assert all(problem.line >= 1 and problem.column >= 1 for problem in problems)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(max_size=200) | st.text("steps:-[]{},&*!|>'\"# \n\t12xyhome", max_size=80))
+@example("steps: *a")
+@example("? - [\n")
+@example("\ud800")
+@example("%YAML 3.0\n---\nsteps: [home]")
+@example("steps: [home]\n---\nsteps: [home]")
+def test_no_text_is_more_than_an_error(text: str) -> None:
+    assert all(problem.line >= 1 for problem in wrong_with(text))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_a_broken_script_is_told_where(data: st.DataObject) -> None:
+    at = data.draw(st.integers(0, len(GOOD) - 1))
+    broken = GOOD[:at] + data.draw(st.text(max_size=3)) + GOOD[at + data.draw(st.integers(0, 9)) :]
+    last = len(broken.splitlines()) + 2
+    assert all(1 <= problem.line <= last for problem in wrong_with(broken))
+
+
+def test_a_script_error_is_an_input_error() -> None:
+    with pytest.raises(InputError):
+        parse("steps: 3")
+    assert np.isfinite(parse(GOOD).speed)
