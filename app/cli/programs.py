@@ -16,6 +16,7 @@ from app.errors import InputError, KatanaError
 from app.programs.bench import Rig
 from app.programs.circle import CircleDemo
 from app.programs.order import Go
+from app.programs.pour import PourDemo
 from app.programs.program import Program, compiled
 from app.programs.runner import Phase
 from app.programs.script import Script, parse
@@ -35,14 +36,17 @@ def run(options: Namespace) -> int:
 
 def demo(options: Namespace) -> int:
     """``katana450 demo``."""
-    text = CircleDemo(
-        options.centre,
-        options.normal,
-        options.radius,
-        options.turns,
-        options.pitch,
-        options.tool,
-    ).text
+    if options.demo == "pour":
+        text = PourDemo(options.water, options.cup, options.basin, options.shake).text
+    else:
+        text = CircleDemo(
+            options.centre,
+            options.normal,
+            options.radius,
+            options.turns,
+            options.pitch,
+            options.tool,
+        ).text
     return _run(text, f"demo {options.demo}", options)
 
 

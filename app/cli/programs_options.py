@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.control.commands import LEAST_SPEED
 from app.programs.circle import CircleDemo
+from app.programs.pour import PourDemo
 from robot_description import URDF_PATH
 
 URL = "http://127.0.0.1:8080"
@@ -53,6 +54,22 @@ def add_demo_options(parser: argparse.ArgumentParser) -> None:
         help="degrees, keep or roomiest (default: 99 for the flange, else roomiest)",
     )
     _add_common(circle)
+    pour = demos.add_parser("pour", help="carry a cup of water to a basin and empty it there")
+    water = PourDemo()
+    pour.add_argument(
+        "--water", type=_number, default=water.water, metavar="ML", help="default: %(default)g"
+    )
+    for name in ("cup", "basin"):
+        pour.add_argument(
+            f"--{name}",
+            type=_spot,
+            metavar="X,Y",
+            help=f"mm on the table, where the {name} stands (default: where it is)",
+        )
+    pour.add_argument(
+        "--shake", type=int, default=water.shake, metavar="N", help="times (default: 3)"
+    )
+    _add_common(pour)
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
@@ -76,6 +93,13 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
     )
+
+
+def _spot(text: str) -> tuple[float, float]:
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"two numbers X,Y in mm, not {text!r}")
+    return _number(parts[0]), _number(parts[1])
 
 
 def _share(text: str) -> float:

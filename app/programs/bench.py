@@ -76,6 +76,8 @@ class Bench:
         self.rig = rig
         self.state = state
         self.orders: list[tuple[str, Order]] = []
+        self.taken: ToolTarget | None = None
+        """Where the tool took what it holds."""
 
     @property
     def world(self) -> World | None:

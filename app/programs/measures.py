@@ -17,5 +17,9 @@ MEASURES: Final = {
     "greatest_speed_share": "of any joint, of its most",
     "greatest_tool_speed_mm_s": "of the tool point",
     "duration_s": "of the run",
+    "emptied_percent": "of the water, what is in the basin at the end",
+    "spilled_ml": "what lies on table and floor at the end",
+    "carried_margin_to_rim_mm": "the least of the lip over the water, until it is poured",
+    "cup_peak_jerk_m_s3": "of the middle of the cup, over a tick",
 }
 """The name, its unit at its end, and what it is."""

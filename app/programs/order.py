@@ -9,6 +9,7 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.state import Reason, State
+from app.control.things import Thing
 from app.errors import InputError
 from app.planning.plan import Plan
 
@@ -73,6 +74,40 @@ class Grip:
 
     def share(self, state: State, waited: float) -> float:  # noqa: ARG002
         return float(state.gripper_setpoint == state.gripper_goal)
+
+
+@dataclass(frozen=True)
+class Filling:
+    """Fill the cup with ``volume`` [m^3]."""
+
+    volume: float
+
+    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        return (cmd.Fill(self.volume),)
+
+    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        if state.poured is None:
+            raise InputError("There is no cup to fill.")
+        return True
+
+    def share(self, state: State, waited: float) -> float:  # noqa: ARG002
+        return 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Putting:
+    """Have ``thing`` stand where it says."""
+
+    thing: Thing
+
+    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
+        return (cmd.Place(self.thing),)
+
+    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
+        return any(np.array_equal(each.T, self.thing.T) for each in state.things)
+
+    def share(self, state: State, waited: float) -> float:  # noqa: ARG002
+        return 1.0
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from app.programs import fields as read
 from app.programs.bench import Place
 from app.programs.fields import Fields
 from app.programs.measures import MEASURES
+from app.programs.setting import Setting
 from app.programs.source import Problem, ScriptError, Value
 from app.programs.source import read as read_text
-from app.programs.steps import MOST_TIMES, STEPS, Setting, Step, Tool, place
+from app.programs.steps import MOST_TIMES, STEPS, Step, Tool, place
 
 MOST_STEPS = 1000
 """All repetitions counted."""

@@ -6,7 +6,7 @@ To add one: a class with `read` and `lay`, and its name in STEPS.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
@@ -24,7 +24,9 @@ from app.planning.tool_path import ToolPath
 from app.programs import fields as read
 from app.programs.bench import Bench, Place
 from app.programs.fields import Fields
+from app.programs.handling import Fill, Grasp, Pour, Put, SetDown
 from app.programs.order import Grip, Pace, Use, Wait
+from app.programs.setting import Setting
 from app.programs.source import Value
 
 LONGEST_WAIT = 3600.0
@@ -34,17 +36,6 @@ MOST_TIMES = 1000
 
 ROOMIEST = "roomiest"
 """The pitch that leaves the joints the most room along an arc."""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What the steps of one script have in common.
-
-    in_base: whether its points are in the base frame. poses: its places by name.
-    """
-
-    in_base: bool
-    poses: Mapping[str, Place]
 
 
 class Step(Protocol):
@@ -380,6 +371,11 @@ STEPS: dict[str, type[Step]] = {
     "wait": Pause,
     "tool": Tool,
     "speed": Speed,
+    "fill": Fill,
+    "put": Put,
+    "grasp": Grasp,
+    "pour": Pour,
+    "set_down": SetDown,
 }
 
 LEVEL = 1e-6

@@ -21,10 +21,12 @@ from app.planning.curve import Tool
 from app.planning.jet import Jet
 from app.planning.path import joint_derivatives
 from app.planning.tool_path import ToolPath
+from app.programs.handling import POURING
 from app.programs.order import Go
 from app.programs.program import Program
 from app.programs.script import Script
 from app.report.trace import Trace
+from app.water.score import score
 
 PLACES = 2000
 """Of each path at which the kinematics are held against it."""
@@ -115,6 +117,7 @@ def measured(program: Program, arm: Arm, trace: Trace) -> dict[str, float | None
         "greatest_speed_share": float((np.abs(trace.qd) / limits.speed).max()),
         "greatest_tool_speed_mm_s": 1e3 * max(speeds),
         "duration_s": float(trace.t[-1]),
+        **_of_water(program, trace),
     }
 
 
@@ -189,6 +192,22 @@ def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
 
 def _length(points: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
+    """What is measured of the water, where there was any."""
+    end = trace.water[-1]
+    if end is None:
+        return {}
+    found = score(end.water, end.course)
+    pours = [number for number, task in enumerate(program.tasks) if task.name == POURING]
+    carried = trace.task < (pours[0] if pours else len(program.tasks))
+    return {
+        "emptied_percent": found.emptied_percent,
+        "spilled_ml": found.spilled_ml,
+        "carried_margin_to_rim_mm": 1e3 * float(trace.margin[carried].min()),
+        "cup_peak_jerk_m_s3": found.peak_jerk,
+    }
 
 
 def _most(values: FloatArray) -> float | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from app.control.pouring import Poured
 from app.control.session import Session
 from app.control.state import State
 from app.drivers.driver import Driver
@@ -34,6 +36,8 @@ class Trace:
         segment: (N,) on which segment of its plan, -1 on none.
         sigma: (N,) where on that segment's path, from 0 to 1.
         tools: (N,) the tool frame.
+        water: (N,) the water, None where there is none.
+        margin: (N,) [m] how far the cup's lip is above it; infinite where there is none.
     """
 
     t: FloatArray
@@ -45,6 +49,8 @@ class Trace:
     segment: IntArray
     sigma: FloatArray
     tools: tuple[str, ...]
+    water: tuple[Poured | None, ...]
+    margin: FloatArray
 
 
 class Rehearsal:
@@ -93,7 +99,15 @@ class Rehearsal:
             segment=np.array([segment for segment, _ in places], dtype=np.int64),
             sigma=np.array([sigma for _, sigma in places]),
             tools=tuple(state.tool for state in states),
+            water=tuple(state.poured for state in states),
+            margin=np.array([self._margin(state) for state in states]),
         )
+
+    def _margin(self, state: State) -> float:
+        pouring = self._session.pouring
+        if pouring is None or state.poured is None:
+            return math.inf
+        return pouring.margin_to_rim(state.poured, state.things)
 
     def _place(self, state: State, number: int) -> tuple[int, float]:
         following, order = state.following, self._program.tasks[number].order
