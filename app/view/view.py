@@ -32,6 +32,7 @@ from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
 from app.view.tint import Tint
+from app.view.traces import Traces
 from app.view.workcell import Workcell
 
 log = logging.getLogger(__name__)
@@ -87,6 +88,7 @@ class View:
         self._tint = Tint(server, model, self._arm.path)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
+        self._traces = Traces(server, model)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
@@ -155,6 +157,7 @@ class View:
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
+            self._traces.follow(state)
             self._cameras.follow(state)
             self._panel.follow(
                 state,
