@@ -139,6 +139,7 @@ def _serve(
         # The libraries that read the robot take most of a second: the page loads in the meantime.
         from app.cli.assembly import described
         from app.exchange.reachability_file import load_map
+        from app.exchange.scripts import Scripts
         from app.gateway.motion import Motion
         from app.runtime.link import FrontEnd
         from app.view.view import View
@@ -147,7 +148,14 @@ def _serve(
         model, session, _ = described(settings, *robot)
         link = FrontEnd(pipe, session.check)
         view = View(
-            gateway.viser, model, link.board, link, session.choices, settings.frame_rate, stored
+            gateway.viser,
+            model,
+            link.board,
+            link,
+            session.choices,
+            settings.frame_rate,
+            stored,
+            (gateway.steering, Scripts(settings.programs)),
         )
         gateway.attach(Motion(model, session, link, view.let_go))
         link.start()

@@ -15,6 +15,7 @@ from app.control.commands import Command
 from app.control.state import PoseTarget, State, Status, ToolTarget
 from app.errors import InputError
 from app.exchange.reachability_file import StoredMap
+from app.exchange.scripts import Scripts
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
@@ -28,6 +29,7 @@ from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
 from app.view.panel import READOUT_INTERVAL, Panel
+from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
@@ -65,9 +67,10 @@ class View:
         find: Find,
         frame_rate: float,
         stored: StoredMap | None = None,
+        programs: tuple[Steering, Scripts] | None = None,
     ) -> None:
         """``find``: the branches to choose from. ``frame_rate``: most updates a second [Hz].
-        ``stored``: a workspace that can be shown.
+        ``stored``: a workspace that can be shown. ``programs``: who runs them, and which there are.
 
         Raises ConfigurationError for the map of another arm.
         """
@@ -95,6 +98,12 @@ class View:
         self._cameras = Cameras(server, model)
         shows = Shows(self._show_ellipsoid, self._look_from, cloud)
         self._panel = Panel(server, model, mailbox.put, find, shows, state)
+        self._programs: ProgramsPanel | None = None
+        if programs is not None:
+            steering, scripts = programs
+            self._programs = ProgramsPanel(
+                server, model, steering, scripts, lambda: board.snapshot.state
+            )
         self.show(board.snapshot)
 
     def start(self) -> None:
@@ -165,6 +174,8 @@ class View:
                 self._board.ledger,
                 caught_up=snapshot.ticket == self._mailbox.last_ticket,
             )
+            if self._programs is not None:
+                self._programs.follow()
         self._server.flush()
 
     def _show_goal(self, state: State) -> None:
