@@ -27,6 +27,7 @@ class Settings:
         tls_cert, tls_key: files of a certificate and its key, for https.
         public_url: what people type when a reverse proxy stands in front.
         bare: whether the arm is without its gripper.
+        programs: folder of scripts that the panel offers besides those that come along.
         lines: TCP port of this machine for programs that speak JSON lines; None without.
     """
 
@@ -43,3 +44,4 @@ class Settings:
     public_url: str | None = None
     lines: int | None = None
     bare: bool = False
+    programs: Path | None = None

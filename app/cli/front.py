@@ -139,6 +139,7 @@ def _serve(
         # The libraries that read the robot take most of a second: the page loads in the meantime.
         from app.cli.assembly import described
         from app.exchange.reachability_file import load_map
+        from app.exchange.scripts import Scripts
         from app.gateway.motion import Motion
         from app.runtime.link import FrontEnd
         from app.runtime.navigator import Navigator
@@ -156,6 +157,7 @@ def _serve(
             session,
             settings.frame_rate,
             stored,
+            (gateway.steering, Scripts(settings.programs)),
         )
         navigator.tell = gateway.announce
         gateway.attach(Motion(model, session, link, navigator, view.let_go))

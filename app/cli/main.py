@@ -40,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 public_url=options.public_url,
                 lines=options.lines,
                 bare=options.bare,
+                programs=options.programs,
             )
             return serve(settings, options.urdf, options.tool, options.workspace)
         if options.command == "access":
@@ -124,6 +125,12 @@ def _parser() -> argparse.ArgumentParser:
         "--public-url",
         metavar="URL",
         help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
+    )
+    serve.add_argument(
+        "--programs",
+        type=Path,
+        metavar="DIR",
+        help="a folder of scripts for the panel, where taught ones are saved too",
     )
     serve.add_argument(
         "--bare",

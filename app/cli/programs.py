@@ -6,13 +6,13 @@ import sys
 from argparse import Namespace
 from dataclasses import replace
 from datetime import datetime
-from pathlib import Path
 
 from app.cli.assembly import described
 from app.cli.progress import progress
 from app.cli.version import version
 from app.drivers.simulated import SimulatedDriver
-from app.errors import InputError, KatanaError
+from app.errors import KatanaError
+from app.exchange.scripts import text_of
 from app.programs.bench import Rig
 from app.programs.circle import CircleDemo
 from app.programs.order import Go
@@ -20,7 +20,7 @@ from app.programs.pour import PourDemo
 from app.programs.program import Program, compiled
 from app.programs.runner import Phase
 from app.programs.script import Script, parse
-from app.programs.source import LARGEST, ScriptError
+from app.programs.source import ScriptError
 from app.report.figures import check_drawable
 from app.report.report import Report
 from app.report.trace import Rehearsal
@@ -48,17 +48,6 @@ def demo(options: Namespace) -> int:
             options.tool,
         ).text
     return _run(text, f"demo {options.demo}", options)
-
-
-def text_of(path: Path) -> str:
-    """The text of a script. Raises InputError for a file that holds none."""
-    try:
-        with path.open("rb") as file:
-            return file.read(LARGEST + 1).decode("utf-8")
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is no text in UTF-8: {error.reason}.") from error
 
 
 def _run(text: str, source: str, options: Namespace) -> int:

@@ -73,9 +73,16 @@ class Firewall:
     """In front of viser, for one connection."""
 
     def __init__(
-        self, guard: Guard, who: str, drags: set[str], drive: Callable[[], None], t: float
+        self,
+        guard: Guard,
+        who: str,
+        drags: set[str],
+        drive: Callable[[], None],
+        steer: Callable[[], None],
+        t: float,
     ) -> None:
-        """``drive`` raises a LeaseError when its person must not move the arm at this moment.
+        """``drive`` raises a LeaseError when its person must not move the arm at this moment, and
+        ``steer`` when they must not tell a program what to do.
 
         ``who``: for the log. ``drags``: the gizmos it holds; whoever empties it ends the drags.
         """
@@ -83,6 +90,7 @@ class Firewall:
         self._who = who
         self._drags = drags
         self._drive = drive
+        self._steer = steer
         self._flood = Bucket(RATE, BURST, t)
         self._patience = Bucket(FORGIVEN, PATIENCE, t)
         self.dropped: Counter[str] = Counter()
@@ -111,7 +119,7 @@ class Firewall:
             # Its beginning was refused, or it was ended here while the hand went on.
             return Verdict(Ruling.DROP, tuple(self._guard.correction(message)))
         try:
-            self._drive()
+            (self._steer if self._guard.steers(message) else self._drive)()
         except LeaseError as refusal:
             corrections = tuple(self._guard.correction(message))
             return Verdict(Ruling.DROP, corrections, refusal=str(refusal))

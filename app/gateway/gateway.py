@@ -27,6 +27,7 @@ from app.gateway.listen import reaches_beyond
 from app.gateway.motion import Motion
 from app.gateway.program import Lines
 from app.gateway.proxy import Proxy
+from app.gateway.steering import Steering
 from app.settings import Settings
 from app.view.guard import Guard
 from app.view.server import open_server
@@ -53,6 +54,7 @@ class Gateway:
         _check_tls(settings)
         self._listening = listening
         self._lines_at = lines
+        self._loop: asyncio.AbstractEventLoop | None = None
         try:
             access = _access(settings, self._listening)
             key = secrets.token_urlsafe(32)
@@ -60,6 +62,7 @@ class Gateway:
             self.port: int = self._listening.getsockname()[1]
             self.address = _address(settings, self._listening)
             self._hub = Hub(time.monotonic, settings.silence)
+            self.steering = Steering(self._hub.performer, lambda: self._loop)
             door = Door(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
             app = application(self._hub, door, proxy, self.address)
@@ -86,7 +89,6 @@ class Gateway:
         )
         self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
         self._started = threading.Event()
-        self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self) -> None:
         """Answer from now on."""

@@ -63,6 +63,8 @@ class Performer:
         self._parts: dict[str, str] = {}
         self._planning: _Planning | None = None
         self._owner: Window | None = None
+        self._hand: Window | None = None
+        self._then: Order | None = None
         self._seen = 0.0
         self._self: Window | None = None
         self._run: Run | None = None
@@ -71,6 +73,31 @@ class Performer:
     def running(self) -> bool:
         """Whether a program has the arm."""
         return self._self is not None
+
+    @property
+    def program(self) -> Program | None:
+        """The one that is planned."""
+        return None if self._planning is None else self._planning.program
+
+    def touch(self, window: Window) -> None:
+        """``window`` touches the panel of programs. Raises LeaseError if it must not."""
+        self._check_may_drive(window)
+        if self.running:
+            self._check_owns(window)
+        self._hand = window
+
+    def plan(self, text: str, then: Order | None) -> None:
+        """Plan ``text`` for who touched the panel last, and do ``then`` once it is planned."""
+        if self._hand is None:
+            raise LeaseError("Open the front page to run programs.")
+        self.script(self._hand, text, more=False, speed=1.0)
+        self._then = then
+
+    def order(self, order: Order) -> None:
+        """`steer` for who touched the panel last."""
+        if self._hand is None:
+            raise LeaseError("Open the front page to run programs.")
+        self.steer(self._hand, order)
 
     def script(self, window: Window, text: str, *, more: bool, speed: float) -> None:
         """A part of a script; after the last it is planned, from where the arm stands then.
@@ -91,7 +118,7 @@ class Performer:
         self._check_may_drive(window)
         planning = _Planning(self._hub.clock())
         self._planning, self._owner, self._run = planning, window, None
-        self._seen = planning.began
+        self._seen, self._then = planning.began, None
         work = (planning, text, speed, arm.rig, arm.state)
         threading.Thread(target=self._plan, args=work, name="planner", daemon=True).start()
 
@@ -123,7 +150,9 @@ class Performer:
 
     def tick(self) -> None:
         """Look at the arm, and go on; to be called often."""
-        program = None if self._planning is None else self._planning.program
+        program = self.program
+        if program is not None and self._then is not None:
+            self._go_on()
         if self._self is None or self._run is None or program is None:
             return
         hub, t = self._hub, self._hub.clock()
@@ -179,6 +208,17 @@ class Performer:
             seconds=program.duration,
             why=now.why,
         )
+
+    def _go_on(self) -> None:
+        """Do what was to be done once a program is planned."""
+        then, self._then = self._then, None
+        assert then is not None
+        assert self._owner is not None
+        try:
+            self.steer(self._owner, then)
+        except LeaseError as error:
+            assert self._planning is not None
+            self._planning.program, self._planning.refused = None, str(error)
 
     def _begin(self, window: Window, *, single: bool) -> None:
         planning = self._planning

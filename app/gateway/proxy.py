@@ -114,7 +114,7 @@ class _Line:
         self._told_at = float("-inf")
         window = hub.window(key)
         who = window.person.name if window is not None else "a window without our page"
-        self._firewall = Firewall(guard, who, self._drags, self._drive, hub.clock())
+        self._firewall = Firewall(guard, who, self._drags, self._drive, self._steer, hub.clock())
 
     async def run(self) -> None:
         """Until either side closes."""
@@ -183,6 +183,12 @@ class _Line:
         if not self._key:
             raise LeaseError("Open the front page to drive the arm.")
         self._hub.drive(self._key)
+
+    def _steer(self) -> None:
+        window = self._hub.window(self._key)
+        if window is None:
+            raise LeaseError("Open the front page to run programs.")
+        self._hub.performer.touch(window)
 
 
 async def _narrow_socket(port: int) -> socket.socket:

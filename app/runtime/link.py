@@ -23,6 +23,7 @@ from app.runtime.board import Board, Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
+from app.runtime.wire import Names, Plans
 
 log = logging.getLogger(__name__)
 
@@ -69,6 +70,7 @@ class ArmEnd:
         self._numbers: deque[tuple[int, int]] = deque([(mailbox.last_ticket, 0)])
         self._numbering = threading.Lock()
         self._heard = time.monotonic()
+        self._names = Names()
         self.cut = threading.Event()
         """Set once there is nobody at the other end."""
         self._threads = [
@@ -105,6 +107,8 @@ class ArmEnd:
             self._mailbox.put(cmd.Stop())
 
     def _put(self, told: Told) -> None:
+        if isinstance(told.command, cmd.Follow):
+            self._names.note(told.number, told.command.plan)
         with self._numbering:
             try:
                 ticket = self._mailbox.put(told.command)
@@ -119,7 +123,7 @@ class ArmEnd:
         seen, reported = board.snapshot, time.monotonic()
         try:
             ledger = board.ledger
-            self._pipe.send(News(self._named(seen), ledger, board.lateness))
+            self._send(News(self._named(seen), ledger, board.lateness))
             last = ledger[-1] if ledger else None
             while not self.cut.is_set():
                 snapshot = board.wait_for_change(seen, REPORT_EVERY)
@@ -130,10 +134,13 @@ class ArmEnd:
                     reported, board.lateness = now, self._loop.lateness
                 fresh = _newer(board.ledger, last)
                 last = fresh[-1] if fresh else last
-                self._pipe.send(News(self._named(snapshot), fresh, board.lateness))
+                self._send(News(self._named(snapshot), fresh, board.lateness))
                 seen = snapshot
         except GONE:
             self.cut.set()
+
+    def _send(self, news: News) -> None:
+        self._pipe.send_bytes(self._names.dumped(news))
 
     def _named(self, snapshot: Snapshot) -> Snapshot:
         """``snapshot`` with the front's number of the last command that is in it."""
@@ -160,7 +167,8 @@ class FrontEnd:
         self._check = check
         self._sending = threading.Lock()
         self._number = 0
-        first = _heard(pipe)
+        self._plans = Plans()
+        first = _heard(pipe, self._plans)
         self.board = Board(first.snapshot, first.lateness)
         self.board.pin(first.snapshot, first.ledger)
         self.cut = threading.Event()
@@ -182,6 +190,8 @@ class FrontEnd:
         self._check(command)
         with self._sending:
             self._number += 1
+            if isinstance(command, cmd.Follow):
+                self._plans.note(self._number, command.plan)
             self._send(Told(self._number, command))
             return self._number
 
@@ -199,7 +209,7 @@ class FrontEnd:
     def _listen(self) -> None:
         try:
             while True:
-                news = _heard(self._pipe)
+                news = _heard(self._pipe, self._plans)
                 self.board.lateness = news.lateness
                 seen = self.board.snapshot
                 if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
@@ -208,9 +218,9 @@ class FrontEnd:
             self.cut.set()
 
 
-def _heard(pipe: Connection) -> News:
+def _heard(pipe: Connection, plans: Plans) -> News:
     """What comes from the arm's end; EOFError when that hangs up."""
-    news = pipe.recv()
+    news = plans.loaded(pipe.recv_bytes())
     if not isinstance(news, News):
         raise EOFError
     return news

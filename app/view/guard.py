@@ -15,6 +15,7 @@ import viser
 from viser import _messages as wire
 
 from app.view.looks import PERSONAL
+from app.view.programs import STEERING
 
 WORKSPACE = 1.5
 """[m] No gizmo goes farther from the base in any direction: more than twice the arm's reach."""
@@ -60,6 +61,12 @@ class Guard:
         if isinstance(message, wire.GuiUpdateMessage):
             return getattr(self._control(message), "label", None) not in PERSONAL
         return not isinstance(message, wire.ViewerCameraMessage)
+
+    def steers(self, message: Any) -> bool:
+        """Whether ``message`` is for a program, which may be another's than who drives by hand."""
+        if not isinstance(message, wire.GuiUpdateMessage):
+            return False
+        return getattr(self._control(message), "label", None) in STEERING
 
     def correction(self, message: Any) -> list[Any]:
         """What the sender must be told so that its window shows the truth again.

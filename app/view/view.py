@@ -16,6 +16,7 @@ from app.control.session import Session
 from app.control.state import PoseTarget, State, Status, ToolTarget
 from app.errors import InputError
 from app.exchange.reachability_file import StoredMap
+from app.exchange.scripts import Scripts
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
@@ -28,11 +29,13 @@ from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
 from app.view.panel import READOUT_INTERVAL, Panel
+from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
 from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
 from app.view.things import ThingNodes
 from app.view.tint import Tint
+from app.view.traces import Traces
 from app.view.water import WaterNodes
 from app.view.workcell import Workcell
 from app.water.around import Around
@@ -67,9 +70,11 @@ class View:
         session: Session,
         frame_rate: float,
         stored: StoredMap | None = None,
+        programs: tuple[Steering, Scripts] | None = None,
     ) -> None:
         """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
-        second [Hz]. ``stored``: a workspace that can be shown.
+        second [Hz]. ``stored``: a workspace that can be shown. ``programs``: who runs them, and
+        which there are.
 
         Raises ConfigurationError for the map of another arm.
         """
@@ -93,6 +98,7 @@ class View:
         self._tint = Tint(server, model, self._arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
+        self._traces = Traces(server, model)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
         cloud = None if stored is None else ReachabilityCloud(server, model, stored)
@@ -105,6 +111,12 @@ class View:
         self._tool = ""
         self._T_base_goal = np.eye(4)
         self._panel = Panel(server, model, mailbox.put, session.choices, shows, state)
+        self._programs: ProgramsPanel | None = None
+        if programs is not None:
+            steering, scripts = programs
+            self._programs = ProgramsPanel(
+                server, model, steering, scripts, lambda: board.snapshot.state
+            )
         self.show(board.snapshot)
 
     def start(self) -> None:
@@ -170,6 +182,7 @@ class View:
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
+            self._traces.follow(state)
             self._cameras.follow(state)
             self._panel.follow(
                 state,
@@ -177,6 +190,8 @@ class View:
                 self._board.ledger,
                 caught_up=snapshot.ticket == self._mailbox.last_ticket,
             )
+            if self._programs is not None:
+                self._programs.follow()
         self._server.flush()
 
     def _show_water(self, state: State) -> None:

@@ -1,0 +1,61 @@
+"""The programs' panel and whoever runs them: across the threads of viser and of the gateway."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Future
+
+from app.api import answers
+from app.api.requests import Order
+from app.errors import LeaseError
+from app.gateway.performer import Performer
+from app.programs.program import Program
+
+PATIENCE = 2.0
+"""[s] Until the panel gives up on an answer."""
+
+
+class Steering:
+    """What the panel may ask; done in the gateway's one thread."""
+
+    def __init__(
+        self, performer: Performer, loop: Callable[[], asyncio.AbstractEventLoop | None]
+    ) -> None:
+        """``loop``: the gateway's, once it runs."""
+        self._performer = performer
+        self._loop = loop
+
+    @property
+    def told(self) -> answers.Program | None:
+        """How the program stands."""
+        return self._performer.told()
+
+    @property
+    def program(self) -> Program | None:
+        """The one that is planned."""
+        return self._performer.program
+
+    def plan(self, text: str, then: Order | None) -> None:
+        """Plan a script, and do ``then``. Raises KatanaError with the reason why not."""
+        self._do(lambda: self._performer.plan(text, then))
+
+    def steer(self, order: Order) -> None:
+        """Tell the program that runs. Raises LeaseError with the reason why not."""
+        self._do(lambda: self._performer.order(order))
+
+    def _do(self, act: Callable[[], None]) -> None:
+        loop, future = self._loop(), Future[None]()
+        if loop is None:
+            raise LeaseError("The server is not there yet.")
+
+        def done() -> None:
+            try:
+                act()
+            except Exception as error:
+                future.set_exception(error)
+            else:
+                future.set_result(None)
+
+        loop.call_soon_threadsafe(done)
+        future.result(PATIENCE)

@@ -1,0 +1,196 @@
+"""The panel of programs: choose one, see its way, run, step, pause and end it; teach a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import Any, Protocol
+
+import numpy as np
+import viser
+
+from app.api.answers import Program as Told
+from app.api.requests import Order
+from app.control.state import State
+from app.errors import InputError, KatanaError
+from app.exchange.scripts import Scripts
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.programs.order import Go, Use
+from app.programs.program import Program
+from app.programs.taught import taught
+from app.robot.model import RobotModel
+
+STEERING = ("Script", "Program", "Teach", "Name")
+"""Labels of the controls that steer a program: who may, the gateway decides."""
+
+PREVIEW = (64, 156, 255)
+PLACES = 60
+"""Pieces that each plan of a preview is drawn with."""
+
+MOST_TAUGHT = 200
+
+ORDERS = {
+    "Run": Order.RUN,
+    "Step": Order.STEP,
+    "Pause": Order.PAUSE,
+    "Resume": Order.RESUME,
+    "End": Order.HALT,
+}
+
+
+class Steering(Protocol):
+    """What the panel asks of whoever runs programs. Each raises KatanaError with the reason."""
+
+    def plan(self, text: str, then: Order | None) -> None:
+        """Plan a script, and then run it, for who touched the panel last."""
+        ...
+
+    def steer(self, order: Order) -> None:
+        """Tell the one that runs."""
+        ...
+
+    @property
+    def told(self) -> Told | None:
+        """How it stands."""
+        ...
+
+    @property
+    def program(self) -> Program | None:
+        """The one that is planned."""
+        ...
+
+
+class ProgramsPanel:
+    """A folder of controls, and the preview in the scene."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        steering: Steering,
+        scripts: Scripts,
+        state: Callable[[], State],
+    ) -> None:
+        """``state``: the newest."""
+        self._model = model
+        self._steering = steering
+        self._scripts = scripts
+        self._state = state
+        self._taught: list[FloatArray] = []
+        self._drawn: Program | None = None
+        self._way = server.scene.add_line_segments(
+            "/path/preview",
+            np.zeros((1, 2, 3), dtype=np.float32),
+            PREVIEW,
+            thickness=0.002,
+            visible=False,
+        )
+        gui = server.gui
+        with gui.add_folder("Programs", expand_by_default=False):
+            self._choice = gui.add_dropdown(
+                "Script", tuple(scripts.paths), hint="Those that come along, and of --programs DIR"
+            )
+            self._orders = gui.add_button_group(
+                "Program",
+                ("Preview", *ORDERS),
+                hint="Preview: plan it and show the tool's way. Step: to the end of a step",
+            )
+            self._orders.on_click(self._guarded(self._order))
+            self._status = gui.add_html("")
+            self._teach = gui.add_button_group(
+                "Teach",
+                ("Add pose", "Forget", "Save"),
+                hint="Add pose: where the arm is now. Save: a script through all of them",
+            )
+            self._teach.on_click(self._guarded(self._on_teach))
+            self._name = gui.add_text("Name", "My script", hint="Of the script that Save writes")
+
+    def follow(self) -> None:
+        """Show how the program stands."""
+        page = _page(self._steering.told, len(self._taught))
+        if page != self._status.content:
+            self._status.content = page
+        program = self._steering.program
+        if program is not self._drawn:
+            self._drawn = program
+            self._preview(program)
+
+    def _order(self) -> None:
+        said = self._orders.value
+        told = self._steering.told
+        running = told is not None and told.status in ("running", "paused", "blocked")
+        if said == "Preview" or (said in ("Run", "Step") and not running):
+            text = self._scripts.text(self._choice.value)
+            self._steering.plan(text, ORDERS.get(said))
+        else:
+            self._steering.steer(ORDERS[said])
+
+    def _on_teach(self) -> None:
+        match self._teach.value:
+            case "Add pose":
+                if len(self._taught) >= MOST_TAUGHT:
+                    raise InputError(f"No more than {MOST_TAUGHT} poses; save these first.")
+                self._taught.append(self._state().goal)
+            case "Forget":
+                self._taught.clear()
+            case "Save":
+                if not self._taught:
+                    raise InputError("There is no pose yet: bring the arm somewhere and add it.")
+                name = self._name.value.strip()
+                self._scripts.save(name, taught(name, self._taught))
+                self._taught.clear()
+                self._choice.options = tuple(self._scripts.paths)
+                self._choice.value = name  # type: ignore[misc]  # viser declares it read-only
+
+    def _guarded(self, act: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], None]:
+        """``act``, and what is wrong told in the window of whoever asked."""
+
+        def acted(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            try:
+                act()
+            except KatanaError as error:
+                if event.client is not None:
+                    event.client.add_notification("Not done", str(error), color="red")
+
+        return acted
+
+    def _preview(self, program: Program | None) -> None:
+        """The way of the tool through all plans, as a line."""
+        tool = self._state().tool
+        ways: list[FloatArray] = []
+        T_base_shoulder = self._model.T_base_shoulder
+        for task in program.tasks if program is not None else ():
+            if isinstance(task.order, Use):
+                tool = task.order.name
+            elif isinstance(task.order, Go):
+                chain = self._model.arm.chain_to(tool)
+                points = [
+                    (T_base_shoulder @ forward(chain, q))[:3, 3]
+                    for q in task.order.plan.postures(PLACES + 1)
+                ]
+                ways.append(np.stack((points[:-1], points[1:]), axis=1))
+        if ways:
+            self._way.points = np.concatenate(ways).astype(np.float32)
+        self._way.visible = bool(ways)
+
+
+def _page(told: Told | None, poses: int) -> str:
+    lines = []
+    if told is not None:
+        head = f"<b>{escape(told.name)}</b> " if told.name else ""
+        lines.append(f"{head}{escape(told.status)}")
+        if told.status in ("running", "paused", "blocked"):
+            lines.append(
+                f"Step {told.step} of {told.steps}, line {told.line}: {escape(told.task)}, "
+                f"{told.share:.0%}"
+            )
+        elif told.status == "ready":
+            lines.append(f"{told.steps} steps, {told.seconds:.1f} s of motion at full speed")
+        lines += [escape(line) for line in told.why.splitlines()]
+    if poses:
+        lines.append(f"Taught: {poses} pose{'s' if poses > 1 else ''}")
+    body = "".join(f"<div>{line}</div>" for line in lines)
+    return f"<div class='k450 program'>{body}</div>" if body else ""
