@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,9 @@ import imageio.v3 as imageio
 import numpy as np
 from numpy.typing import NDArray
 
+from app.api import answers, requests
+from app.client import Client, connect
+from app.programs.pour import PourDemo
 from app.view.cameras import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
@@ -89,6 +93,53 @@ def gallery(page: ViserPage) -> None:
         imageio.imwrite(IMAGES / f"gallery-{theme.lower()}.jpg", np.vstack(rows), quality=82)
 
 
+STAGES = (
+    ("grasp cup: before it", 0.0),
+    ("grasp cup: close", 0.0),
+    ("over basin", 0.5),
+    ("pour", 0.62),
+)
+"""Of the pouring demo, as in the paper's figures 9 to 12: the task, and how much of it is done."""
+
+
+def pouring(page: ViserPage) -> None:
+    """Initial, grasping, approaching, emptying."""
+    url = page.page.url.split("/?")[0].rstrip("/")
+    pictures = []
+    with connect(url, "Pictures") as arm:
+        send(arm, PourDemo().text)
+        program(arm, lambda told: told.status in ("ready", "refused"))
+        arm.ask(requests.Steer(order=requests.Order.RUN))
+        for task, share in STAGES:
+            program(arm, lambda told, t=task, s=share: told.task == t and told.share >= s)  # type: ignore[misc]
+            arm.ask(requests.Steer(order=requests.Order.PAUSE))
+            page.page.wait_for_timeout(700)
+            page.wait_drawn()
+            pictures.append(tile(page))
+            arm.ask(requests.Steer(order=requests.Order.RESUME))
+        arm.ask(requests.Steer(order=requests.Order.HALT))
+    sheet = np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
+    imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
+
+
+def send(arm: Client, text: str) -> None:
+    """Have a script planned."""
+    parts = [text[at : at + 600] for at in range(0, len(text), 600)]
+    for number, part in enumerate(parts, start=1):
+        arm.ask(requests.Program(text=part, more=number < len(parts)))
+
+
+def program(arm: Client, wanted: Callable[[answers.Program], bool]) -> answers.Program:
+    """What is told of the program as soon as it is as wanted."""
+    while True:
+        told = arm.look(answers.State).program
+        if told is not None and wanted(told):
+            return told
+        if told is not None and told.status in ("refused", "stopped", "failed"):
+            sys.exit(f"The program {told.name} is {told.status}: {told.why}")
+        time.sleep(0.02)
+
+
 def tile(page: ViserPage) -> NDArray[np.uint8]:
     """The middle of the scene."""
     left, top, width, height = page.scene_rectangle()
@@ -103,6 +154,7 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
+    pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(38.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
 
