@@ -1,0 +1,82 @@
+"""Find the programs that read our exports, and install them where that can be done without asking.
+
+``python tests/exchange/tools.py`` does so; tests of a program that is not there are skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+PACKAGES = {
+    "gcc": "gcc",
+    "make": "make",
+    "clang": "clang",
+    "cmake": "cmake",
+    "/usr/include/GL/freeglut.h": "freeglut3-dev",
+    "/usr/lib/x86_64-linux-gnu/dri/swrast_dri.so": "libgl1-mesa-dri",
+    "xvfb-run": "xvfb",
+    "xauth": "xauth",
+    "tovrmlx3d": "view3dscene",
+    "view3dscene": "view3dscene",
+}
+"""Programs and files, and Debian's packages that bring them."""
+
+SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
+
+VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
+"""What building and running the C viewer takes."""
+
+
+def missing(names: Sequence[str]) -> list[str]:
+    """Debian's packages of those that are not there."""
+    absent = [n for n in names if not (Path(n).exists() if n[0] == "/" else shutil.which(n))]
+    return list(dict.fromkeys(PACKAGES[name] for name in absent))
+
+
+def needs(*names: str) -> pytest.MarkDecorator:
+    """Skip a test, and say why, where one of the programs is not there."""
+    packages = " ".join(missing(names))
+    return pytest.mark.skipif(
+        bool(packages), reason=f"not here; on Debian and Ubuntu: apt-get install {packages}"
+    )
+
+
+def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -> str:
+    """Run a program that must succeed within so many seconds; what it printed."""
+    done = subprocess.run(
+        [str(word) for word in words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=seconds,
+        check=False,
+    )
+    assert done.returncode == 0, f"{words[0]} ended with {done.returncode}:\n{done.stderr[-4000:]}"
+    return done.stdout
+
+
+def main() -> None:
+    """Say what the tests use; install it first if root can."""
+    packages = missing(list(PACKAGES))
+    if packages and shutil.which("apt-get") and os.geteuid() == 0:
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        install = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends", *packages]
+        for command in (["apt-get", "update", "--quiet=2"], install):
+            print("Running:", *command, flush=True)
+            subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)
+    packages = missing(list(PACKAGES))
+    print(
+        f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
+        if packages
+        else "The programs that read our exports are all here."
+    )
+
+
+if __name__ == "__main__":
+    main()
