@@ -38,7 +38,7 @@ octave: $(dev_ok)             ## find GNU Octave, or install it where that can b
 	$(bin)/python tests/gateway/octave.py
 
 exchange: $(dev_ok)           ## find the programs that read our exports, or install them
-	$(bin)/python -m tests.exchange.tools
+	$(bin)/python tests/exchange/tools.py
 
 # Three at once: those that drive a browser, which mostly wait for it, those that run servers, and,
 # giving way to both, those that only compute.
