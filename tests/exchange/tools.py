@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import tarfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,6 +28,11 @@ PACKAGES = {
 }
 """Programs and files, and Debian's packages that bring them."""
 
+X_ITE = "x_ite@15.0.1"
+"""A browser of VRML and X3D worlds in JavaScript, from npm."""
+
+X_ITE_FOLDER = Path(__file__).parents[2] / ".cache" / X_ITE
+
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
@@ -37,6 +43,12 @@ def missing(names: Sequence[str]) -> list[str]:
     """Debian's packages of those that are not there."""
     absent = [n for n in names if not (Path(n).exists() if n[0] == "/" else shutil.which(n))]
     return list(dict.fromkeys(PACKAGES[name] for name in absent))
+
+
+def x_ite() -> Path | None:
+    """Its script, if it is there."""
+    script = X_ITE_FOLDER / "package" / "dist" / "x_ite.min.js"
+    return script if script.is_file() else None
 
 
 def needs(*names: str) -> pytest.MarkDecorator:
@@ -61,6 +73,21 @@ def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -
     return done.stdout
 
 
+def fetch_x_ite() -> None:
+    """Bring and unpack it; nothing of it is run."""
+    X_ITE_FOLDER.mkdir(parents=True, exist_ok=True)
+    pack = ["npm", "pack", X_ITE, "--silent"]
+    print("Running:", *pack, flush=True)
+    try:
+        subprocess.run(pack, cwd=X_ITE_FOLDER, check=False, timeout=120.0, capture_output=True)
+    except subprocess.TimeoutExpired:
+        return
+    for archive in X_ITE_FOLDER.glob("*.tgz"):
+        with tarfile.open(archive) as packed:
+            packed.extractall(X_ITE_FOLDER, filter="data")
+        archive.unlink()
+
+
 def main() -> None:
     """Say what the tests use; install it first if root can."""
     packages = missing(list(PACKAGES))
@@ -70,6 +97,9 @@ def main() -> None:
         for command in (["apt-get", "update", "--quiet=2"], install):
             print("Running:", *command, flush=True)
             subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)
+    if x_ite() is None and shutil.which("npm"):
+        fetch_x_ite()
+    print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
     packages = missing(list(PACKAGES))
     print(
         f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
