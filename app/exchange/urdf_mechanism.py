@@ -21,6 +21,10 @@ MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
 """Types of joint that are understood, and whether each slides."""
 
 
+EDGE = math.radians(30.0)
+"""Between two triangles, from which on they are shaded apart."""
+
+
 def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     """The tree in a URDF file with its visual shapes, and notes for a person on what it lacks.
 
@@ -132,7 +136,8 @@ def _shapes(visual: Visual) -> Sequence[Shape]:
         (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),
     )
     if not isinstance(visual.source, Path):
-        return [_shape(visual.mesh, np.eye(4), plain)]
+        return [_shape(_edged(visual.mesh), np.eye(4), plain)]
+    bare = visual.source.suffix.lower() == ".stl"
     T = visual.T_body_visual @ np.diag([*visual.scale, 1.0])
     try:
         scene = trimesh.load_scene(visual.source)
@@ -143,8 +148,14 @@ def _shapes(visual: Visual) -> Sequence[Shape]:
         T_file, name = scene.graph[node]
         mesh = scene.geometry[name]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            shapes.append(_shape(mesh, T @ T_file, _material(mesh, plain)))
+            made = _edged(mesh) if bare else mesh
+            shapes.append(_shape(made, T @ T_file, _material(mesh, plain)))
     return shapes
+
+
+def _edged(mesh: Any) -> Any:
+    """A mesh that brings no normals of its own, with those of a smooth surface up to an edge."""
+    return trimesh.graph.smooth_shade(mesh, angle=EDGE)
 
 
 def _shape(mesh: Any, T: FloatArray, material: Material) -> Shape:
@@ -161,9 +172,12 @@ def _shape(mesh: Any, T: FloatArray, material: Material) -> Shape:
 
 def _material(mesh: Any, plain: Material) -> Material:
     material = getattr(mesh.visual, "material", None)
-    factor = getattr(material, "baseColorFactor", None)
-    if material is None or factor is None:
+    if material is None:
         return plain
+    factor = getattr(material, "baseColorFactor", None)
+    if factor is None:
+        red, green, blue = (float(part) / 255.0 for part in material.main_color[:3])
+        return Material(str(material.name or plain.name), (red, green, blue))
     red, green, blue = (_srgb(float(part) / 255.0) for part in np.asarray(factor)[:3])
     metallic, rough = (
         default if value is None else float(value)

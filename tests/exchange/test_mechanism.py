@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 import yourdfpy
 
 from app.errors import InputError, RobotDescriptionError
@@ -59,6 +60,56 @@ def test_every_shape_is_there_with_its_material(katana: Mechanism) -> None:
     assert colours["champagne aluminium"] == pytest.approx((0.745, 0.706, 0.631), abs=2e-3)
     for shape in shapes:
         np.testing.assert_allclose(np.linalg.norm(shape.normals, axis=1), 1.0, atol=1e-6)
+
+
+def test_what_brings_no_normals_keeps_its_edges(gantry: Mechanism) -> None:
+    shapes = {link.name: link.shapes for link in gantry.links}
+    (box,), (ball,) = shapes["cart"], shapes["thumb"]
+    for shape, most in ((box, 1e-6), (ball, math.radians(10.0))):
+        corners = shape.vertices[shape.faces]
+        flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+        lean = np.einsum("fck,fk->fc", shape.normals[shape.faces], flat)
+        assert np.arccos(np.clip(lean, -1.0, 1.0)).max() < most
+    assert len(box.vertices) == 24
+    assert len(ball.vertices) < len(ball.faces)
+
+
+PAINTED = """mtllib painted.mtl
+v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+vt 0 0
+usemtl red
+f 1/1 3/1 2/1
+f 1/1 2/1 4/1
+f 2/1 3/1 4/1
+f 1/1 4/1 3/1
+"""
+
+
+def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) -> None:
+    box = trimesh.creation.box(extents=(0.2, 0.3, 0.4))
+    (tmp_path / "painted.mtl").write_text("newmtl red\nKd 0.8 0.1 0.2\n")
+    (tmp_path / "painted.obj").write_text(PAINTED)
+    box.export(tmp_path / "bare.stl")
+    text = GANTRY.read_text()
+    for shape, mesh in (
+        ('<box size="0.2 0.2 0.12"/>', '<mesh filename="painted.obj"/>'),
+        ('<sphere radius="0.05"/>', '<mesh filename="bare.stl" scale="1 -1 2"/>'),
+    ):
+        assert shape in text
+        text = text.replace(shape, mesh)
+    (tmp_path / "other.urdf").write_text(text)
+    shapes = {link.name: link.shapes for link in load_mechanism(tmp_path / "other.urdf")[0].links}
+    (cart,), (thumb,) = shapes["cart"], shapes["thumb"]
+    assert cart.material.colour == pytest.approx((0.8, 0.1, 0.2), abs=0.01)
+    assert thumb.material.colour == pytest.approx((0.1, 0.4, 0.7), abs=0.01)
+    made = trimesh.Trimesh(thumb.vertices, thumb.faces, process=False)
+    assert made.volume == pytest.approx(2.0 * box.volume)
+    outward = np.einsum("nk,nk->n", thumb.vertices, thumb.normals)
+    assert outward.min() > 0.0
 
 
 def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Mechanism) -> None:
