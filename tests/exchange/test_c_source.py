@@ -12,6 +12,7 @@ import pytest
 
 from app.exchange.c_source import c_files
 from app.exchange.mechanism import Mechanism, camera
+from app.geometry import so3
 from app.settings import Settings
 from robot_description import URDF_PATH
 from tests.browser.server import APP, AppServer
@@ -111,6 +112,39 @@ def test_it_follows_a_running_server(tmp_path: Path, viewer: Path, katana: Mecha
         theirs = seen(shot(viewer, tmp_path / "a.ppm", "--follow", found[1]))
     ours = silhouette(placed(URDF_PATH, katana.values(Settings.ready)), camera(katana))
     assert overlap(theirs, ours) >= 0.98
+
+
+HANDS = """
+"$0" --size "$1" & viewer=$!
+xdotool search --sync --name katana450 > window
+picture() {
+    xdotool key p
+    until [ -s viewer.ppm ]; do kill -0 $viewer || exit 1; sleep 0.05; done
+    sleep 0.2
+    mv viewer.ppm "$1"
+}
+xdotool mousemove 400 400 key 2 key minus key minus key Left key Left key plus
+xdotool key 1 keydown shift mousedown 1 mousemove 420 400 mouseup 1 keyup shift
+sleep 0.2
+picture joints.ppm
+xdotool mousemove 400 400 mousedown 1 mousemove 450 400 mouseup 1
+sleep 0.2
+picture view.ppm
+xdotool key Escape
+wait $viewer
+"""
+
+
+@needs(*VIEWER, "xdotool")
+def test_keys_and_mouse_move_joints_and_camera(
+    tmp_path: Path, viewer: Path, katana: Mechanism
+) -> None:
+    run(*SCREEN, "bash", "-c", HANDS, viewer, f"{SIZE}x{SIZE}", folder=tmp_path)
+    pose = np.add(POSES[1], (0.2, -0.15, 0.0, 0.0, 0.0, 0.0))
+    meshes, view = placed(URDF_PATH, katana.values(pose.tolist())), camera(katana)
+    assert overlap(seen(tmp_path / "joints.ppm"), silhouette(meshes, view)) >= 0.98
+    turned = view._replace(eye=view.target + so3.rotation_z(-0.5) @ (view.eye - view.target))
+    assert overlap(seen(tmp_path / "view.ppm"), silhouette(meshes, turned)) >= 0.98
 
 
 @needs(*VIEWER)

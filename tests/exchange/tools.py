@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import tarfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -23,6 +25,7 @@ PACKAGES = {
     "/usr/lib/x86_64-linux-gnu/dri/swrast_dri.so": "libgl1-mesa-dri",
     "xvfb-run": "xvfb",
     "xauth": "xauth",
+    "xdotool": "xdotool",
     "tovrmlx3d": "view3dscene",
     "view3dscene": "view3dscene",
 }
@@ -61,16 +64,24 @@ def needs(*names: str) -> pytest.MarkDecorator:
 
 def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -> str:
     """Run a program that must succeed within so many seconds; what it printed."""
-    done = subprocess.run(
+    # A group of its own, so that what xvfb-run started ends with it.
+    process = subprocess.Popen(
         [str(word) for word in words],
         cwd=folder,
-        capture_output=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        timeout=seconds,
-        check=False,
+        start_new_session=True,
     )
-    assert done.returncode == 0, f"{words[0]} ended with {done.returncode}:\n{done.stderr[-4000:]}"
-    return done.stdout
+    try:
+        printed, told = process.communicate(timeout=seconds)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    assert process.returncode == 0, f"{words[0]} ended with {process.returncode}:\n{told[-4000:]}"
+    return printed
 
 
 def fetch_x_ite() -> None:

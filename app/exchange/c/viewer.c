@@ -9,8 +9,9 @@
  *   --frames      draw so many pictures as fast as can be, print how many a second, and end
  *
  * Keys: 1 to 9 choose a joint, + and - or the arrows left and right turn it, 0 puts all back to
- * where they started, c the camera, Esc ends. Mouse: drag left to turn the view, with Shift held to
- * turn the chosen joint, drag right or roll the wheel to come nearer.
+ * where they started, c the camera, p writes the picture viewer.ppm, Esc ends. Mouse: drag left to
+ * turn the view, with Shift held to turn the chosen joint, drag right or roll the wheel to come
+ * nearer.
  */
 #define _POSIX_C_SOURCE 200112L
 
@@ -49,6 +50,7 @@ static int held = -1, held_with_shift, last_x, last_y;
 
 static const char *screenshot;
 static int frames;
+static int wanted; /* a picture, by a key */
 
 static int port;
 static int link_socket = -1;
@@ -114,6 +116,7 @@ static void write_words(void)
     glEnable(GL_LIGHTING);
 }
 
+/* All but the words. */
 static void draw(void)
 {
     static const float ahead[4] = {0.0f, 0.0f, 1.0f, 0.0f}, above[4] = {0.3f, -0.4f, 1.0f, 0.0f};
@@ -137,15 +140,14 @@ static void draw(void)
     glLightfv(GL_LIGHT0, GL_DIFFUSE, bright);
     glLightfv(GL_LIGHT1, GL_DIFFUSE, bright);
     robot_draw(q);
-    if (screenshot == NULL)
-        write_words();
 }
 
-static int write_picture(void)
+/* What was drawn and not shown yet. */
+static int write_picture(const char *name)
 {
     size_t row = 3 * (size_t)width;
     unsigned char *pixels = malloc(row * (size_t)height);
-    FILE *file = fopen(screenshot, "wb");
+    FILE *file = fopen(name, "wb");
     int y, whole = pixels != NULL && file != NULL;
     if (whole) {
         glPixelStorei(GL_PACK_ALIGNMENT, 1);
@@ -158,7 +160,7 @@ static int write_picture(void)
         whole = 0;
     free(pixels);
     if (!whole)
-        fprintf(stderr, "viewer: %s cannot be written.\n", screenshot);
+        fprintf(stderr, "viewer: %s cannot be written.\n", name);
     return whole;
 }
 
@@ -171,6 +173,7 @@ static void measure(void)
     for (k = 0; k < frames; k++) {
         azimuth += 2.0 * PI / frames;
         draw();
+        write_words();
         glutSwapBuffers();
         glFinish();
     }
@@ -183,13 +186,18 @@ static void display(void)
         if (port > 0 && states == 0)
             return;
         draw();
-        exit(write_picture() ? EXIT_SUCCESS : EXIT_FAILURE);
+        exit(write_picture(screenshot) ? EXIT_SUCCESS : EXIT_FAILURE);
     }
     if (frames > 0) {
         measure();
         exit(EXIT_SUCCESS);
     }
     draw();
+    if (wanted) {
+        wanted = 0;
+        write_picture("viewer.ppm");
+    }
+    write_words();
     glutSwapBuffers();
 }
 
@@ -330,6 +338,8 @@ static void key(unsigned char sign, int x, int y)
         memcpy(q, start, sizeof q);
     else if (sign == 'c')
         reset_camera();
+    else if (sign == 'p')
+        wanted = 1;
     glutPostRedisplay();
 }
 
