@@ -22,7 +22,7 @@ PACKAGES = {
     "clang": "clang",
     "cmake": "cmake",
     "/usr/include/GL/freeglut.h": "freeglut3-dev",
-    "/usr/lib/x86_64-linux-gnu/dri/swrast_dri.so": "libgl1-mesa-dri",
+    "/usr/share/doc/libgl1-mesa-dri": "libgl1-mesa-dri",
     "xvfb-run": "xvfb",
     "xauth": "xauth",
     "xdotool": "xdotool",
@@ -89,10 +89,8 @@ def fetch_x_ite() -> None:
     X_ITE_FOLDER.mkdir(parents=True, exist_ok=True)
     pack = ["npm", "pack", X_ITE, "--silent"]
     print("Running:", *pack, flush=True)
-    try:
+    with suppress(subprocess.TimeoutExpired):
         subprocess.run(pack, cwd=X_ITE_FOLDER, check=False, timeout=120.0, capture_output=True)
-    except subprocess.TimeoutExpired:
-        return
     for archive in X_ITE_FOLDER.glob("*.tgz"):
         with tarfile.open(archive) as packed:
             packed.extractall(X_ITE_FOLDER, filter="data")
@@ -107,7 +105,10 @@ def main() -> None:
         install = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends", *packages]
         for command in (["apt-get", "update", "--quiet=2"], install):
             print("Running:", *command, flush=True)
-            subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)
+            with suppress(subprocess.TimeoutExpired):
+                subprocess.run(
+                    command, env=environment, stdout=subprocess.DEVNULL, check=False, timeout=600.0
+                )
     if x_ite() is None and shutil.which("npm"):
         fetch_x_ite()
     print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
