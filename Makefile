@@ -11,13 +11,13 @@ browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test test-long check lint types contracts tests browser octave robot bench-collision bench-drag \
+.PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-drag \
         bench-kinematics bench-load bench-start bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
 
-test: check browser octave tests ## set up and pass every check and test
+test: check browser octave exchange tests ## set up and pass every check and test
 
 check: lint types contracts
 
@@ -36,6 +36,9 @@ browser: $(dev_ok)            ## find a Chromium, or install one
 
 octave: $(dev_ok)             ## find GNU Octave, or install it where that can be done
 	$(bin)/python tests/gateway/octave.py
+
+exchange: $(dev_ok)           ## find the programs that read our exports, or install them
+	$(bin)/python tests/exchange/tools.py
 
 # Three at once: those that drive a browser, which mostly wait for it, those that run servers, and,
 # giving way to both, those that only compute.

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.cli.access_options import add_access_options
+from app.cli.export_options import add_export_options
 from app.cli.programs_options import add_demo_options, add_run_options
 from app.cli.version import version
 from app.cli.workspace_options import add_workspace_options
@@ -55,6 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli import programs
 
             return programs.run(options) if options.command == "run" else programs.demo(options)
+        if options.command == "export":
+            from app.cli.export import export
+
+            return export(options)
         from app.cli.lines import Kinematics, answer_lines
 
         in_base_frame = options.frame == "base"
@@ -167,7 +172,17 @@ def _parser() -> argparse.ArgumentParser:
             "workspace", help="map where the tool can be, and how freely it can be turned there"
         )
     )
-    with_an_arm = list(commands.choices.values())
+    exporting = commands.add_parser("export", help="write the arm as files for other programs")
+    add_export_options(exporting)
+    exporting.add_argument(
+        "--urdf",
+        type=Path,
+        default=URDF_PATH,
+        metavar="FILE",
+        help="another mechanism: any tree of turning, sliding and mimicking joints "
+        "(default: the Katana450)",
+    )
+    with_an_arm = [parser for parser in commands.choices.values() if parser is not exporting]
     add_access_options(
         commands.add_parser("access", help="give people links by which they may come in")
     )

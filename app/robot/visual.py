@@ -80,7 +80,7 @@ def visuals_of(
             source: Any = _primitive(geometry)
             scale = np.ones(3)
         else:
-            source = _mesh_file(geometry.mesh.filename, folder)
+            source = mesh_file(geometry.mesh.filename, folder)
             factors = 1.0 if geometry.mesh.scale is None else geometry.mesh.scale
             scale = np.broadcast_to(np.asarray(factors, dtype=float), 3)
             if not source.is_file():
@@ -116,7 +116,7 @@ def _primitive(geometry: Any) -> Any:
     return None
 
 
-def _mesh_file(name: str, folder: Path) -> Path:
+def mesh_file(name: str, folder: Path) -> Path:
     """``package://name/rest`` is looked for as rest beside the file and in the folders above."""
     if not name.startswith("package://"):
         return (folder / name.removeprefix("file://")).resolve()

@@ -1,0 +1,47 @@
+"""The options of ``katana450 export``, apart from its work: reading them must load nothing."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+FORMATS = {
+    "vrml": "a VRML97 world and a file a part, as LabVIEW, Simulink and X3D browsers read them",
+    "c": "C arrays and draw functions a link, and an OpenGL viewer with its Makefile",
+    "glb": "binary glTF 2.0, for browsers, Blender and game engines",
+    "urdf": "a zip of a ROS package with the URDF and its meshes",
+}
+
+
+def add_export_options(parser: argparse.ArgumentParser) -> None:
+    """Put them into `parser`."""
+    parser.add_argument("format", choices=tuple(FORMATS), help=_listed())
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="directory for the files"
+    )
+    parser.add_argument(
+        "--pose",
+        type=_numbers,
+        default=(),
+        metavar="Q",
+        help="values of the driven joints in rad or m with commas between, gripper last, such as "
+        "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
+    )
+    parser.add_argument(
+        "--trajectory",
+        type=Path,
+        metavar="FILE",
+        help="vrml and glb: a motion the file plays by itself; .csv with the columns "
+        "t,theta1,...,theta5,gripper or .json with lists of these names",
+    )
+
+
+def _listed() -> str:
+    return "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"numbers with commas between, not {text!r}") from None

@@ -1,0 +1,188 @@
+"""VRML97 as values: nodes with their fields, and the routes between them.
+
+Field names and types are those of ISO/IEC 14772-1:1997, chapter 6, for the nodes that are used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+from typing import NamedTuple
+
+
+class Type(Enum):
+    """Of a field: how many numbers make one value, and whether there can be any number of them."""
+
+    BOOL = "SFBool"
+    INT_LIST = "MFInt32"
+    FLOAT = "SFFloat"
+    FLOAT_LIST = "MFFloat"
+    TIME = "SFTime"
+    VECTOR = "SFVec3f"
+    VECTOR_LIST = "MFVec3f"
+    COLOR = "SFColor"
+    COLOR_LIST = "MFColor"
+    ROTATION = "SFRotation"
+    ROTATION_LIST = "MFRotation"
+    STRING = "SFString"
+    STRING_LIST = "MFString"
+    NODE = "SFNode"
+    NODE_LIST = "MFNode"
+
+
+WIDTHS: Mapping[Type, int] = MappingProxyType(
+    {
+        Type.INT_LIST: 1,
+        Type.FLOAT: 1,
+        Type.FLOAT_LIST: 1,
+        Type.TIME: 1,
+        Type.VECTOR: 3,
+        Type.VECTOR_LIST: 3,
+        Type.COLOR: 3,
+        Type.COLOR_LIST: 3,
+        Type.ROTATION: 4,
+        Type.ROTATION_LIST: 4,
+    }
+)
+"""Numbers a value of those types that are made of numbers."""
+
+LISTS = frozenset(kind for kind in Type if kind.value.startswith("MF"))
+
+_CHILDREN = {"children": Type.NODE_LIST}
+
+FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
+    {
+        "WorldInfo": {"title": Type.STRING, "info": Type.STRING_LIST},
+        "NavigationInfo": {
+            "type": Type.STRING_LIST,
+            "headlight": Type.BOOL,
+            "speed": Type.FLOAT,
+        },
+        "Background": {"skyColor": Type.COLOR_LIST},
+        "Viewpoint": {
+            "position": Type.VECTOR,
+            "orientation": Type.ROTATION,
+            "fieldOfView": Type.FLOAT,
+            "description": Type.STRING,
+        },
+        "DirectionalLight": {
+            "direction": Type.VECTOR,
+            "intensity": Type.FLOAT,
+            "ambientIntensity": Type.FLOAT,
+        },
+        "Group": _CHILDREN,
+        "Transform": {
+            "translation": Type.VECTOR,
+            "center": Type.VECTOR,
+            "rotation": Type.ROTATION,
+            **_CHILDREN,
+        },
+        "Shape": {"appearance": Type.NODE, "geometry": Type.NODE},
+        "Appearance": {"material": Type.NODE},
+        "Material": {
+            "diffuseColor": Type.COLOR,
+            "specularColor": Type.COLOR,
+            "ambientIntensity": Type.FLOAT,
+            "shininess": Type.FLOAT,
+        },
+        "IndexedFaceSet": {
+            "solid": Type.BOOL,
+            "coord": Type.NODE,
+            "normal": Type.NODE,
+            "coordIndex": Type.INT_LIST,
+        },
+        "Coordinate": {"point": Type.VECTOR_LIST},
+        "Normal": {"vector": Type.VECTOR_LIST},
+        "TimeSensor": {
+            "cycleInterval": Type.TIME,
+            "loop": Type.BOOL,
+            "startTime": Type.TIME,
+        },
+        "OrientationInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.ROTATION_LIST},
+        "PositionInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.VECTOR_LIST},
+    }
+)
+"""Every node that is used, with the types of its fields."""
+
+EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
+    {
+        ("TimeSensor", "fraction_changed"): Type.FLOAT,
+        ("OrientationInterpolator", "value_changed"): Type.ROTATION,
+        ("PositionInterpolator", "value_changed"): Type.VECTOR,
+    }
+)
+"""Events that go out of nodes."""
+
+SETTERS: Mapping[tuple[str, str], Type] = MappingProxyType(
+    {
+        ("OrientationInterpolator", "set_fraction"): Type.FLOAT,
+        ("PositionInterpolator", "set_fraction"): Type.FLOAT,
+        ("Transform", "set_rotation"): Type.ROTATION,
+        ("Transform", "set_translation"): Type.VECTOR,
+    }
+)
+"""Events that nodes take."""
+
+KEYWORDS = frozenset(
+    [
+        *("DEF", "EXTERNPROTO", "FALSE", "IS", "NULL", "PROTO", "ROUTE", "TO", "TRUE", "USE"),
+        *("eventIn", "eventOut", "exposedField", "field"),
+    ]
+)
+
+
+class Use(NamedTuple):
+    """A node that was named before, once more."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Node:
+    """kind: a key of FIELDS. fields: name and value of each that is set. name: of its DEF.
+
+    Values are bool, float, str, tuples of them, a Node or Use, or a tuple of those; the numbers of
+    lists stand in one row.
+    """
+
+    kind: str
+    fields: tuple[tuple[str, Value], ...] = ()
+    name: str | None = None
+
+    def get(self, field: str) -> Value | None:
+        """The value of a field, if it is set."""
+        return next((value for name, value in self.fields if name == field), None)
+
+    def walk(self) -> Iterator[Node]:
+        """It and all nodes in it, in the order of a file."""
+        yield self
+        for _, value in self.fields:
+            for part in value if isinstance(value, tuple) else (value,):
+                if isinstance(part, Node):
+                    yield from part.walk()
+
+
+Value = bool | float | str | Node | Use | tuple["float | str | Node | Use", ...]
+
+
+class Route(NamedTuple):
+    """Node and event it goes out of, node and event it goes into."""
+
+    source: str
+    out: str
+    target: str
+    into: str
+
+
+@dataclass(frozen=True)
+class World:
+    """What a file holds."""
+
+    nodes: tuple[Node, ...]
+    routes: tuple[Route, ...] = ()
+
+    def named(self) -> dict[str, Node]:
+        """Every node that has a DEF."""
+        return {n.name: n for top in self.nodes for n in top.walk() if n.name is not None}

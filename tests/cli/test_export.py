@@ -1,0 +1,69 @@
+"""``katana450 export`` writes what it says, and says what it cannot."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from app.cli.main import main
+from tests.exchange.conftest import GANTRY
+
+LONGEST = 3.0
+"""[s] Of processor for one export."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "file"),
+    [
+        ("vrml", "katana450.wrl"),
+        ("c", "viewer.c"),
+        ("glb", "katana450.glb"),
+        ("urdf", "katana450_description.zip"),
+    ],
+)
+def test_every_format_is_there_soon(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, file: str
+) -> None:
+    before = time.process_time()
+    assert main(["export", kind, "--out", str(tmp_path / "new" / "folder")]) == 0
+    assert time.process_time() - before < LONGEST
+    path = tmp_path / "new" / "folder" / file
+    assert f"{path}: {path.stat().st_size} bytes\n" in capsys.readouterr().out
+
+
+def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
+    words = ["--out", str(tmp_path), "--urdf", str(GANTRY), "--pose=-0.1,7"]
+    assert main(["export", "vrml", *words]) == 0
+    assert (tmp_path / "gantry_2.wrl").exists()
+    assert (tmp_path / "parts" / "thumb.wrl").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("c", "--trajectory", "m.csv"), "A file of c holds no motion"),
+        (("urdf", "--pose", "0,0"), "A file of urdf stands in no pose"),
+        (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
+        (("glb", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
+        (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),
+    ],
+)
+def test_what_cannot_be_done_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+) -> None:
+    assert main(["export", *words, "--out", str(tmp_path)]) == 1
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_way_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["export", "glb", "--out", str(tmp_path / "file")]) == 1
+    assert "cannot be made" in capsys.readouterr().err
+
+
+def test_words_that_are_no_pose_are_not_understood(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit):
+        main(["export", "glb", "--out", str(tmp_path), "--pose", "up"])

@@ -1,0 +1,138 @@
+"""The GLB: other programs find names, places, colours and the motion in it."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import trimesh
+import yourdfpy
+
+from app.exchange.glb import glb_files
+from app.exchange.mechanism import Mechanism
+from app.exchange.trajectory_file import load_motion
+from app.geometry import so3
+from robot_description import URDF_PATH
+from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
+from tests.exchange.tools import needs, run
+
+UPRIGHT = so3.rotation_x(-np.pi / 2.0)
+
+
+@pytest.mark.parametrize("which", ["katana", "gantry"])
+def test_trimesh_finds_every_link_where_the_urdf_has_it(
+    which: str, katana: Mechanism, gantry: Mechanism
+) -> None:
+    path, mechanism, pose = (
+        (URDF_PATH, katana, POSES[2]) if which == "katana" else (GANTRY, gantry, GANTRY_POSE)
+    )
+    values = mechanism.values(pose)
+    ((name, content),) = glb_files(mechanism, values).items()
+    assert name == ("katana450.glb" if which == "katana" else "gantry_2.glb")
+    scene = trimesh.load_scene(io.BytesIO(content), file_type="glb")
+    urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    urdf.update_cfg({name: values[name] for name in urdf.actuated_joint_names})
+    for link in mechanism.links:
+        T, _ = scene.graph[link.name]
+        expected = urdf.get_transform(link.name)
+        np.testing.assert_allclose(T[:3, 3], UPRIGHT @ expected[:3, 3], atol=1e-6)
+        np.testing.assert_allclose(T[:3, :3], UPRIGHT @ expected[:3, :3], atol=1e-6)
+        if link.parent is not None:
+            assert scene.graph.transforms.parents[link.name] == link.parent
+    shapes = [shape for link in mechanism.links for shape in link.shapes]
+    assert sum(len(mesh.faces) for mesh in scene.geometry.values()) == sum(
+        len(shape.faces) for shape in shapes
+    )
+    found = {mesh.visual.material.name for mesh in scene.geometry.values()}
+    assert found == {shape.material.name for shape in shapes}
+
+
+def test_colours_and_normals_come_through(katana: Mechanism) -> None:
+    """Against the mesh files that the URDF names."""
+    ((_, content),) = glb_files(katana, katana.values(())).items()
+    ours = trimesh.load_scene(io.BytesIO(content), file_type="glb")
+    theirs = trimesh.load_scene(URDF_PATH.parent / "meshes" / "wrist_link.glb")
+    in_wrist = [ours.geometry[ours.graph[n][1]] for n in ours.graph.nodes_geometry if "wrist" in n]
+    by_name = {mesh.visual.material.name: mesh for mesh in in_wrist}
+    assert len(by_name) == len(theirs.geometry) == 6
+    for mesh in theirs.geometry.values():
+        own = by_name[mesh.visual.material.name]
+        a, b = (np.array(m.visual.material.baseColorFactor, dtype=int) for m in (mesh, own))
+        assert np.abs(a - b).max() <= 1
+        np.testing.assert_allclose(own.vertex_normals, mesh.vertex_normals, atol=1e-5)
+        np.testing.assert_allclose(own.vertices, mesh.vertices, atol=1e-7)
+
+
+def chunks(content: bytes) -> tuple[dict[str, Any], bytes]:
+    magic, version, length = struct.unpack_from("<4sII", content)
+    assert (magic, version, length) == (b"glTF", 2, len(content))
+    size, kind = struct.unpack_from("<I4s", content, 12)
+    assert kind == b"JSON"
+    told = json.loads(content[20 : 20 + size])
+    binary, kind = struct.unpack_from("<I4s", content, 20 + size)
+    assert kind == b"BIN\0"
+    body = content[28 + size :]
+    assert len(body) == binary == told["buffers"][0]["byteLength"]
+    return told, body
+
+
+def floats(told: dict[str, Any], body: bytes, number: int) -> npt.NDArray[np.float32]:
+    accessor = told["accessors"][number]
+    view = told["bufferViews"][accessor["bufferView"]]
+    values = np.frombuffer(body, "<f4", view["byteLength"] // 4, view["byteOffset"])
+    return values.reshape(accessor["count"], -1)
+
+
+def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Mechanism) -> None:
+    (tmp_path / "m.csv").write_text("t,rail,turn,grip\n0,0,0,0\n1,0.4,5,-1\n3,-0.4,4,0.5\n")
+    motion = load_motion(tmp_path / "m.csv", gantry)
+    ((_, content),) = glb_files(gantry, gantry.values(()), motion).items()
+    told, body = chunks(content)
+    (animation,) = told["animations"]
+    assert len(animation["channels"]) == len(gantry.joints)
+    urdf = yourdfpy.URDF.load(str(GANTRY), load_meshes=False, build_scene_graph=True)
+    for channel in animation["channels"]:
+        sampler = animation["samplers"][channel["sampler"]]
+        node = told["nodes"][channel["target"]["node"]]
+        t, rows = (floats(told, body, sampler[side]) for side in ("input", "output"))
+        joint = next(j for j in urdf.robot.joints if j.child == node["name"])
+        for when, row in zip(t[:, 0], rows, strict=True):
+            now = {
+                name: float(np.interp(when, motion.t, motion.values[name]))
+                for name in gantry.driven
+            }
+            urdf.update_cfg(now)
+            T = urdf.get_transform(node["name"], joint.parent)
+            if channel["target"]["path"] == "translation":
+                np.testing.assert_allclose(row, T[:3, 3], atol=1e-6)
+            else:
+                R = so3.from_quaternion(np.roll(row.astype(float), 1))
+                np.testing.assert_allclose(R, T[:3, :3], atol=2e-6)
+    extras = {n["name"]: n["extras"]["joint"] for n in told["nodes"] if "extras" in n}
+    assert extras["cart"] == {
+        "name": "rail",
+        "type": "prismatic",
+        "axis": [1.0, 0.0, 0.0],
+        "lower": -0.4,
+        "upper": 0.4,
+    }
+    assert "lower" not in extras["mast"]
+    assert extras["thumb"]["mimic"] == {"joint": "grip", "multiplier": -0.1, "offset": -0.04}
+
+
+@needs("tovrmlx3d")
+def test_another_program_reads_it_with_its_motion(tmp_path: Path, katana: Mechanism) -> None:
+    (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,2\n")
+    motion = load_motion(tmp_path / "m.csv", katana)
+    ((name, content),) = glb_files(katana, katana.values(()), motion).items()
+    (tmp_path / name).write_bytes(content)
+    converted = run("tovrmlx3d", tmp_path / name)
+    assert "pan_link" in converted
+    assert converted.count("OrientationInterpolator {") == len(katana.joints)
+    assert converted.count("TimeSensor {") == 1

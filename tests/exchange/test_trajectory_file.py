@@ -1,0 +1,94 @@
+"""A motion is the same from CSV and JSON; a file that is none is refused, and says where."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.exchange.mechanism import Mechanism
+from app.exchange.trajectory_file import WIDEST_TURN, load_motion
+
+TABLE = {
+    "t": [1.0, 2.0, 2.5],
+    "theta1": [0.0, 2.5, -1.0],
+    "theta4": [0.0, -0.5, 0.5],
+    "gripper": [0.0, 0.25, 0.3],
+}
+
+
+def csv_of(table: dict[str, list[float]]) -> str:
+    rows = zip(*table.values(), strict=True)
+    return "\n".join([",".join(table), *(", ".join(map(repr, row)) for row in rows), ""])
+
+
+def test_csv_and_json_say_the_same(tmp_path: Path, katana: Mechanism) -> None:
+    (tmp_path / "a.csv").write_text(csv_of(TABLE))
+    (tmp_path / "a.json").write_text(json.dumps(TABLE))
+    one, two = (load_motion(tmp_path / name, katana) for name in ("a.csv", "a.json"))
+    for motion in (one, two):
+        np.testing.assert_array_equal(motion.t, [0.0, 1.0, 1.5])
+        np.testing.assert_array_equal(motion.values["axis_1"], TABLE["theta1"])
+        np.testing.assert_array_equal(motion.values["axis_4"], TABLE["theta4"])
+        for finger in ("finger_right_joint", "finger_left_joint"):
+            np.testing.assert_array_equal(motion.values[finger], TABLE["gripper"])
+        np.testing.assert_array_equal(motion.values["axis_2"], np.zeros(3))
+
+
+def test_joints_go_by_their_own_names_too(tmp_path: Path, gantry: Mechanism) -> None:
+    (tmp_path / "a.csv").write_text("t,turn,theta1\n0,0,0\n1,9,0.4\n")
+    motion = load_motion(tmp_path / "a.csv", gantry)
+    np.testing.assert_array_equal(motion.values["turn"], [0.0, 9.0])
+    np.testing.assert_array_equal(motion.values["rail"], [0.0, 0.4])
+    np.testing.assert_allclose(motion.values["out"], -0.1 * motion.values["grip"] - 0.04)
+
+
+def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Mechanism) -> None:
+    (tmp_path / "a.csv").write_text("t,turn\n0,0\n1,9\n3,8.5\n4,-9\n")
+    motion = load_motion(tmp_path / "a.csv", gantry)
+    t, values = motion.keys("turn")
+    assert (np.diff(t) > 0.0).all()
+    assert np.abs(np.diff(values)).max() <= WIDEST_TURN
+    assert set(motion.t) <= set(t)
+    np.testing.assert_allclose(values, np.interp(t, motion.t, motion.values["turn"]), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "", "is empty"),
+        ("a.csv", "x,theta1\n0,0\n1,0\n", "no column t"),
+        ("a.csv", "t,theta1\n0,0\n", "has 1 rows"),
+        ("a.csv", "t,theta1\n0,0\n0,0\n", "must rise.*in row 2"),
+        ("a.csv", "t,theta1\n0,0\n1,0,0\n", "Row 2 .*3 values and not 2"),
+        ("a.csv", "t,theta1\n0,0\n1,one\n", "Row 2 .*one"),
+        ("a.csv", "t,theta1\n0,0\n1,nan\n", "theta1.*nan"),
+        ("a.csv", "t,theta1\n0,0\n1,4\n", "axis_1 cannot be at 4 rad"),
+        ("a.csv", "t,theta7\n0,0\n1,0\n", "'theta7', which is no driven joint"),
+        ("a.csv", "t,finger_left_joint\n0,0\n1,0\n", "no driven joint"),
+        ("a.csv", "t,theta1,theta1\n0,0,0\n1,0,0\n", "a column twice"),
+        ("a.csv", "t,theta1,axis_1\n0,0,0\n1,0,0\n", "the joint axis_1 twice"),
+        ("a.json", "{", "no JSON"),
+        ("a.json", "[1]", "an object of lists"),
+        ("a.json", '{"t": [0, 1], "theta1": [0]}', r"shape \(1,\)"),
+        ("a.json", '{"t": [0, 1], "theta1": [0, "x"]}', "theta1"),
+        ("a.json", '{"t": [0, 1], "theta1": [0, {}]}', "theta1"),
+        ("a.txt", "t\n0\n1\n", r"\.csv or \.json"),
+    ],
+)
+def test_what_is_no_motion_is_refused(
+    tmp_path: Path, katana: Mechanism, name: str, text: str, said: str
+) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=said):
+        load_motion(tmp_path / name, katana)
+
+
+def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, katana: Mechanism) -> None:
+    (tmp_path / "a.csv").write_bytes(b"\xff\xfe\x00")
+    for name in ("a.csv", "b.csv"):
+        with pytest.raises(InputError, match="cannot be read"):
+            load_motion(tmp_path / name, katana)

@@ -1,0 +1,253 @@
+"""VRML97: read back the same, placed by its Transforms, accepted and drawn by another program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree  # type: ignore[import-untyped]
+
+from app.errors import InputError
+from app.exchange.mechanism import Mechanism, camera
+from app.exchange.trajectory_file import load_motion
+from app.exchange.vrml import DIGITS, part_world, vrml_files, world_of
+from app.exchange.vrml_node import FIELDS, KEYWORDS, LISTS, WIDTHS, Node, Type, Use, Value, World
+from app.exchange.vrml_text import HEADER, read_world, world_text
+from app.geometry import se3, so3
+from robot_description import URDF_PATH
+from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
+from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
+from tests.exchange.tools import SCREEN, needs, run
+
+MOST = 2_500_000
+"""Bytes of the arm's world."""
+
+Matrix = npt.NDArray[np.float64]
+
+numbers = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False), st.integers(-99, 99).map(lambda n: n / 10.0)
+)
+texts = st.text(st.characters(codec="utf-8", exclude_characters="\r"), max_size=12)
+names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,6}", fullmatch=True).filter(
+    lambda name: name not in KEYWORDS
+)
+
+
+def values(kind: Type, nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Value]:
+    """Any value a field of that type can have."""
+    match kind:
+        case Type.BOOL:
+            return st.booleans()
+        case Type.STRING:
+            return texts
+        case Type.STRING_LIST:
+            return st.lists(texts, max_size=3).map(tuple)
+        case Type.INT_LIST:
+            return st.lists(st.integers(-(2**31), 2**31 - 1), max_size=9).map(tuple)
+        case Type.NODE:
+            return nodes
+        case Type.NODE_LIST:
+            return st.lists(nodes, max_size=3).map(tuple)
+    width = WIDTHS[kind]
+    if kind in LISTS:
+        rows = st.lists(st.tuples(*[numbers] * width), max_size=40)
+        return rows.map(lambda rows: tuple(number for row in rows for number in row))
+    return numbers if width == 1 else st.tuples(*[numbers] * width)
+
+
+def some(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
+    def of(kind: str) -> st.SearchStrategy[Node]:
+        fields = {name: values(FIELDS[kind][name], nodes) for name in FIELDS[kind]}
+        chosen = st.fixed_dictionaries({}, optional=fields)
+        return chosen.map(lambda fields: Node(kind, tuple(fields.items())))
+
+    return st.sampled_from(sorted(FIELDS)).flatmap(of)
+
+
+def plain(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
+    return st.recursive(st.just(Node("Group")), some, max_leaves=6) | nodes
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(plain(st.just(Node("Shape"))), max_size=3), names)
+def test_any_world_is_read_back_as_it_was_written(nodes: list[Node], name: str) -> None:
+    first = Node("Group", (("children", tuple(nodes)),), name)
+    again = Node("Group", (("children", (Use(name),)),))
+    world = World((first, again))
+    assert read_world(world_text(world)) == world
+
+
+def test_the_arm_and_its_motion_are_read_back(tmp_path: Path, katana: Mechanism) -> None:
+    (tmp_path / "m.csv").write_text("t,theta1,theta5\n0,0,0\n2,2.5,1\n")
+    motion = load_motion(tmp_path / "m.csv", katana)
+    world = world_of(katana, katana.values(POSES[1]), motion)
+    text = world_text(world)
+    assert read_world(text) == world
+    assert len(text) <= MOST
+    assert set(world.named()) >= {*katana.joints, *(link.name for link in katana.links)}
+    assert len(world.routes) == 2 * len(katana.joints)
+
+
+def placed_points(world: World) -> Iterator[tuple[str, Matrix]]:
+    """Name of the nearest named node above, and points (n, 3), of every face set, as they stand."""
+
+    def visit(node: Node, T: Matrix, name: str) -> Iterator[tuple[str, Matrix]]:
+        name = node.name if node.name is not None and node.kind != "Appearance" else name
+        if node.kind == "Transform":
+            # ISO/IEC 14772-1, 6.52: P' = T C R -C P.
+            centre, moved = (field(node, key, (0.0, 0.0, 0.0)) for key in ("center", "translation"))
+            x, y, z, angle = field(node, "rotation", (0.0, 0.0, 1.0, 0.0))
+            step = se3.from_rotation_translation(so3.exp(angle * np.array((x, y, z))), moved)
+            step[:3, 3] += centre - step[:3, :3] @ centre
+            T = T @ step
+        if node.kind == "Coordinate":
+            points = field(node, "point", ()).reshape(-1, 3)
+            yield name, points @ T[:3, :3].T + T[:3, 3]
+        for _, value in node.fields:
+            for part in value if isinstance(value, tuple) else (value,):
+                if isinstance(part, Node):
+                    yield from visit(part, T, name)
+
+    for top in world.nodes:
+        yield from visit(top, np.eye(4), "")
+
+
+def field(node: Node, name: str, default: tuple[float, ...]) -> Matrix:
+    value = node.get(name)
+    return np.array(default if value is None else value, dtype=float)
+
+
+@pytest.mark.parametrize("which", ["katana", "gantry"])
+def test_the_transforms_put_every_point_where_the_urdf_does(
+    which: str, katana: Mechanism, gantry: Mechanism
+) -> None:
+    path, mechanism, pose = (
+        (URDF_PATH, katana, POSES[2]) if which == "katana" else (GANTRY, gantry, GANTRY_POSE)
+    )
+    values = mechanism.values(pose)
+    read = read_world(world_text(world_of(mechanism, values)))
+    upright = so3.rotation_x(-np.pi / 2.0)
+    points = np.concatenate([points for _, points in placed_points(read)])
+    expected = np.concatenate([mesh.vertices @ upright.T for _, mesh in placed(path, values)])
+    for some, others in ((points, expected), (expected, points)):
+        assert cKDTree(others).query(some)[0].max() < 10.0**-DIGITS
+
+
+def test_parts_stand_where_they_are_at_zero(katana: Mechanism) -> None:
+    whole = dict(placed_points(world_of(katana, katana.values(()))))
+    for link in katana.links:
+        if link.shapes:
+            parts = dict(placed_points(part_world(katana, link)))
+            np.testing.assert_array_equal(parts[link.name], whole[link.name])
+
+
+def test_every_link_with_a_shape_has_a_file(gantry: Mechanism) -> None:
+    files = vrml_files(gantry, gantry.values(()))
+    parts = ("floor", "cart", "mast", "left_finger", "right_finger", "thumb")
+    assert sorted(files) == sorted(["gantry_2.wrl", *(f"parts/{part}.wrl" for part in parts)])
+    for content in files.values():
+        read_world(content.decode())
+
+
+MOVER = "DEF a PositionInterpolator { } DEF b Transform { }"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "does not begin"),
+        ("#VRML V1.0 ascii\n", "does not begin"),
+        ("#VRML V2.0 utf8x\n", "does not begin"),
+        (f"{HEADER}\nGroup {{", "ends too early"),
+        (f"{HEADER}\n\nSphere {{ }}", "line 3: 'Sphere' is no node"),
+        (f"{HEADER}\nGroup {{ color 1 0 0 }}", "no field 'color'"),
+        (f"{HEADER}\nTransform {{ center 1 0 }}", "a number is wanted"),
+        (f"{HEADER}\nTransform {{ center 1 0 nan }}", "a number is wanted"),
+        (f"{HEADER}\nTransform {{ center 1 0 1e999 }}", "too large"),
+        (f"{HEADER}\nTransform {{ center 0 0 0 center 0 0 0 }}", "stands twice"),
+        (f"{HEADER}\nCoordinate {{ point [ 1 2 3 4 ] }}", "no rows of 3"),
+        (f"{HEADER}\nIndexedFaceSet {{ coordIndex [ 1.5 ] }}", "a whole number"),
+        (f"{HEADER}\nIndexedFaceSet {{ solid YES }}", "TRUE or FALSE"),
+        (f"{HEADER}\nGroup {{ children [ USE a ] }}", "before it is defined"),
+        (f"{HEADER}\nDEF a Group {{ children USE a }}", "before it is defined"),
+        (f"{HEADER}\nDEF a Group {{ }} DEF a Group {{ }}", "defined twice"),
+        (f"{HEADER}\nDEF TO Group {{ }}", "'TO' is no name"),
+        (f"{HEADER}\nDEF a Group {{ }} USE a", "no USE"),
+        (f"{HEADER}\nDEF a TimeSensor {{ }} ROUTE a.fraction_changed TO b.set_fraction", "into"),
+        (f"{HEADER}\nROUTE a.fraction_changed TO b.set_fraction", "out of"),
+        (f"{HEADER}\n{MOVER}\nROUTE a.value_changed TO b.set_rotation", "line 3.*two types"),
+        (f'{HEADER}\nWorldInfo {{ title "open }}', "does not end"),
+        (f"{HEADER}\n" + "Group { children " * 300, "deep"),
+    ],
+)
+def test_what_is_no_vrml_is_refused(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_world(text)
+
+
+def test_comments_commas_and_bare_values_are_understood() -> None:
+    text = f"{HEADER} by hand\n# one\nTransform{{center 1,2,3#two\nchildren Group{{}}}}"
+    shown = (("center", (1.0, 2.0, 3.0)), ("children", (Node("Group"),)))
+    assert read_world(text) == World((Node("Transform", shown),))
+
+
+@needs("tovrmlx3d")
+def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Mechanism) -> None:
+    (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,0.2\n")
+    motion = load_motion(tmp_path / "m.csv", katana)
+    (tmp_path / "whole.wrl").write_text(world_text(world_of(katana, katana.values(()), motion)))
+    converted = run("tovrmlx3d", "--encoding", "xml", tmp_path / "whole.wrl")
+    for joint in katana.joints:
+        assert f'<Transform DEF="{joint}"' in converted
+    assert converted.count("<ROUTE") == 2 * len(katana.joints)
+    assert converted.count("<IndexedFaceSet") == sum(len(link.shapes) for link in katana.links)
+
+
+@needs("tovrmlx3d")
+@pytest.mark.parametrize("which", ["katana", "gantry"])
+def test_another_program_accepts_parts(
+    which: str, tmp_path: Path, katana: Mechanism, gantry: Mechanism
+) -> None:
+    mechanism = katana if which == "katana" else gantry
+    links = [link for link in mechanism.links if link.shapes]
+    for link in links[-3:]:
+        (tmp_path / "part.wrl").write_text(world_text(part_world(mechanism, link)))
+        converted = run("tovrmlx3d", tmp_path / "part.wrl")
+        assert converted.count("IndexedFaceSet {") == len(link.shapes)
+
+
+def picture(folder: Path, content: bytes, name: str = "scene.wrl", time: float = 0.0) -> Path:
+    """What view3dscene draws of a file, so many seconds after it was opened."""
+    scene, image = folder / name, folder / "picture.png"
+    scene.write_bytes(content)
+    alone = ("--geometry", f"{SIZE}x{SIZE}", "--hide-extras", "--hide-menu")
+    run(*SCREEN, "view3dscene", scene, *alone, "--screenshot", f"{time:g}", image)
+    return image
+
+
+@needs("view3dscene", "xvfb-run", "xauth")
+@pytest.mark.parametrize("pose", POSES)
+def test_another_program_draws_what_we_do(
+    tmp_path: Path, katana: Mechanism, pose: tuple[float, ...]
+) -> None:
+    values = katana.values(pose)
+    ours = silhouette(placed(URDF_PATH, values), camera(katana))
+    theirs = picture(tmp_path, vrml_files(katana, values)["katana450.wrl"])
+    assert overlap(seen(theirs), ours) >= 0.98
+
+
+@needs("view3dscene", "xvfb-run", "xauth")
+def test_the_motion_plays_by_itself(tmp_path: Path, gantry: Mechanism) -> None:
+    end = ",".join(map(str, GANTRY_POSE))
+    (tmp_path / "m.csv").write_text(f"t,rail,turn,grip\n0,0,0,0\n3,{end}\n")
+    motion = load_motion(tmp_path / "m.csv", gantry)
+    half = gantry.values([value / 2.0 for value in GANTRY_POSE])
+    ours = silhouette(placed(GANTRY, half), camera(gantry))
+    content = vrml_files(gantry, gantry.values(()), motion)["gantry_2.wrl"]
+    assert overlap(seen(picture(tmp_path, content, time=1.5)), ours) >= 0.98
+    assert overlap(seen(picture(tmp_path, content, time=0.0)), ours) < 0.9

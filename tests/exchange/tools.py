@@ -1,0 +1,124 @@
+"""Find the programs that read our exports, and install them where that can be done without asking.
+
+``python tests/exchange/tools.py`` does so; tests of a program that is not there are skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import tarfile
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+PACKAGES = {
+    "gcc": "gcc",
+    "make": "make",
+    "clang": "clang",
+    "cmake": "cmake",
+    "/usr/include/GL/freeglut.h": "freeglut3-dev",
+    "/usr/share/doc/libgl1-mesa-dri": "libgl1-mesa-dri",
+    "xvfb-run": "xvfb",
+    "xauth": "xauth",
+    "xdotool": "xdotool",
+    "tovrmlx3d": "view3dscene",
+    "view3dscene": "view3dscene",
+}
+"""Programs and files, and Debian's packages that bring them."""
+
+X_ITE = "x_ite@15.0.1"
+"""A browser of VRML and X3D worlds in JavaScript, from npm."""
+
+X_ITE_FOLDER = Path(__file__).parents[2] / ".cache" / X_ITE
+
+SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
+
+VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
+"""What building and running the C viewer takes."""
+
+
+def missing(names: Sequence[str]) -> list[str]:
+    """Debian's packages of those that are not there."""
+    absent = [n for n in names if not (Path(n).exists() if n[0] == "/" else shutil.which(n))]
+    return list(dict.fromkeys(PACKAGES[name] for name in absent))
+
+
+def x_ite() -> Path | None:
+    """Its script, if it is there."""
+    script = X_ITE_FOLDER / "package" / "dist" / "x_ite.min.js"
+    return script if script.is_file() else None
+
+
+def needs(*names: str) -> pytest.MarkDecorator:
+    """Skip a test, and say why, where one of the programs is not there."""
+    packages = " ".join(missing(names))
+    return pytest.mark.skipif(
+        bool(packages), reason=f"not here; on Debian and Ubuntu: apt-get install {packages}"
+    )
+
+
+def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -> str:
+    """Run a program that must succeed within so many seconds; what it printed."""
+    # A group of its own, so that what xvfb-run started ends with it.
+    process = subprocess.Popen(
+        [str(word) for word in words],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        printed, told = process.communicate(timeout=seconds)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    assert process.returncode == 0, f"{words[0]} ended with {process.returncode}:\n{told[-4000:]}"
+    return printed
+
+
+def fetch_x_ite() -> None:
+    """Bring and unpack it; nothing of it is run."""
+    X_ITE_FOLDER.mkdir(parents=True, exist_ok=True)
+    pack = ["npm", "pack", X_ITE, "--silent"]
+    print("Running:", *pack, flush=True)
+    with suppress(subprocess.TimeoutExpired):
+        subprocess.run(pack, cwd=X_ITE_FOLDER, check=False, timeout=120.0, capture_output=True)
+    for archive in X_ITE_FOLDER.glob("*.tgz"):
+        with tarfile.open(archive) as packed:
+            packed.extractall(X_ITE_FOLDER, filter="data")
+        archive.unlink()
+
+
+def main() -> None:
+    """Say what the tests use; install it first if root can."""
+    packages = missing(list(PACKAGES))
+    if packages and shutil.which("apt-get") and os.geteuid() == 0:
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        install = ["apt-get", "install", "--yes", "--quiet=2", "--no-install-recommends", *packages]
+        for command in (["apt-get", "update", "--quiet=2"], install):
+            print("Running:", *command, flush=True)
+            with suppress(subprocess.TimeoutExpired):
+                subprocess.run(
+                    command, env=environment, stdout=subprocess.DEVNULL, check=False, timeout=600.0
+                )
+    if x_ite() is None and shutil.which("npm"):
+        fetch_x_ite()
+    print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
+    packages = missing(list(PACKAGES))
+    print(
+        f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
+        if packages
+        else "The programs that read our exports are all here."
+    )
+
+
+if __name__ == "__main__":
+    main()
