@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.collision.clearance import SETTLING, advance, surely_clear
+from app.collision.clearance import SETTLING, STOP, advance, surely_clear
 from app.collision.contact import Contact
 from app.collision.world import LONGEST_WAY, World
 from app.control.arm import Arm
@@ -55,6 +55,14 @@ class Mover:
         self._arm = arm
         self._world = world
         self._touch = touch
+        # What the fingers are to touch holds them back, which is nothing to be told.
+        self._touching: frozenset[frozenset[str]] = frozenset()
+        if world is not None and touch is not None:
+            names = [world.parts[number].name for number in world.part_of.tolist()]
+            soft = np.flatnonzero(touch < STOP).tolist()
+            self._touching = frozenset(
+                frozenset((names[world.first[pair]], names[world.second[pair]])) for pair in soft
+            )
         self._tool_speed = PLANNED * tool_speed
         self._follower = Follower(world)
         self._any = Limiter(arm.limits)
@@ -97,7 +105,10 @@ class Mover:
         )
         if braking:
             return self._updated(after)
-        return _told(after, contact or (None if hand is None else hand.contact))
+        held_back = None if hand is None else hand.contact
+        if held_back is not None and frozenset(held_back.parts) in self._touching:
+            held_back = None
+        return _told(after, contact or held_back)
 
     def limiter(self, state: State) -> Limiter:
         """That which keeps the elbow on its branch, unless the motion is from or to another one."""
