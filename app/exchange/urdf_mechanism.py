@@ -15,7 +15,7 @@ import yourdfpy
 from app.errors import RobotDescriptionError
 from app.exchange.mechanism import Joint, Link, Material, Mechanism, Shape
 from app.geometry.arrays import FloatArray, frozen
-from app.robot.visual import Visual, visuals_of
+from app.robot.visual import Visual, rods, visuals_of
 
 MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
 """Types of joint that are understood, and whether each slides."""
@@ -27,6 +27,8 @@ EDGE = math.radians(30.0)
 
 def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     """The tree in a URDF file with its visual shapes, and notes for a person on what it lacks.
+
+    Thin rods stand for a link without shapes that others hang on.
 
     Raises RobotDescriptionError when the file cannot be read or has a joint that no exported
     format has a word for.
@@ -42,6 +44,9 @@ def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
         for name in _parents_first(path, links, joints):
             visuals, absent = visuals_of(links[name].visuals, urdf.robot.materials, path.parent)
             missing.extend(absent)
+            if not visuals:
+                hung = [joint.origin for joint in joints.values() if joint.parent == name]
+                visuals = rods([origin[:3, 3] for origin in hung if origin is not None])
             shapes = tuple(shape for visual in visuals for shape in _shapes(visual))
             above = joints.get(name)
             if above is None:

@@ -112,6 +112,16 @@ def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) 
     assert outward.min() > 0.0
 
 
+def test_an_arm_without_shapes_is_drawn_as_rods() -> None:
+    mechanism, _ = load_mechanism(ARMS / "pincherx_150.urdf")
+    links = {link.name: link for link in mechanism.links}
+    assert not links["fingertips"].shapes
+    # The elbow stands 50 mm before the shoulder and 150 mm above it.
+    (rod,) = links["upper_arm"].shapes
+    assert rod.vertices[:, 2].max() == pytest.approx(0.15, abs=0.009)
+    assert rod.vertices[:, 0].max() == pytest.approx(0.05, abs=0.009)
+
+
 def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Mechanism) -> None:
     view = camera(katana)
     way = (view.target - view.eye) / np.linalg.norm(view.target - view.eye)
