@@ -55,6 +55,20 @@ def obstacle(name: str, T_base_shape: FloatArray, *shapes: Shape) -> Part:
     return Part(name, GROUND, tuple(frozen(T_base_shape) for _ in shapes), shapes)
 
 
+@dataclass(frozen=True, eq=False)
+class Likeness:
+    """The bodies and pairs of a world, as a digest, and where each is, (b, 4, 4)."""
+
+    bodies: bytes
+    places: FloatArray
+
+    def differs_by(self, other: Likeness) -> float:
+        """By how much any body is elsewhere [m or 1]; infinitely when they are other bodies."""
+        if self.bodies != other.bodies:
+            return np.inf
+        return float(np.abs(self.places - other.places).max(initial=0.0))
+
+
 class World:
     """Convex bodies on the pieces of a linkage, and the pairs of them that may meet.
 
@@ -171,15 +185,15 @@ class World:
         return min(gaps, default=np.inf)
 
     @cached_property
-    def digest(self) -> bytes:
-        """The same for worlds that hold the same bodies and pairs, in any process."""
+    def likeness(self) -> Likeness:
+        """By which another world, of another process too, is known to be the same."""
         told = hashlib.sha256(repr(self.pairs).encode())
         for part in self.parts:
             told.update(f"{part.name} {part.mover}".encode())
-            for T, shape in zip(part.T_mover_shape, part.shapes, strict=True):
-                for each in (T, shape.centre, shape.low, shape.high):
+            for shape in part.shapes:
+                for each in (shape.centre, shape.low, shape.high):
                     told.update(np.asarray(each, dtype=np.float64).tobytes())
-        return told.digest()
+        return Likeness(told.digest(), frozen(self.T_mover_body))
 
     def with_carried(self, carried: Part) -> World:
         """This world and what the arm carries, which meets what more than one joint lets meet it.

@@ -18,6 +18,13 @@ from app.planning.scaling import Scaling
 GRAZE = 1e-3
 """[m] Ways shorter than this are not looked at in between: no part is as thin."""
 
+SAME_PLACE = 1e-4
+"""[m or 1] A body that is no farther from where a plan has it may be taken to be there: plans keep
+MARGIN, 1 mm more than has to be."""
+
+SAME_FINGERS = 5e-3
+"""[rad] Likewise: half a millimetre at the pads."""
+
 PROBE = 0.02
 """[1] Of a segment: an arm that waits goes on once the way is clear so far."""
 
@@ -67,7 +74,11 @@ class Follower:
     def _met(self, here: Following, halt: Following, fingers: float) -> Contact | None:
         plan, segment = here.plan, here.segment
         world = self._world
-        if world is None or (plan.clear_of == world.digest and plan.fingers == fingers):
+        if world is None or (
+            plan.clear_of is not None
+            and abs(plan.fingers - fingers) <= SAME_FINGERS
+            and plan.clear_of.differs_by(world.likeness) <= SAME_PLACE
+        ):
             return None
         start, end = (segment.scaling.pace(each.local).sigma for each in (here, halt))
         low, high = min(start, end), max(start, end)

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.collision.clearance import STOP
 from app.collision.contact import Contact
-from app.collision.world import World
+from app.collision.world import Likeness, World
 from app.errors import BlockedError, InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.forward import forward
@@ -82,13 +82,13 @@ class Nearest:
 class Plan:
     """Segments in their order, tau running through them all.
 
-    clear_of, fingers: the digest of the world it is known to be clear of, with the finger joint at
-    that angle [rad]; None when nothing was looked at. nearest: the least clearance on the whole
+    clear_of, fingers: the world it is known to be clear of, with the finger joint at that angle
+    [rad]; None when nothing was looked at. nearest: the least clearance on the whole
     way; None where nothing can meet or nothing was looked at.
     """
 
     segments: tuple[Segment, ...]
-    clear_of: bytes | None = None
+    clear_of: Likeness | None = None
     fingers: float = 0.0
     nearest: Nearest | None = None
 
@@ -113,12 +113,12 @@ class Plan:
         """Of the tool point's way [m]."""
         return sum(segment.length for segment in self.segments)
 
-    @property
+    @cached_property
     def start(self) -> FloatArray:
         """(5,) where it begins [rad]."""
         return self.segments[0].path.start
 
-    @property
+    @cached_property
     def end(self) -> FloatArray:
         """(5,) where it ends [rad]."""
         return self.segments[-1].path.end
@@ -157,7 +157,7 @@ def plan(
             )
     clearances = [None if world is None else _clearance(p, world, fingers, margin) for p in paths]
     segments = tuple(Segment(path, fastest(path, bounds)) for path in paths)
-    found = Plan(segments, None if world is None else world.digest, fingers)
+    found = Plan(segments, None if world is None else world.likeness, fingers)
     each = [
         Nearest(clearance.contact, begin + segment.scaling.tau(clearance.sigma))
         for clearance, segment, begin in zip(clearances, segments, found.begins, strict=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -84,12 +85,12 @@ class ToolPath:
         x, y, z, _, _ = self.curve.at(sigma)
         return x, y, z
 
-    @property
+    @cached_property
     def start(self) -> FloatArray:
         """(5,) where it begins [rad]."""
         return frozen([each.c0 for each in self.joints(Jet.variable(0.0))])
 
-    @property
+    @cached_property
     def end(self) -> FloatArray:
         """(5,) where it ends [rad]."""
         return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
