@@ -68,6 +68,7 @@ class Performer:
         self._seen = 0.0
         self._self: Window | None = None
         self._run: Run | None = None
+        self._speed = 1.0
 
     @property
     def running(self) -> bool:
@@ -238,7 +239,9 @@ class Performer:
             hub.leave(joined, for_good=True)
             raise
         self._self, self._owner, self._seen = joined, window, hub.clock()
-        self._run = Run(hub.present().state.t, single=single)
+        arm = hub.present()
+        self._speed = arm.state.speed
+        self._run = Run(arm.state.t, single=single)
         log.info("%s runs the program %s.", window.person.name, program.name)
 
     def _plan(self, planning: _Planning, text: str, speed: float, rig: Rig, state: State) -> None:
@@ -273,6 +276,9 @@ class Performer:
         assert self._run is not None
         joined, self._self = self._self, None
         self._run = runner.ended(self._run, phase, why)
+        if self._hub.arm is not None:
+            # A program's speed is its own.
+            self._hub.arm.limit(self._speed)
         if self._hub.lease.holder == joined.person:
             self._hub.give_up(joined)
         self._hub.leave(joined, for_good=True)

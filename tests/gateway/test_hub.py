@@ -21,6 +21,7 @@ from app.gateway.door import Visitor
 from app.gateway.hub import TICK, Hub, Window, key_of
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
+from app.programs.bench import Rig
 from app.robot.model import RobotModel
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
@@ -37,6 +38,7 @@ class FakeArm:
     snapshot: Snapshot
     ready: FloatArray
     lateness: Lateness
+    rig: Rig
 
     def __init__(self, state: State) -> None:
         self.rest = state
