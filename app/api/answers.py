@@ -74,7 +74,7 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float | None = None
 
 
-class Program(msgspec.Struct, frozen=True, kw_only=True):
+class Progress(msgspec.Struct, frozen=True, kw_only=True):
     """The program that is planned or runs, or ran last.
 
     ``by``: who sent it. ``status``: planning, refused, ready, running, paused, blocked, done,
@@ -133,7 +133,7 @@ class State(Answer, frozen=True, kw_only=True):
     holder: str | None
     stopped: str | None
     windows: int
-    program: Program | None = None
+    program: Progress | None = None
 
 
 class Arm(Answer, frozen=True, kw_only=True):

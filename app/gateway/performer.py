@@ -177,7 +177,7 @@ class Performer:
             if self._run.phase is not Phase.RUNNING:
                 self._leave_with(self._run.phase, self._run.why)
 
-    def told(self) -> answers.Program | None:
+    def told(self) -> answers.Progress | None:
         """How it stands; None when there is none."""
         planning, owner = self._planning, self._owner
         if planning is None or owner is None:
@@ -185,11 +185,11 @@ class Performer:
         program = planning.program
         if program is None:
             stage = Stage.PLANNING if planning.refused is None else Stage.REFUSED
-            return answers.Program(
+            return answers.Progress(
                 name="", by=owner.person.name, status=stage.value, why=planning.refused or ""
             )
         if self._run is None or self._hub.arm is None:
-            return answers.Program(
+            return answers.Progress(
                 name=program.name,
                 by=owner.person.name,
                 status=Stage.READY.value,
@@ -197,7 +197,7 @@ class Performer:
                 seconds=program.duration,
             )
         now = runner.progress(program, self._run, self._hub.arm.state)
-        return answers.Program(
+        return answers.Progress(
             name=program.name,
             by=owner.person.name,
             status=now.status,

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import viser
 
-from app.api.answers import Program as Told
+from app.api.answers import Progress as Told
 from app.api.requests import Order
 from app.control.state import State
 from app.errors import InputError, KatanaError

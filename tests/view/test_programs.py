@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import viser
 
-from app.api.answers import Program as Told
+from app.api.answers import Progress as Told
 from app.api.requests import Order
 from app.control.session import Session
 from app.exchange.scripts import Scripts
