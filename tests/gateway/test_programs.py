@@ -24,7 +24,7 @@ READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
 THERE_AND_BACK = """\
 name: There and back
 steps:
-  - joints: [25, -60, 85, 8, 0]
+  - joints: [20, -64, 85, 8, 0]
   - line: {by: {z: 20}}
   - home
 """
