@@ -84,7 +84,7 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
     margin_to_rim: float
 
 
-class Program(msgspec.Struct, frozen=True, kw_only=True):
+class Progress(msgspec.Struct, frozen=True, kw_only=True):
     """The program that is planned or runs, or ran last.
 
     ``by``: who sent it. ``status``: planning, refused, ready, running, paused, blocked, done,
@@ -145,7 +145,7 @@ class State(Answer, frozen=True, kw_only=True):
     stopped: str | None
     windows: int
     water: Water | None
-    program: Program | None = None
+    program: Progress | None = None
 
 
 class Arm(Answer, frozen=True, kw_only=True):

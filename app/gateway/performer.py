@@ -68,6 +68,7 @@ class Performer:
         self._seen = 0.0
         self._self: Window | None = None
         self._run: Run | None = None
+        self._speed = 1.0
 
     @property
     def running(self) -> bool:
@@ -176,7 +177,7 @@ class Performer:
             if self._run.phase is not Phase.RUNNING:
                 self._leave_with(self._run.phase, self._run.why)
 
-    def told(self) -> answers.Program | None:
+    def told(self) -> answers.Progress | None:
         """How it stands; None when there is none."""
         planning, owner = self._planning, self._owner
         if planning is None or owner is None:
@@ -184,11 +185,11 @@ class Performer:
         program = planning.program
         if program is None:
             stage = Stage.PLANNING if planning.refused is None else Stage.REFUSED
-            return answers.Program(
+            return answers.Progress(
                 name="", by=owner.person.name, status=stage.value, why=planning.refused or ""
             )
         if self._run is None or self._hub.arm is None:
-            return answers.Program(
+            return answers.Progress(
                 name=program.name,
                 by=owner.person.name,
                 status=Stage.READY.value,
@@ -196,7 +197,7 @@ class Performer:
                 seconds=program.duration,
             )
         now = runner.progress(program, self._run, self._hub.arm.state)
-        return answers.Program(
+        return answers.Progress(
             name=program.name,
             by=owner.person.name,
             status=now.status,
@@ -238,7 +239,9 @@ class Performer:
             hub.leave(joined, for_good=True)
             raise
         self._self, self._owner, self._seen = joined, window, hub.clock()
-        self._run = Run(hub.present().state.t, single=single)
+        arm = hub.present()
+        self._speed = arm.state.speed
+        self._run = Run(arm.state.t, single=single)
         log.info("%s runs the program %s.", window.person.name, program.name)
 
     def _plan(self, planning: _Planning, text: str, speed: float, rig: Rig, state: State) -> None:
@@ -273,6 +276,9 @@ class Performer:
         assert self._run is not None
         joined, self._self = self._self, None
         self._run = runner.ended(self._run, phase, why)
+        if self._hub.arm is not None:
+            # A program's speed is its own.
+            self._hub.arm.limit(self._speed)
         if self._hub.lease.holder == joined.person:
             self._hub.give_up(joined)
         self._hub.leave(joined, for_good=True)

@@ -27,7 +27,7 @@ class Steering:
         self._loop = loop
 
     @property
-    def told(self) -> answers.Program | None:
+    def told(self) -> answers.Progress | None:
         """How the program stands."""
         return self._performer.told()
 

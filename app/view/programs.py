@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import viser
 
-from app.api.answers import Program as Told
+from app.api.answers import Progress as Told
 from app.api.requests import Order
 from app.control.state import State
 from app.errors import InputError, KatanaError
@@ -33,8 +33,7 @@ MOST_TAUGHT = 200
 ORDERS = {
     "Run": Order.RUN,
     "Step": Order.STEP,
-    "Pause": Order.PAUSE,
-    "Resume": Order.RESUME,
+    "Wait": Order.PAUSE,
     "End": Order.HALT,
 }
 
@@ -94,7 +93,8 @@ class ProgramsPanel:
             self._orders = gui.add_button_group(
                 "Program",
                 ("Preview", *ORDERS),
-                hint="Preview: plan it and show the tool's way. Step: to the end of a step",
+                hint="Preview: plan it and show the tool's way. Step: to the end of a step. "
+                "Wait: rest on the way, until Run or Step",
             )
             self._orders.on_click(self._guarded(self._order))
             self._status = gui.add_html("")

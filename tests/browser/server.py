@@ -102,6 +102,17 @@ class AppServer:
             raise ServerError(f"{self._name} does not run")
         return self._process.pid
 
+    @property
+    def front(self) -> int:
+        """The number of the process that people speak to, as Linux lists it: a child."""
+        (front,) = (
+            int(child)
+            for children in Path(f"/proc/{self.pid}/task").glob("*/children")
+            for child in children.read_text().split()
+            if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text()
+        )
+        return front
+
     def start(self) -> None:
         """Start the process and return when it is ready.
 

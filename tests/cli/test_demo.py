@@ -136,5 +136,5 @@ def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:
 def test_the_script_that_comes_along_is_the_demo() -> None:
     path = ROOT / "app" / "programs" / "library" / "circle.yaml"
     stored, demo = parse(path.read_text(encoding="utf-8")), parse(CircleDemo().text)
-    assert stored.expected == demo.expected
+    assert (stored.about, stored.expected) == (demo.about, demo.expected)
     assert [repr(a.step) for a in stored.steps] == [repr(b.step) for b in demo.steps]

@@ -275,10 +275,10 @@ def test_without_a_session_there_is_nothing_to_see(server: AppServer) -> None:
 
 
 def viser_port(server: AppServer) -> int:
-    """The other port on which the process listens."""
+    """The other port on which the process that people speak to listens."""
     inodes = {
         link.readlink().name.partition("[")[2].rstrip("]")
-        for link in Path(f"/proc/{server.pid}/fd").iterdir()
+        for link in Path(f"/proc/{server.front}/fd").iterdir()
         if link.readlink().name.startswith("socket:")
     }
     rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]

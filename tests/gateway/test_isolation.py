@@ -32,18 +32,6 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
-def front_of(server: AppServer) -> int:
-    """The number of the process that people speak to."""
-    found = []
-    for children in Path(f"/proc/{server.pid}/task").glob("*/children"):
-        for child in children.read_text().split():
-            line = Path(f"/proc/{child}/cmdline").read_text()
-            if "spawn_main" in line:
-                found.append(int(child))
-    (front,) = found
-    return front
-
-
 def under_way(arm: Client) -> answers.State:
     """Set out for FAR; the state once the arm is on its way."""
     arm.ask(requests.Joints(q=FAR.tolist()))
@@ -64,13 +52,13 @@ def again(server: AppServer, seconds: float = 20.0) -> answers.State:
 
 
 def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: AppServer) -> None:
-    killed = front_of(server)
+    killed = server.front
     with suppress(LostError), connect(server.url, "Driver") as arm:
         before = under_way(arm)
         os.kill(killed, signal.SIGKILL)
         arm.go(requests.Home())
     state = again(server)
-    assert front_of(server) != killed
+    assert server.front != killed
     assert state.stopped == "The arm lost the server and stopped."
     assert state.status == "halted"
     assert before.q[0] < state.q[0] < FAR[0] - 0.2
@@ -86,7 +74,7 @@ def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: App
 def test_a_front_that_freezes_stops_the_arm_in_time() -> None:
     with AppServer(ATTENTIVE_APP) as server, connect(server.url, "Driver") as arm:
         before = under_way(arm)
-        front = front_of(server)
+        front = server.front
         os.kill(front, signal.SIGSTOP)
         time.sleep(1.5)
         os.kill(front, signal.SIGCONT)
@@ -100,7 +88,7 @@ def test_a_front_that_freezes_stops_the_arm_in_time() -> None:
 
 
 def test_when_the_arms_process_is_killed_the_other_goes_too(server: AppServer) -> None:
-    front = front_of(server)
+    front = server.front
     os.kill(server.pid, signal.SIGKILL)
     end = time.monotonic() + 10.0
     while Path(f"/proc/{front}").exists() and "Z" not in _state(front):

@@ -24,7 +24,7 @@ READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
 THERE_AND_BACK = """\
 name: There and back
 steps:
-  - joints: [25, -60, 85, 8, 0]
+  - joints: [20, -64, 85, 8, 0]
   - line: {by: {z: 20}}
   - home
 """
@@ -49,7 +49,7 @@ def arm(server: AppServer) -> Iterator[Client]:
         arm.ask(requests.Release())
 
 
-def planned(arm: Client, text: str) -> answers.Program:
+def planned(arm: Client, text: str) -> answers.Progress:
     """Once it is, or refused."""
     for at in range(0, len(text), 100):
         more = at + 100 < len(text)
@@ -58,8 +58,8 @@ def planned(arm: Client, text: str) -> answers.Program:
 
 
 def wait(
-    arm: Client, until: Callable[[answers.Program], bool], seconds: float = 20.0
-) -> answers.Program:
+    arm: Client, until: Callable[[answers.Progress], bool], seconds: float = 20.0
+) -> answers.Progress:
     due = time.monotonic() + seconds
     while time.monotonic() < due:
         program = arm.look(answers.State).program

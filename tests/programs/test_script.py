@@ -136,7 +136,7 @@ def wrong_with(text: str) -> tuple[Problem, ...]:
     return () if script.steps else (Problem(0, 0, "no steps"),)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(TREES)
 def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
     text = json.dumps({"steps": tree})
@@ -144,7 +144,7 @@ def test_no_tree_of_values_is_more_than_an_error(tree: object) -> None:
     assert all(problem.line >= 1 and problem.column >= 1 for problem in problems)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.text(max_size=200) | st.text("steps:-[]{},&*!|>'\"# \n\t12xyhome", max_size=80))
 @example("steps: *a")
 @example("? - [\n")
@@ -155,7 +155,7 @@ def test_no_text_is_more_than_an_error(text: str) -> None:
     assert all(problem.line >= 1 for problem in wrong_with(text))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_a_broken_script_is_told_where(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(GOOD) - 1))

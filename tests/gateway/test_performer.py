@@ -1,0 +1,126 @@
+"""Who may tell a program what to do, told by a clock of the test's own."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from app.api.requests import Order
+from app.control import commands as cmd
+from app.control.lease import Role
+from app.control.session import Session
+from app.errors import LeaseError
+from app.gateway.hub import Window
+from app.programs.bench import Rig
+from tests.gateway.test_hub import PAGES, Table
+
+SCRIPT = "name: Wave\nsteps:\n  - wait: 0.05\n  - joints: [20, -60, 80, 8, 0]\n"
+
+
+class Staged(Table):
+    """A table whose arm can be planned for."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session.begin(session.ready, 0.0, 0.0))
+        self.arm.rig = Rig(session, np.eye(4))
+
+    @property
+    def status(self) -> str:
+        told = self.hub.performer.told()
+        return "" if told is None else told.status
+
+    def plan(self, window: Window) -> None:
+        """And wait for the thread that does it."""
+        self.hub.performer.script(window, SCRIPT, more=False, speed=1.0)
+        due = time.monotonic() + 10.0
+        while self.status == "planning" and time.monotonic() < due:
+            time.sleep(0.005)
+
+
+@pytest.fixture
+def table(session: Session) -> Staged:
+    return Staged(session)
+
+
+def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.hub.drive(window.person.key)
+    table.plan(window)
+    assert table.status == "ready"
+    table.hub.performer.steer(window, Order.RUN)
+    holder = table.hub.lease.holder
+    assert holder is not None
+    assert (holder.name, holder.role) == ("Wave", Role.OPERATOR)
+    table.wait(1.0, window)
+    assert table.hub.lease.holder == holder
+    assert any(isinstance(command, cmd.SpeedScale) for command in table.arm.commands)
+    with pytest.raises(LeaseError, match="Wave holds the arm"):
+        table.hub.drive(window.person.key)
+
+
+def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> None:
+    owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    viewer, admin = table.join("third", Role.VIEWER), table.join("fourth", Role.ADMIN)
+    performer = table.hub.performer
+    with pytest.raises(LeaseError, match="watch"):
+        performer.script(viewer, SCRIPT, more=False, speed=1.0)
+    table.plan(owner)
+    performer.steer(owner, Order.RUN)
+    for window, said in ((viewer, "watch"), (other, "is Window 1's")):
+        with pytest.raises(LeaseError, match=said):
+            performer.touch(window)
+        with pytest.raises(LeaseError, match=said):
+            performer.steer(window, Order.HALT)
+    with pytest.raises(LeaseError, match="end it first"):
+        table.plan(other)
+    performer.touch(admin)
+    performer.steer(admin, Order.HALT)
+    assert table.status == "stopped"
+    assert table.hub.lease.holder is None
+
+
+def test_it_does_not_take_the_arm_from_somebody(table: Staged) -> None:
+    owner, other = (table.join(page) for page in PAGES)
+    table.plan(owner)
+    table.hub.drive(other.person.key)
+    with pytest.raises(LeaseError, match="Window 2 holds the arm"):
+        table.hub.performer.steer(owner, Order.RUN)
+    assert len(table.hub.windows) == 2
+    assert table.hub.lease.holder == other.person
+
+
+def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window)
+    table.hub.performer.steer(window, Order.RUN)
+    table.hub.stop("Somebody")
+    table.wait(0.1, window)
+    assert table.status == "stopped"
+    table.hub.reset(window)
+    table.hub.give_up(window)
+    table.hub.performer.steer(window, Order.RUN)
+    table.wait(0.5, window)
+    table.hub.leave(window)
+    table.wait(0.5)
+    assert table.status == "running"
+    table.wait(1.0)
+    assert table.status == "stopped"
+    assert table.arm.holds > 0
+
+
+def test_what_the_panel_asked_for_is_done_once_it_is_planned(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    performer = table.hub.performer
+    with pytest.raises(LeaseError, match="front page"):
+        performer.plan(SCRIPT, Order.RUN)
+    performer.touch(window)
+    performer.plan(SCRIPT, Order.RUN)
+    with pytest.raises(LeaseError, match="being planned"):
+        performer.plan(SCRIPT, Order.RUN)
+    due = time.monotonic() + 10.0
+    while table.status in ("planning", "ready") and time.monotonic() < due:
+        table.wait(0.02, window)
+        time.sleep(0.005)
+    assert table.status == "running"

@@ -1,0 +1,48 @@
+"""Plans cross the pipe once, and come back as the plan that was sent."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from app.control.arm import Arm
+from app.control.following import Following
+from app.control.plans import plan_to
+from app.control.session import Session
+from app.planning.plan import Plan
+from app.runtime.wire import KEPT_HERE, Names, Plans
+
+
+@pytest.fixture(scope="module")
+def plan(arm: Arm) -> Plan:
+    session = Session(arm, np.array((0.0, -1.2, 1.5, 0.1, 0.0)))
+    state = session.begin(session.ready, 0.0, 0.0)
+    return plan_to(arm, None, state, session.ready + 0.2)
+
+
+def test_a_plan_comes_back_as_itself(plan: Plan) -> None:
+    names, plans = Names(), Plans()
+    plans.note(7, plan)
+    over_there: Plan = pickle.loads(pickle.dumps(plan))
+    names.note(7, over_there)
+    data = names.dumped(Following.begun(over_there))
+    back = plans.loaded(data)
+    assert back.plan is plan
+    assert len(data) < 2000 < len(pickle.dumps(Following.begun(over_there)))
+
+
+def test_one_that_is_not_known_is_sent_whole(plan: Plan) -> None:
+    back = Plans().loaded(Names().dumped(plan))
+    assert np.array_equal(back.end, plan.end)
+
+
+def test_old_ones_are_forgotten(plan: Plan) -> None:
+    names, plans = Names(), Plans()
+    each = [pickle.loads(pickle.dumps(plan)) for _ in range(KEPT_HERE + 1)]
+    for number, one in enumerate(each):
+        plans.note(number, one)
+        names.note(number, one)
+    assert plans.loaded(names.dumped(each[-1])) is each[-1]
+    assert plans.loaded(names.dumped(each[0])) is not each[0]

@@ -1,0 +1,87 @@
+"""The panel of programs: what it says, what it draws, what it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import viser
+
+from app.api.answers import Progress as Told
+from app.api.requests import Order
+from app.control.session import Session
+from app.exchange.scripts import Scripts
+from app.programs.bench import Rig
+from app.programs.program import Program, compiled
+from app.programs.script import parse
+from app.robot.model import RobotModel
+from app.view.programs import ProgramsPanel, _page
+from tests.browser.server import free_port
+
+
+class Performer:
+    """Remembers what was asked."""
+
+    def __init__(self) -> None:
+        self.told: Told | None = None
+        self.program: Program | None = None
+        self.asked: list[tuple[str, Order | None]] = []
+
+    def plan(self, text: str, then: Order | None) -> None:
+        self.asked.append((text, then))
+
+    def steer(self, order: Order) -> None:
+        self.asked.append(("", order))
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(port=free_port(), verbose=False)
+    yield server
+    server.stop()
+
+
+def test_what_is_said_is_text_and_no_markup() -> None:
+    page = _page(Told(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"), 2)
+    assert "&lt;b&gt;x" in page
+    assert "<script>" not in page
+    assert "2 poses" in page
+    told = Told(name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", share=0.5)
+    assert "Step 2 of 3, line 7: line, 50%" in _page(told, 0)
+    assert _page(None, 0) == ""
+
+
+def test_it_previews_steers_and_teaches(
+    server: viser.ViserServer, model: RobotModel, session: Session, tmp_path: Path
+) -> None:
+    performer = Performer()
+    state = session.begin(session.ready, 0.0, 0.0)
+    panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
+    panel.follow()
+    assert not panel._way.visible
+    rig = Rig(session, model.T_base_shoulder)
+    text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"
+    performer.program = compiled(parse(text), rig, state)
+    panel.follow()
+    points = np.asarray(panel._way.points).reshape(-1, 3)
+    assert np.abs(points[-1] - points[0] - (0.0, 0.0, 0.04)).max() < 1e-6
+    assert np.abs(points[:, :2] - points[0, :2]).max() < 1e-6
+
+    panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
+    panel._order()
+    performer.told = Told(name="x", by="me", status="running")
+    for said in ("Wait", "Run", "End"):
+        panel._orders.value = said  # type: ignore[misc]  # likewise
+        panel._order()
+    assert [order for _, order in performer.asked] == [
+        Order.RUN, Order.PAUSE, Order.RUN, Order.HALT
+    ]  # fmt: skip
+    assert parse(performer.asked[0][0]).name == "Circle"
+
+    for said in ("Add pose", "Add pose", "Save"):
+        panel._teach.value = said  # type: ignore[misc]  # likewise
+        panel._on_teach()
+    assert len(parse((tmp_path / "My script.yaml").read_text(encoding="utf-8")).steps) == 2
+    assert panel._choice.value == "My script"

@@ -1,0 +1,69 @@
+"""What viser is told of the path of the tool: what there is to see, and nothing at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import viser
+
+from app.control import commands as cmd
+from app.control.plans import plan_along
+from app.control.session import Session
+from app.kinematics.branch import branch_of
+from app.kinematics.tool import ToolTarget
+from app.planning.curve import Linear, ToolArc
+from app.planning.tool_path import ToolPath
+from app.robot.model import RobotModel
+from app.settings import Settings
+from app.view.traces import BAD, GOOD, WORST, Traces, coloured
+from tests.browser.server import free_port
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(port=free_port(), verbose=False)
+    yield server
+    server.stop()
+
+
+def test_the_path_and_the_way_that_was_gone_are_the_arc(
+    server: viser.ViserServer, model: RobotModel
+) -> None:
+    arm = model.arm
+    session = Session(arm, np.array(Settings().ready))
+    state = session.begin(session.ready, 0.0, 0.0)
+    at = ToolTarget.at(arm.chain, session.ready)
+    centre = at.position - (0.0, 0.0, 0.05)
+    arc = ToolArc(at.position, centre, np.array((1.0, 0.0, 0.0)), math.tau,
+                  Linear(at.pitch, at.pitch), Linear(0.0, 0.0))  # fmt: skip
+    path = ToolPath(arm.chain, arc, branch_of(arm.chain, session.ready), session.ready)
+    traces = Traces(server, model)
+    desired, traced = traces._desired, traces._traced
+    traces.follow(state)
+    assert [desired.visible, traced.visible] == [False, False]
+    state = session.step(state, [cmd.Follow(plan_along(arm, None, state, [path]))], 0.01)
+    told = []
+    while state.moving:
+        state = session.step(state, [], state.t + 0.01)
+        state = session.observe(state, state.setpoint, 0.0)
+        traces.follow(state)
+        told.append(len(traced.points))
+    assert [desired.visible, traced.visible] == [True, True]
+    middle = (model.T_base_shoulder @ np.append(centre, 1.0))[:3]
+    for handle in (desired, traced):
+        away = np.linalg.norm(np.asarray(handle.points) - middle, axis=2)
+        assert np.abs(away - 0.05).max() < 1e-5
+    assert (np.asarray(traced.colors) == GOOD.astype(np.uint8)).all()
+    # Appended ten times a second, not with every tick.
+    assert len(set(told)) < 1.2 * len(told) / 10 + 3
+    last = traced.points
+    traces.follow(state)
+    assert traced.points is last
+
+
+def test_errors_have_their_colours() -> None:
+    found = coloured(np.array((0.0, WORST, 5.0 * WORST)))
+    assert found.tolist() == [GOOD.tolist(), BAD.tolist(), BAD.tolist()]
