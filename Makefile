@@ -9,6 +9,8 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
+long    := tests/browser/test_x_ite.py tests/exchange/test_c_source.py tests/exchange/test_vrml.py \
+           tests/cli/test_export.py tests/cli/test_demo.py tests/gateway/test_programs.py
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 .PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-drag \
@@ -17,7 +19,7 @@ editable := $(install) --no-deps --no-build-isolation --editable .
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
 
-test: check browser octave exchange tests ## set up and pass every check and test
+test: check browser octave tests ## set up and pass every check and test
 
 check: lint types contracts
 
@@ -40,18 +42,21 @@ octave: $(dev_ok)             ## find GNU Octave, or install it where that can b
 exchange: $(dev_ok)           ## find the programs that read our exports, or install them
 	$(bin)/python tests/exchange/tools.py
 
-# Three at once: those that drive a browser, which mostly wait for it, those that run servers, and,
-# giving way to both, those that only compute.
+# Two at once, as many as there are cores: those that drive a browser, and beside them those that run
+# servers, then those that only compute.
 tests: $(dev_ok)
-	@nice $(bin)/python -m pytest $(browser:%=--ignore=%) $(servers:%=--ignore=%) \
-	    > $(VENV)/computed.log 2>&1 & computed=$$!; \
-	  $(bin)/python -m pytest $(servers) > $(VENV)/servers.log 2>&1 & servers=$$!; \
-	  $(bin)/python -m pytest $(browser); status=$$?; \
-	  wait $$servers || status=1; cat $(VENV)/servers.log; \
-	  wait $$computed || status=1; cat $(VENV)/computed.log; \
+	@( $(bin)/python -m pytest $(servers) $(long:%=--ignore=%) > $(VENV)/servers.log 2>&1; \
+	    status=$$?; nice -n 5 $(bin)/python -m pytest $(browser:%=--ignore=%) \
+	    $(servers:%=--ignore=%) $(long:%=--ignore=%) > $(VENV)/computed.log 2>&1 || status=1; \
+	    exit $$status ) & beside=$$!; \
+	  $(bin)/python -m pytest $(browser) $(long:%=--ignore=%); status=$$?; \
+	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
 	  exit $$status
 
-test-long: $(dev_ok) browser  ## 200 STOPs instead of 12
+# What takes long: demos as commands, programs on live servers, exports read by other programs, and
+# 200 STOPs instead of 12.
+test-long: $(dev_ok) browser exchange ## the tests that `make test` leaves out because they take long
+	$(bin)/python -m pytest $(long) $(ARGS)
 	KATANA450_LONG=1 $(bin)/python -m pytest tests/browser/test_gateway.py $(ARGS)
 
 robot: $(dev_ok)              ## rebuild all files of the robot from the numbers in robot_description/cad

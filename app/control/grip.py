@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.collision.world import World
+from app.control.aims import without
 from app.control.state import Finding, Reason, State
 from app.control.things import Surroundings, Thing
 from app.geometry.arrays import FloatArray
@@ -32,7 +33,7 @@ def gripped(surroundings: Surroundings, world: World | None, state: State) -> St
         things = tuple(surroundings.left(t, x) if t.held else t for t in state.things)
         return replace(state, things=things, grip=None)
     if state.gripper_goal >= state.gripper_setpoint:
-        return _without(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
+        return without(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
     for thing in state.things:
         if thing.can_be_held:
             felt = _felt(surroundings.hand.fingers, world, thing, x)
@@ -50,7 +51,7 @@ def _closed(
     surroundings: Surroundings, state: State, thing: Thing, felt: dict[str, float], x: FloatArray
 ) -> State:
     """The fingers have closed on ``thing``: they stop there, and hold it if both have."""
-    state = _without(_without(state, Reason.CONTACT), Reason.LOPSIDED)
+    state = without(without(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
     far = max(felt, key=lambda finger: felt[finger])
     if felt[far] > CENTRED:
@@ -59,8 +60,3 @@ def _closed(
     taken = surroundings.taken(thing, x)
     things = tuple(taken if each is thing else each for each in state.things)
     return replace(stopped, things=things, grip=state.gripper_setpoint)
-
-
-def _without(state: State, reason: Reason) -> State:
-    findings = tuple(finding for finding in state.findings if finding.reason is not reason)
-    return replace(state, findings=findings)

@@ -10,7 +10,9 @@ import numpy as np
 from app import tolerances
 from app.collision.world import World
 from app.control import commands as cmd
+from app.control.aims import gone, leaving, without
 from app.control.arm import Arm
+from app.control.checks import check
 from app.control.choices import Choice, choice, choices, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
 from app.control.following import Following
@@ -125,22 +127,7 @@ class Session:
 
     def check(self, command: cmd.Command) -> None:
         """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
-        n = self.arm.chain.n
-        match command:
-            case cmd.SetJoint(axis=axis) if axis >= n:
-                raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
-            case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
-                raise InputError(f"This arm has {n} joints, the command {q.size}.")
-            case cmd.SetTool(name=name):
-                self.arm.chain_to(name)
-            case cmd.Fill(volume=volume):
-                if self.pouring is None:
-                    raise InputError("There is no cup to fill.")
-                self.pouring.check(volume)
-            case cmd.Follow(plan=plan):
-                chains = [segment.path.chain for segment in plan.segments]
-                if any(not np.array_equal(chain.S, self.arm.chain.S) for chain in chains):
-                    raise InputError("The plan was made for another arm.")
+        check(self.arm, self.pouring, command)
 
     def choices(self, state: State) -> tuple[Choice, ...]:
         """What there is to choose from on each branch."""
@@ -200,12 +187,12 @@ class Session:
             case cmd.Release():
                 goal = self._mover(state).halt(state)[0]
                 free = replace(state, halted=None, goal=goal, target=JointTarget(goal))
-                return _leaving(self._without(free, Reason.HALTED))
+                return leaving(without(free, Reason.HALTED))
             case cmd.Pause():
-                told = self._without(state, Reason.PAUSED).findings
+                told = without(state, Reason.PAUSED).findings
                 return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
             case cmd.Resume():
-                return self._without(replace(state, paused=False), Reason.PAUSED)
+                return without(replace(state, paused=False), Reason.PAUSED)
             case cmd.Follow(plan=plan):
                 return self._begin(state, plan)
             case cmd.GoAlong(share=share):
@@ -216,7 +203,7 @@ class Session:
                 if state.paused:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
-                return _leaving(replace(state, jogging=jogging, since=None, let_go=False))
+                return leaving(replace(state, jogging=jogging, since=None, let_go=False))
             case cmd.SetJoint(axis=axis, value=value):
                 q = np.array(state.goal)
                 q[axis] = value
@@ -231,7 +218,7 @@ class Session:
                 return self._aim(state, JointTarget(frozen(np.zeros(self.arm.chain.n))))
             case cmd.Reset():
                 held = replace(state, gripper_goal=state.gripper_setpoint)
-                held = self._without(held, Reason.CONTACT)
+                held = without(held, Reason.CONTACT)
                 return self._aim(held, JointTarget(self._mover(state).halt(state)[0]))
             case cmd.MoveTool(position=position):
                 return self._drag(state, replace(wish(self.arm, state), position=position))
@@ -245,7 +232,7 @@ class Session:
                 # The findings stay: they say why the handle springs back.
                 goal = state.setpoint if state.blocked else state.goal
                 let_go = replace(state, goal=goal, target=JointTarget(goal), blocked=False)
-                return _leaving(let_go) if state.blocked else let_go
+                return leaving(let_go) if state.blocked else let_go
             case cmd.SetTool(name=name):
                 renamed = self._aim(replace(state, tool=name), JointTarget(state.goal))
                 return replace(renamed, following=state.following)
@@ -274,12 +261,12 @@ class Session:
         if isinstance(target, JointTarget):
             goal = frozen(chain.clamp(target.q))
             state = replace(state, branch=branch_of(chain, goal))
-            return self._gone(state, target, goal, of_joints(chain, target.q))
+            return gone(state, target, goal, of_joints(chain, target.q))
         best = project(
             chain, target.T, reading=state.reading, branch=state.branch, q_hint=state.goal
         )
         findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
-        return self._gone(state, target, best.q, findings)
+        return gone(state, target, best.q, findings)
 
     def _keep_up(self, state: State, q: FloatArray, qd: FloatArray | None) -> State:
         """Take ``q`` (n,) for the newest of a stream, and ``qd`` (n,) for how fast it changes."""
@@ -307,14 +294,14 @@ class Session:
     def _drag(self, state: State, target: ToolTarget) -> State:
         """Make ``target`` what is followed from now on, along the way the hand took there."""
         since = wish(self.arm, state) if state.since is None else state.since
-        return _leaving(replace(state, target=target, since=since, let_go=False))
+        return leaving(replace(state, target=target, since=since, let_go=False))
 
     def _begin(self, state: State, plan: Plan) -> State:
         """Follow ``plan`` from here, if the arm stands at its start."""
         off = np.abs(state.setpoint - plan.start)
         if off.max() > AT_START or not state.motion.at_rest:
             axis = int(off.argmax())
-            told = self._without(state, Reason.NOT_AT_START).findings
+            told = without(state, Reason.NOT_AT_START).findings
             return replace(
                 state, findings=(*told, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
             )
@@ -331,7 +318,7 @@ class Session:
         """With the goal where ``following`` ends."""
         goal = following.goal
         state = replace(state, branch=branch_of(self.arm.chain, goal))
-        return replace(self._gone(state, JointTarget(goal), goal, ()), following=following)
+        return replace(gone(state, JointTarget(goal), goal, ()), following=following)
 
     def _follow(self, state: State, target: ToolTarget, since: ToolTarget) -> State:
         """Take the goal on towards ``target``, as far as one tick has time for."""
@@ -342,35 +329,14 @@ class Session:
         if tracked.since is not None:
             return replace(state, goal=tracked.best.q, since=tracked.since)
         wished = JointTarget(tracked.best.q) if state.let_go else target
-        return self._gone(state, wished, tracked.best.q, of_tracked(chain, tracked, state.reading))
-
-    @staticmethod
-    def _gone(
-        state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]
-    ) -> State:
-        """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
-        kept = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
-        paused = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
-        # What the arm brakes for stays the reason, however often it is told anew meanwhile.
-        met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
-        aimed = replace(
-            state,
-            target=target,
-            goal=goal,
-            findings=paused + met + findings + kept,
-            since=None,
-            let_go=False,
-            jogging=None,
-            servo=None,
-        )
-        return _leaving(aimed)
+        return gone(state, wished, tracked.best.q, of_tracked(chain, tracked, state.reading))
 
     def _halt(self, state: State) -> State:
         """Brake, and forget every wish. The grip stays: what is held must not be dropped."""
         if state.halted is not None:
             return state
         if state.following is not None:
-            left = None if self._mover(state).may_leave(state) else _leaving(state).following
+            left = None if self._mover(state).may_leave(state) else leaving(state).following
             state = replace(state, following=left)
         goal, way, time = self._mover(state).halt(state)
         halted = replace(
@@ -406,10 +372,6 @@ class Session:
             jogging=jogging,
         )
 
-    @staticmethod
-    def _without(state: State, reason: Reason) -> State:
-        return replace(state, findings=tuple(f for f in state.findings if f.reason is not reason))
-
     def taken(self, state: State, branch: Branch) -> State:
         """Leap to ``branch`` with the tool where it is wished."""
         best = choice(self.arm, state, branch)
@@ -424,7 +386,7 @@ class Session:
             state.reading,
             yaw_was_wished=isinstance(target, PoseTarget),
         )
-        return self._gone(replace(state, branch=branch), target, best.q, findings)
+        return gone(replace(state, branch=branch), target, best.q, findings)
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.arm.gripper
@@ -434,10 +396,3 @@ class Session:
         beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
         held = (Finding(Reason.GRIPPER_LIMIT, goal),) if beyond else ()
         return replace(state, gripper_goal=goal, findings=others + held)
-
-
-def _leaving(state: State) -> State:
-    """``state`` that follows a plan no longer than it takes to leave it."""
-    if state.following is None:
-        return state
-    return replace(state, following=replace(state.following, leaving=True))

@@ -141,6 +141,8 @@ def test_a_message_no_page_sends_changes_nothing(server: AppServer) -> None:
 def test_what_is_no_message_is_not_answered(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (_, good):
+            # On a busy machine the scene comes with breaks.
+            await good.listen(1.0)
             for name, send in RUDE.items():
                 async with opened(server.url) as (bad, _):
                     with suppress(ConnectionClosed):
