@@ -97,6 +97,16 @@ class Thing:
         return self.T @ up
 
 
+def same(some: tuple[Thing, ...], others: tuple[Thing, ...]) -> bool:
+    """Whether they are the same things in the same places."""
+    return len(some) == len(others) and all(
+        (a.name, a.form, a.size, a.can_be_held, a.held)
+        == (b.name, b.form, b.size, b.can_be_held, b.held)
+        and np.array_equal(a.T, b.T)
+        for a, b in zip(some, others, strict=True)
+    )
+
+
 def placed(things: tuple[Thing, ...], thing: Thing) -> tuple[Thing, ...]:
     """``things`` with ``thing`` in place of the one of its name, or as one more if there is room.
 

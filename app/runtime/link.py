@@ -13,11 +13,12 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from app.control import commands as cmd
 from app.control.ledger import Entry
+from app.control.things import same
 from app.errors import InputError
 from app.runtime.board import Board, Snapshot
 from app.runtime.lateness import Lateness
@@ -213,9 +214,19 @@ class FrontEnd:
                 self.board.lateness = news.lateness
                 seen = self.board.snapshot
                 if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
-                    self.board.pin(news.snapshot, news.ledger)
+                    self.board.pin(_known(news.snapshot, seen), news.ledger)
         except GONE:
             self.cut.set()
+
+
+def _known(news: Snapshot, seen: Snapshot) -> Snapshot:
+    """``news`` with the things of ``seen`` where they are the same.
+
+    What comes by the pipe is another object each time, which would be taken for a change.
+    """
+    if not same(news.state.things, seen.state.things):
+        return news
+    return Snapshot(replace(news.state, things=seen.state.things), news.ticket)
 
 
 def _heard(pipe: Connection, plans: Plans) -> News:
