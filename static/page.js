@@ -20,21 +20,29 @@
   let silent = 0;
   let trip = null;
   let asking = null;
+  let press = null;
 
   // A page that is loaded anew is the same page; a second tab is another.
   function name() {
     const again = performance.getEntriesByType("navigation")[0]?.type === "reload";
     const old = again && sessionStorage.getItem("page");
-    const bytes = crypto.getRandomValues(new Uint8Array(16));
-    const fresh = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    const fresh = unheardOf();
     sessionStorage.setItem("page", old || fresh);
     return old || fresh;
   }
 
+  function unheardOf() {
+    const bytes = crypto.getRandomValues(new Uint8Array(16));
+    return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  }
+
   // STOP
 
+  // A press is told until it is heard, and counts once: on a thin line the last telling may come
+  // after a reset.
   function stop() {
-    say({ do: "stop" });
+    press = unheardOf();
+    say({ do: "stop", press });
     Jog.quiet();
     stopButton.classList.add("asked");
     clearTimeout(asking);
@@ -42,7 +50,7 @@
   }
 
   function insist() {
-    fetch("stop", { method: "POST", keepalive: true }).then(
+    fetch(`stop?press=${press}`, { method: "POST", keepalive: true }).then(
       ({ ok }) => ok && stopped(),
       () => {},
     );

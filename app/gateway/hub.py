@@ -6,6 +6,7 @@ Lives in the gateway's one thread; what it decides reaches the arm through the m
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -37,7 +38,7 @@ TICK = 0.02
 """[s] Between two looks at whether somebody has fallen silent."""
 
 REMEMBERED = 256
-"""Pages that are known again when they come back."""
+"""Pages that are known again when they come back, and presses of STOP that are told again."""
 
 
 class Arm(Protocol):
@@ -133,6 +134,7 @@ class Hub:
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
+        self._presses: deque[str] = deque(maxlen=REMEMBERED)
         self._jogged = -JOG_TIME
         self._looked = clock()
 
@@ -202,8 +204,12 @@ class Hub:
 
     # What people do
 
-    def stop(self, name: str) -> None:
-        """Anybody may, at any time."""
+    def stop(self, name: str, press: str | None = None) -> None:
+        """Anybody may, at any time. A ``press`` counts once, however often it is told."""
+        if press is not None:
+            if press in self._presses:
+                return
+            self._presses.append(press)
         self._halt(Stopped(name, f"{name} pressed STOP."))
 
     def reset(self, window: Window) -> None:
