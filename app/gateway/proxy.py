@@ -23,6 +23,7 @@ from app.gateway.door import NOT_YOU, Door
 from app.gateway.firewall import Firewall, Ruling, Verdict
 from app.gateway.flow import Flow
 from app.gateway.hub import Hub, key_of
+from app.view.frames import VALVE_HEADER, Valve
 from app.view.guard import Guard
 from app.view.server import KEY_HEADER
 
@@ -72,12 +73,13 @@ class Proxy:
         # Without our page around it viser can be looked at, and no more.
         key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
         self._open += 1
+        valve = Valve()
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
                 sock=await _narrow_socket(self._port),
                 subprotocols=[SUBPROTOCOL],
-                additional_headers={KEY_HEADER: self._key},
+                additional_headers={KEY_HEADER: self._key, VALVE_HEADER: valve.name},
                 user_agent_header=None,
                 compression=None,
                 max_size=None,
@@ -85,7 +87,7 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                line = _Line(self._hub, self._guard, browser, upstream, key)
+                line = _Line(self._hub, self._guard, browser, upstream, valve, key)
                 if not await self._door.while_welcome(
                     lambda: self._door.visitor(browser.cookies), line.run()
                 ):
@@ -101,9 +103,16 @@ class _Line:
     """Between one browser and viser."""
 
     def __init__(
-        self, hub: Hub, guard: Guard, browser: WebSocket, upstream: ClientConnection, key: str
+        self,
+        hub: Hub,
+        guard: Guard,
+        browser: WebSocket,
+        upstream: ClientConnection,
+        valve: Valve,
+        key: str,
     ) -> None:
         self._hub = hub
+        self._valve = valve
         self._browser = browser
         self._upstream = upstream
         self._key = key
@@ -136,14 +145,20 @@ class _Line:
     async def _down(self) -> None:
         """Pictures, as fast as the browser sees them."""
         async for frame in self._upstream:
-            while not self._flow.has_room(self._hub.clock()):
-                self._room.clear()
-                with suppress(TimeoutError):
-                    async with asyncio.timeout(LOOK_AGAIN):
-                        await self._room.wait()
             assert isinstance(frame, bytes)
             waited = self._flow.age(self._hub.clock()) > CROWDED
             await self._send(frame, _age(frame) if waited else 0.0)
+            if not self._flow.has_room(self._hub.clock()):
+                self._valve.let(False)
+                await self._wait_for_room()
+                self._valve.let(True)
+
+    async def _wait_for_room(self) -> None:
+        while not self._flow.has_room(self._hub.clock()):
+            self._room.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LOOK_AGAIN):
+                    await self._room.wait()
 
     async def _up(self) -> None:
         """What the firewall lets pass."""

@@ -1,4 +1,4 @@
-"""Frames on their way out, packed once for all browsers that are sent the same.
+"""Frames on their way out: packed once for all who are sent the same, and only when they can be.
 
 viser packs and compresses each window of messages for each browser anew, which for a crowd costs
 more than all else the view does. What is sent here is what it sends; the hook is no public
@@ -7,9 +7,13 @@ interface of viser's, whose version is exact, and tests hold the frames to viser
 
 from __future__ import annotations
 
+import asyncio
+import secrets
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
 
 import msgspec
 import zstandard
@@ -23,6 +27,43 @@ FRESH = 0.03
 
 ALIGNED = 8
 """Bytes: arrays begin at multiples of it."""
+
+
+VALVE_HEADER = "X-Katana450-Valve"
+"""Header in which the gateway names the valve of a browser's line."""
+
+
+class Valve:
+    """Holds back what would only wait on the way to one browser.
+
+    A frame that is made says what is so by then; one that waits grows old. The gateway shuts and
+    opens it from its own thread.
+    """
+
+    def __init__(self) -> None:
+        self.name = secrets.token_hex(16)
+        self._is_open = True
+        self._changed = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        _valves[self.name] = self
+
+    def let(self, is_open: bool) -> None:
+        """Open it or shut it. For any thread."""
+        self._is_open = is_open
+        if self._loop is not None:
+            with suppress(RuntimeError):  # viser's loop may have ended
+                self._loop.call_soon_threadsafe(self._changed.set)
+
+    async def passed(self) -> None:
+        """Return while it is open; in viser's loop."""
+        # Known before the look, so that whoever opens it after the look is heard.
+        self._loop = asyncio.get_running_loop()
+        while not self._is_open:
+            self._changed.clear()
+            await self._changed.wait()
+
+
+_valves: WeakValueDictionary[str, Valve] = WeakValueDictionary()
 
 
 class _Packed(NamedTuple):
@@ -75,10 +116,14 @@ class Packer:
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
     """Send a browser the windows of a buffer, as viser's own producer of this name does."""
     packer = buffer.__dict__.setdefault("packer", Packer())
+    valve = _valves.get(line.request.headers.get(VALVE_HEADER, ""))
     windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
     try:
         async for window in windows:
             await line.send(packer.frame(window))
+            # What is for one browser alone is an answer, and does not repeat itself.
+            if valve is not None and buffer.persistent_messages:
+                await valve.passed()
     finally:
         # An unfinished one would keep what it has not sent.
         await windows.aclose()
