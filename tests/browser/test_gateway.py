@@ -258,7 +258,7 @@ def test_the_arm_goes_from_hand_to_hand(
     other.wait_until(lambda: other.slider_value("Axis 1") == before, "the slider to spring back")
     other.press_in_bar("Request")
     page.wait_until(lambda: f"{they} asks for it" in bar(page, "name"), "the request")
-    page.screenshot(artefacts / "gateway-request.png")
+    page.keep(artefacts / "gateway-request.png")
     page.press_in_bar(f"Give to {they}")
     other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
     assert truth.status()["holder"] == they
@@ -305,7 +305,7 @@ def test_a_killed_server_is_told_at_once_and_the_page_comes_back(
         killed = time.monotonic()
         page.page.wait_for_selector("#banner.lost")
         told = time.monotonic() - killed
-        page.screenshot(artefacts / "gateway-lost.png")
+        page.keep(artefacts / "gateway-lost.png")
         assert "No line" in bar(page, "link")
         assert told < 1.0
         robot.since = time.time()
@@ -448,7 +448,7 @@ def test_pads_and_buttons_move_while_they_are_held(
         mouse.move(box["x"] + right * box["width"], box["y"] + down * box["height"], steps=3)
         wait_moved(page, start, axis, sign)
         if axis == 1:
-            page.screenshot(artefacts / "gateway-jog.png")
+            page.keep(artefacts / "gateway-jog.png")
         mouse.up()
         truth.wait(mood="ok")
     start = page.slider_value("Axis 5")
@@ -590,7 +590,7 @@ def test_stop_is_always_there_and_the_biggest(
         assert found["stop"] == max(found.values())
         assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
         page.page.wait_for_timeout(300)
-        page.screenshot(artefacts / f"gateway-{size}-{scheme}-{state}.png")
+        page.keep(artefacts / f"gateway-{size}-{scheme}-{state}.png")
     reset(page, truth)
 
 
