@@ -16,7 +16,7 @@ short   := $(long:%=--ignore=%)
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-drag \
+.PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-crowd bench-drag \
         bench-kinematics bench-load bench-start bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -73,6 +73,9 @@ bench-view: $(dev_ok)         ## what one update of the view costs the server
 
 bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
 	$(bin)/python -m benchmarks.load $(ARGS)
+
+bench-crowd: $(dev_ok) browser ## mouse event to drawn frame, alone and among 31 watchers
+	$(bin)/python -m benchmarks.crowd $(ARGS)
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)

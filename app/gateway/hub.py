@@ -187,6 +187,11 @@ class Hub:
         """It is closed."""
         del self._pictures[picture]
 
+    @property
+    def watching(self) -> int:
+        """Browsers that are sent pictures."""
+        return len(self._pictures)
+
     def age(self, window: Window) -> float:
         """How old the picture is that the window shows [s]."""
         of_it = [each for each, (key, _) in self._pictures.items() if key == window.person.key]
