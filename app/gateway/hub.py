@@ -16,6 +16,7 @@ from app.control.choices import Choice
 from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
 from app.control.ledger import Entry
+from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.state import State
 from app.control.things import Surroundings
@@ -66,6 +67,9 @@ class Arm(Protocol):
 
     @property
     def pouring(self) -> Pouring | None: ...
+
+    @property
+    def margins(self) -> Margins: ...
 
     @property
     def ledger(self) -> Sequence[Entry]: ...

@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from app.api.requests import Rates
+from app.collision.world import World
 from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.ledger import Entry
+from app.control.margins import Margins, margins
 from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import State
@@ -43,6 +45,7 @@ class Motion:
         self._board = link.board
         self._navigator = navigator
         self._let_go = let_go
+        self._measured: tuple[tuple[str, World | None, bytes], Margins] | None = None
 
     @property
     def snapshot(self) -> Snapshot:
@@ -73,6 +76,20 @@ class Motion:
     def lateness(self) -> Lateness:
         """How well the control loop keeps its period."""
         return self._board.lateness
+
+    @property
+    def margins(self) -> Margins:
+        """How near it is to what it cannot pass.
+
+        Measured once for everybody who asks, and anew when something has changed.
+        """
+        state = self.state
+        world, x = self._session.world_at(state), np.append(state.q, state.gripper)
+        key = (state.tool, world, x.tobytes())
+        if self._measured is None or self._measured[0] != key:
+            chain = self.model.arm.chain_to(state.tool)
+            self._measured = (key, margins(chain, world, x))
+        return self._measured[1]
 
     def choices(self) -> tuple[Choice, ...]:
         """The branches there are to choose from."""

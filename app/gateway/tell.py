@@ -7,11 +7,14 @@ import numpy as np
 from app.api import answers
 from app.control import state as control
 from app.control.choices import Choice
+from app.control.margins import Margins
 from app.control.pouring import Pouring
+from app.control.things import Hand
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
 from app.kinematics.tool import ToolTarget
+from app.kinematics.velocity import tool_speed
 from app.robot.model import RobotModel
 from app.runtime.lateness import Lateness
 from app.view.texts import sentence, told
@@ -43,6 +46,7 @@ def state(hub: Hub) -> answers.State:
         t=now.t,
         ticket=snapshot.ticket,
         q=now.q.tolist(),
+        setpoint=now.setpoint.tolist(),
         qd=now.motion.qd.tolist(),
         goal=now.goal.tolist(),
         gripper=now.gripper,
@@ -51,6 +55,10 @@ def state(hub: Hub) -> answers.State:
         T=forward(chain, now.q).tolist(),
         pitch=five.pitch,
         roll=five.roll,
+        tool_speed=tool_speed(chain, now.setpoint, now.motion.qd),
+        margins=margins(arm.margins),
+        touching=touching(arm.surroundings.hand, now),
+        held=next((thing.name for thing in now.things if thing.held), None),
         branch=(now.branch.shoulder, now.branch.elbow),
         reading=now.reading.value,
         status=now.status.value,
@@ -64,6 +72,28 @@ def state(hub: Hub) -> answers.State:
         water=water(arm.pouring, now),
         program=hub.performer.told(),
     )
+
+
+def margins(found: Margins) -> answers.Margins:
+    """How near the arm is to what it cannot pass."""
+    nearest = found.nearest
+    return answers.Margins(
+        limit=found.limit,
+        axis=found.axis + 1,
+        smallest_singular_value=found.smallest_singular_value,
+        clearance=None if nearest is None else nearest.distance,
+        parts=None if nearest is None else nearest.parts,
+    )
+
+
+def touching(hand: Hand | None, now: control.State) -> list[str]:
+    """The fingers that feel something, by what became of it when they closed."""
+    if hand is None:
+        return []
+    if any(thing.held for thing in now.things):
+        return list(hand.fingers)
+    away = [each.parts for each in now.findings if each.reason is control.Reason.LOPSIDED]
+    return [finger for parts in away if parts for finger in hand.fingers if finger not in parts]
 
 
 def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
