@@ -124,7 +124,8 @@ class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
     Attributes:
-        t: when, on the server's clock, which only goes forwards.
+        t: when, on the server's clock, which only goes forwards; an arm at rest is as it was then.
+        told: when this was said, on the same clock.
         ticket: of the last command that is heeded in it.
         q: (n,) where the arm is, as it says itself.
         setpoint, qd: (n,) where it is told to be, and how fast that moves.
@@ -145,6 +146,7 @@ class State(Answer, frozen=True, kw_only=True):
     """
 
     t: float
+    told: float
     ticket: int
     q: Numbers
     setpoint: Numbers

@@ -7,9 +7,9 @@ import numpy as np
 from app.api import answers
 from app.control import state as control
 from app.control.choices import Choice
+from app.control.grip import touching
 from app.control.margins import Margins
 from app.control.pouring import Pouring
-from app.control.things import Hand
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
@@ -44,6 +44,7 @@ def state(hub: Hub) -> answers.State:
     five = ToolTarget.at(chain, now.q)
     return answers.State(
         t=now.t,
+        told=hub.clock(),
         ticket=snapshot.ticket,
         q=now.q.tolist(),
         setpoint=now.setpoint.tolist(),
@@ -57,7 +58,7 @@ def state(hub: Hub) -> answers.State:
         roll=five.roll,
         tool_speed=tool_speed(chain, now.setpoint, now.motion.qd),
         margins=margins(arm.margins),
-        touching=touching(arm.surroundings.hand, now),
+        touching=list(touching(arm.surroundings.hand, now)),
         held=next((thing.name for thing in now.things if thing.held), None),
         branch=(now.branch.shoulder, now.branch.elbow),
         reading=now.reading.value,
@@ -84,16 +85,6 @@ def margins(found: Margins) -> answers.Margins:
         clearance=None if nearest is None else nearest.distance,
         parts=None if nearest is None else nearest.parts,
     )
-
-
-def touching(hand: Hand | None, now: control.State) -> list[str]:
-    """The fingers that feel something, by what became of it when they closed."""
-    if hand is None:
-        return []
-    if any(thing.held for thing in now.things):
-        return list(hand.fingers)
-    away = [each.parts for each in now.findings if each.reason is control.Reason.LOPSIDED]
-    return [finger for parts in away if parts for finger in hand.fingers if finger not in parts]
 
 
 def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:

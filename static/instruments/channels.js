@@ -9,7 +9,7 @@ export function channelsOf(arm, gripper) {
   const group = (name, ...more) => {
     groups[name] = more.map((channel) => channels.push(channel) - 1);
   };
-  const axes = (unit, of) => arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, unit, of: of(i) }));
+  const axes = (unit, of) => arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, short: `${i + 1}`, unit, of: of(i) }));
   group("angles", ...axes("deg", (i) => ({ q }) => q[i] * DEGREES));
   group("speeds", ...axes("deg/s", (i) => ({ qd }) => qd[i] * DEGREES));
   group("errors", ...axes("deg", (i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * DEGREES));

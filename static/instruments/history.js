@@ -1,5 +1,7 @@
 // What was measured of late: a ring of samples, each a time and a number a channel.
 const CAPACITY = 18_000; // ten minutes at 30 Hz
+const AT_REST = 0.1; // s after which a state is no late one, but that of an arm that rests
+const ANEW = 1.0; // s that no clock goes back unless its server was started anew
 export const GAP = 0.5; // s without a sample that a line does not bridge
 
 export class History {
@@ -14,11 +16,11 @@ export class History {
   }
 
   take(state) {
-    // A server that was started anew has another clock.
-    if (this.#count && state.t < this.newest) this.#count = 0;
-    if (this.#count && state.t === this.newest) return;
+    const t = state.told - state.t > AT_REST ? state.told : state.t;
+    if (t < this.newest - ANEW) this.#count = 0;
+    if (t <= this.newest) return;
     const slot = this.#count % CAPACITY;
-    this.#times[slot] = state.t;
+    this.#times[slot] = t;
     this.channels.forEach((channel, i) => (this.#columns[i][slot] = channel.of(state) ?? NaN));
     this.#count += 1;
   }

@@ -66,11 +66,11 @@ export class Plot {
 
   #entry(channel, i) {
     const value = html("output", {}, "–");
-    const { label } = this.#history.channels[channel];
+    const { label, short = label } = this.#history.channels[channel];
     const button = html(
       "button",
-      { type: "button", "aria-pressed": "true", class: `series-${i + 1}` },
-      html("i"), html("span", {}, label), value,
+      { type: "button", "aria-pressed": "true", "aria-label": label, class: `series-${i + 1}` },
+      html("i"), html("span", {}, short), value,
     );
     button.addEventListener("click", () => {
       set(button, "aria-pressed", button.getAttribute("aria-pressed") !== "true");
