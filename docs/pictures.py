@@ -124,14 +124,19 @@ def pouring(page: ViserPage) -> None:
 
 
 def instruments(page: ViserPage) -> None:
-    """They show the paper's circle while it is drawn."""
+    """They show the paper's circle, up to where it was paused."""
     url = page.page.url.split("/?")[0].rstrip("/")
+    # To draw the scene all the while would take the time that the plots need.
+    page.frame.evaluate("() => harness.draw(false)")
     with connect(url, "Circle") as arm:
         send(arm, CircleDemo(tool="tcp").text)
         program(arm, lambda told: told.status in ("ready", "refused"))
         page.press_in_bar("Instruments")
         arm.ask(requests.Steer(order=requests.Order.RUN))
         program(arm, lambda told: told.task == "circle" and told.share > 0.75)
+        page.page.locator("#instruments").get_by_role("button", name="Pause").click()
+        arm.ask(requests.Steer(order=requests.Order.PAUSE))
+        page.page.wait_for_timeout(3000)
         page.screenshot(IMAGES / "instruments.png")
 
 

@@ -133,6 +133,8 @@ class State(Answer, frozen=True, kw_only=True):
         gripper, gripper_goal: the finger joint.
         tool: the frame that ``T`` (4, 4), ``pitch`` and ``roll`` are of; T in the frame {S}.
         tool_speed: of the tool point [m/s], by its setpoints.
+        holding: (n,) torques [N m] that hold the arm still there against its own weight; null where
+            its description tells no masses. What it carries besides is not counted.
         margins: how near the arm is to what it cannot pass.
         touching: the fingers that touch what may be held. held: what both hold; null with an empty
             hand.
@@ -159,6 +161,7 @@ class State(Answer, frozen=True, kw_only=True):
     pitch: float
     roll: float
     tool_speed: float
+    holding: Numbers | None
     margins: Margins
     touching: list[str]
     held: str | None

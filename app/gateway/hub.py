@@ -69,6 +69,9 @@ class Arm(Protocol):
     def pouring(self) -> Pouring | None: ...
 
     @property
+    def holding(self) -> FloatArray | None: ...
+
+    @property
     def margins(self) -> Margins: ...
 
     @property

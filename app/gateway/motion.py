@@ -18,9 +18,11 @@ from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
+from app.kinematics.statics import holding_torques
 from app.kinematics.velocity import JogFrame
 from app.programs.bench import Rig
 from app.robot.model import RobotModel
+from app.robot.weight import loads_of
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.link import FrontEnd
@@ -45,7 +47,10 @@ class Motion:
         self._board = link.board
         self._navigator = navigator
         self._let_go = let_go
-        self._measured: tuple[tuple[str, World | None, bytes], Margins] | None = None
+        self._loads = loads_of(model)
+        self._measured: (
+            tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
+        ) = None
 
     @property
     def snapshot(self) -> Snapshot:
@@ -78,17 +83,24 @@ class Motion:
         return self._board.lateness
 
     @property
-    def margins(self) -> Margins:
-        """How near it is to what it cannot pass.
+    def holding(self) -> FloatArray | None:
+        """(n,) torques that hold it still [N m]; None where nobody knows what it weighs."""
+        return self._posture()[1]
 
-        Measured once for everybody who asks, and anew when something has changed.
-        """
+    @property
+    def margins(self) -> Margins:
+        """How near it is to what it cannot pass."""
+        return self._posture()[0]
+
+    def _posture(self) -> tuple[Margins, FloatArray | None]:
+        """Worked out once for everybody who asks, and anew when something has changed."""
         state = self.state
         world, x = self._session.world_at(state), np.append(state.q, state.gripper)
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
             chain = self.model.arm.chain_to(state.tool)
-            self._measured = (key, margins(chain, world, x))
+            holding = holding_torques(chain, state.q, self._loads) if self._loads else None
+            self._measured = (key, (margins(chain, world, x), holding))
         return self._measured[1]
 
     def choices(self) -> tuple[Choice, ...]:

@@ -58,6 +58,7 @@ def state(hub: Hub) -> answers.State:
         roll=five.roll,
         tool_speed=tool_speed(chain, now.setpoint, now.motion.qd),
         margins=margins(arm.margins),
+        holding=None if arm.holding is None else arm.holding.tolist(),
         touching=list(touching(arm.surroundings.hand, now)),
         held=next((thing.name for thing in now.things if thing.held), None),
         branch=(now.branch.shoulder, now.branch.elbow),

@@ -127,6 +127,7 @@ function plots(gripper, history, groups, view) {
     plot("joint-angles", "Joint angles [°]", "angles", 2, 1, true),
     plot("joint-speeds", "Joint speeds [°/s]", "speeds", 2, 1, true),
     plot("tool-point", "Tool point in {S} [mm]", "tool", 2, 1, true),
+    plot("joint-loads", "Weight on the joints [N m]", "loads", 1, 2, true),
     plot("tracking", "Tracking error [°]", "errors", 0.01, 3, true),
     ...(gripper ? [plot("gripper-opening", "Gripper [%]", "gripper", 2, 1, false)] : []),
     plot("clearances", "Clearance [mm]", "clearance", 2, 1, false),

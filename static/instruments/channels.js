@@ -13,6 +13,7 @@ export function channelsOf(arm, gripper) {
   group("angles", ...axes("deg", (i) => ({ q }) => q[i] * DEGREES));
   group("speeds", ...axes("deg/s", (i) => ({ qd }) => qd[i] * DEGREES));
   group("errors", ...axes("deg", (i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * DEGREES));
+  group("loads", ...axes("N m", (i) => ({ holding }) => holding?.[i]));
   group("tool", ...["x", "y", "z"].map((label, i) => ({ label, unit: "mm", of: ({ T }) => T[i][3] * MM })));
   group("clearance", { label: "Nearest", unit: "mm", of: ({ margins }) => (margins.clearance ?? NaN) * MM });
   group("speed", { label: "Tool", unit: "mm/s", of: ({ tool_speed: speed }) => speed * MM });

@@ -45,6 +45,7 @@ class FakeArm:
     pouring: Pouring | None
     rig: Rig
     margins: Margins
+    holding: FloatArray | None
 
     def __init__(self, state: State) -> None:
         self.rest = state
