@@ -39,11 +39,11 @@ export class Command {
     else this.#ticket = ticket;
   }
 
-  // Refused, or the line is gone: nothing is wanted any more.
+  // Refused, or the line is gone: nothing is wanted any more. Another server counts anew.
   forget() {
     clearTimeout(this.#timer);
     this.#timer = null;
-    this.#open = 0;
+    this.#open = this.#ticket = this.#until = 0;
   }
 
   // Whether a state knows all that was asked; until then its goal is an older one.

@@ -105,7 +105,7 @@ export class Panel {
     const arrange = toggle("Arrange", "Move, resize, show and hide instruments", (on) => this.#board?.arrange(on));
     return html(
       "div",
-      { class: "toolbar", role: "toolbar", "aria-label": "Instruments" },
+      { class: "toolbar", role: "group", "aria-label": "Of all plots and cards" },
       html("fieldset", { class: "choice", "aria-label": "Time that plots show" }, ...spans),
       pause, this.#age, arrange,
     );
