@@ -129,13 +129,16 @@ def instruments(page: ViserPage) -> None:
     # To draw the scene all the while would take the time that the plots need.
     page.frame.evaluate("() => harness.draw(false)")
     with connect(url, "Circle") as arm:
+        page.press_in_bar("Instruments")
         send(arm, CircleDemo(tool="tcp").text)
         program(arm, lambda told: told.status in ("ready", "refused"))
-        page.press_in_bar("Instruments")
         arm.ask(requests.Steer(order=requests.Order.RUN))
+        # The way to its start counts as a share of its own.
         program(arm, lambda told: told.task == "circle" and told.share > 0.75)
-        page.page.locator("#instruments").get_by_role("button", name="Pause").click()
+        program(arm, lambda told: told.task == "circle" and 0.05 < told.share < 0.3)
+        program(arm, lambda told: told.share > 0.75)
         arm.ask(requests.Steer(order=requests.Order.PAUSE))
+        page.page.locator("#instruments").get_by_role("button", name="Pause").click()
         page.page.wait_for_timeout(3000)
         page.screenshot(IMAGES / "instruments.png")
 

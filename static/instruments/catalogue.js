@@ -101,6 +101,12 @@ function gauges(arm) {
       ({ margins }) => [margins.smallest_singular_value],
     ),
     gauge(
+      "pitch",
+      "Tool pitch",
+      { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one },
+      ({ pitch }) => [pitch * DEGREES],
+    ),
+    gauge(
       "touch",
       "Touch",
       { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },

@@ -9,7 +9,8 @@ export class Gauge {
   #options;
   #parts;
 
-  // text: of the value. zones: [{below | above, tone}], the first that fits counts.
+  // text: of the value. zones: [{below | above, tone}], the first that fits counts. origin: where
+  // the arc begins, low unless told.
   constructor(options) {
     this.#options = options;
     const { title, low, high, zones = [], unit } = options;
@@ -44,14 +45,15 @@ export class Gauge {
 
   // value: null when there is none.
   show(value, note = " ") {
-    const { text, low, zones = [] } = this.#options;
+    const { text, low, origin = low, zones = [] } = this.#options;
     const { way, value: shown, note: said } = this.#parts;
     const words = value === null ? "–" : text(value);
     write(shown, words);
     write(said, note);
     const fits = ({ below = -Infinity, above = Infinity }) => value !== null && (value < below || value > above);
     set(this.element, "data-tone", zones.find(fits)?.tone ?? "ok");
-    set(way, "d", value === null || this.#turn(value) - FROM < 0.5 ? "" : arc(RING, this.#turn(low), this.#turn(value)));
+    const ends = [origin, value ?? origin].map((each) => this.#turn(each));
+    set(way, "d", Math.abs(ends[1] - ends[0]) < 0.5 ? "" : arc(RING, ...ends));
     set(this.element, "aria-valuenow", value === null ? low : value.toFixed(3));
     set(this.element, "aria-valuetext", value === null ? "none" : `${words} ${this.#options.unit} ${note}`.trim());
   }
