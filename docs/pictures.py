@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.api import answers, requests
 from app.client import Client, connect
+from app.programs.circle import CircleDemo
 from app.programs.pour import PourDemo
 from app.view.cameras import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
@@ -122,6 +123,26 @@ def pouring(page: ViserPage) -> None:
     imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
 
 
+def instruments(page: ViserPage) -> None:
+    """They show the paper's circle, up to where it was paused."""
+    url = page.page.url.split("/?")[0].rstrip("/")
+    # To draw the scene all the while would take the time that the plots need.
+    page.frame.evaluate("() => harness.draw(false)")
+    with connect(url, "Circle") as arm:
+        page.press_in_bar("Instruments")
+        send(arm, CircleDemo(tool="tcp").text)
+        program(arm, lambda told: told.status in ("ready", "refused"))
+        arm.ask(requests.Steer(order=requests.Order.RUN))
+        # The way to its start counts as a share of its own.
+        program(arm, lambda told: told.task == "circle" and told.share > 0.75)
+        program(arm, lambda told: told.task == "circle" and 0.05 < told.share < 0.3)
+        program(arm, lambda told: told.share > 0.75)
+        arm.ask(requests.Steer(order=requests.Order.PAUSE))
+        page.page.locator("#instruments").get_by_role("button", name="Pause").click()
+        page.page.wait_for_timeout(3000)
+        page.screenshot(IMAGES / "instruments.png")
+
+
 def send(arm: Client, text: str) -> None:
     """Have a script planned."""
     parts = [text[at : at + 600] for at in range(0, len(text), 600)]
@@ -155,6 +176,7 @@ PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
     pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(38.0)),
+    instruments: Camera((0.9, -0.75, 0.7), (0.25, 0.0, 0.2), math.radians(45.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
 

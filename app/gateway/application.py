@@ -91,7 +91,7 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
 
     routes = [
         Route("/", page),
-        Route("/static/{name}", file),
+        Route("/static/{name:path}", file),
         Route("/viser/", viser_index),
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),

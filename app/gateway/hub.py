@@ -17,6 +17,7 @@ from app.control.choices import Choice
 from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
 from app.control.ledger import Entry
+from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.state import State
 from app.control.things import Surroundings
@@ -67,6 +68,12 @@ class Arm(Protocol):
 
     @property
     def pouring(self) -> Pouring | None: ...
+
+    @property
+    def holding(self) -> FloatArray | None: ...
+
+    @property
+    def margins(self) -> Margins: ...
 
     @property
     def ledger(self) -> Sequence[Entry]: ...

@@ -13,6 +13,7 @@ from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.lease import LOST_AFTER, Lease, Role
 from app.control.ledger import Entry
+from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import Finding, Halt, Reason, State
@@ -43,6 +44,8 @@ class FakeArm:
     surroundings: Surroundings
     pouring: Pouring | None
     rig: Rig
+    margins: Margins
+    holding: FloatArray | None
 
     def __init__(self, state: State) -> None:
         self.rest = state
