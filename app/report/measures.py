@@ -21,8 +21,8 @@ from app.planning.curve import Tool
 from app.planning.jet import Jet
 from app.planning.path import joint_derivatives
 from app.planning.tool_path import ToolPath
-from app.programs.handling import POURING
 from app.programs.order import Go
+from app.programs.pouring import POURING
 from app.programs.program import Program
 from app.programs.script import Script
 from app.report.trace import Trace

@@ -11,9 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from app.errors import InputError
+from app.programs.moves import Move
 from app.programs.script import MOST_STEPS, parse
 from app.programs.source import DEEPEST, LARGEST, Problem, ScriptError
-from app.programs.steps import STEPS, Circle, Line, Move
+from app.programs.steps import STEPS
+from app.programs.tool_moves import Circle, Line
 
 GOOD = """\
 name: Try
@@ -50,7 +52,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
     assert line.by is not None
     assert line.by.tolist() == [0.0, 0.0, -0.05]
     assert isinstance(circle, Circle)
-    assert circle.normal.tolist() == [-1.0, 0.0, 0.0]
+    assert circle.turn.axis.tolist() == [-1.0, 0.0, 0.0]
     assert [placed.line for placed in script.steps[1:4]] == [10, 11, 15]
 
 
