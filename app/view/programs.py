@@ -127,7 +127,7 @@ class ProgramsPanel:
     def _draw(self, program: Program | None) -> None:
         """Show what ``program`` would do."""
         span = self._preview.show(program, self._state().tool, ghosts=self._wanted)
-        self._look.value = 0.0
+        self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
         if span > 0.0:
             self._look.max = span
