@@ -102,6 +102,10 @@ STAGES = (
 """Of the pouring demo, as in the paper's figures 9 to 12: the task, and how much of it is done."""
 
 
+UNHURRIED = 0.5
+"""Of full speed, so that no stage is over before it is seen."""
+
+
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
     url = page.page.url.split("/?")[0].rstrip("/")
@@ -126,16 +130,16 @@ def send(arm: Client, text: str) -> None:
     """Have a script planned."""
     parts = [text[at : at + 600] for at in range(0, len(text), 600)]
     for number, part in enumerate(parts, start=1):
-        arm.ask(requests.Program(text=part, more=number < len(parts)))
+        arm.ask(requests.Program(text=part, more=number < len(parts), speed=UNHURRIED))
 
 
-def program(arm: Client, wanted: Callable[[answers.Program], bool]) -> answers.Program:
+def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.Progress:
     """What is told of the program as soon as it is as wanted."""
     while True:
         told = arm.look(answers.State).program
         if told is not None and wanted(told):
             return told
-        if told is not None and told.status in ("refused", "stopped", "failed"):
+        if told is not None and told.status in ("refused", "stopped", "failed", "done"):
             sys.exit(f"The program {told.name} is {told.status}: {told.why}")
         time.sleep(0.02)
 

@@ -184,8 +184,9 @@ class Bench:
     def follow(self, paths: Sequence[Path], name: str) -> None:
         """Go along ``paths``, the first of which begins here. Raises BlockedError."""
         world, fingers = self.world, self.state.gripper_setpoint
-        for path in {id(path): path for path in paths}.values() if world is not None else ():
-            check_clear(path, world, fingers)
+        if world is not None:
+            for path in {id(path): path for path in paths}.values():
+                check_clear(path, world, fingers)
         self.note(
             name, Draft(self.rig.arm, world, self.state, tuple(paths)), self.standing(paths[-1].end)
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from html import escape
 from typing import Any, Protocol
@@ -24,6 +25,9 @@ STEERING = ("Script", "Program", "Look at", "Teach", "Name")
 
 RUNS = ("running", "paused", "blocked")
 """How a program stands that has the arm."""
+
+STEP = 0.1
+"""[s] Between two times to look at."""
 
 MOST_TAUGHT = 200
 
@@ -94,7 +98,7 @@ class ProgramsPanel:
                 "Look at",
                 min=0.0,
                 max=1.0,
-                step=0.01,
+                step=STEP,
                 initial_value=0.0,
                 disabled=True,
                 hint="Seconds of what is previewed, at full speed: the arm as it will stand then",
@@ -130,7 +134,7 @@ class ProgramsPanel:
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
         if span > 0.0:
-            self._look.max = span
+            self._look.max = math.ceil(span / STEP) * STEP
 
     def _order(self) -> None:
         said = self._orders.value

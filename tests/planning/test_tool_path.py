@@ -155,7 +155,7 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
 def off_leg(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
     """[m] How far `p` is from the segment from `a` to `b`."""
     way = b - a
-    share = np.clip((p - a) @ way / max(way @ way, 1e-30), 0.0, 1.0)
+    share = np.clip((p - a) @ way / max(float(way @ way), 1e-30), 0.0, 1.0)
     return math.dist(p, a + share * way)
 
 
