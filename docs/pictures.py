@@ -108,6 +108,8 @@ UNHURRIED = 0.5
 
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
+    # A banner of ours moves the scene down while the picture is old.
+    page.page.set_viewport_size({"width": WINDOW[0], "height": 1100})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
