@@ -108,8 +108,7 @@ UNHURRIED = 0.5
 
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
-    # A banner of ours moves the scene down while the picture is old.
-    page.page.set_viewport_size({"width": WINDOW[0], "height": 1100})
+    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 100})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
@@ -147,7 +146,15 @@ def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.
 
 
 def tile(page: ViserPage) -> NDArray[np.uint8]:
-    """The middle of the scene."""
+    """The middle of the scene, once the page has found room for all of it again."""
+
+    def fits() -> bool:
+        _, top, _, height = page.scene_rectangle()
+        size = page.page.viewport_size
+        return size is not None and TILE[1] <= height <= size["height"] - top
+
+    # A banner of ours moves the scene down while the picture is old.
+    page.wait_until(fits, "the scene to fit its window", seconds=60.0)
     left, top, width, height = page.scene_rectangle()
     picture = page.picture()
     across, down = TILE
