@@ -103,8 +103,13 @@ STAGES = (
 """Of the pouring demo, as in the paper's figures 9 to 12: the task, and how much of it is done."""
 
 
+UNHURRIED = 0.5
+"""Of full speed, so that no stage is over before it is seen."""
+
+
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
+    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 100})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
@@ -147,22 +152,30 @@ def send(arm: Client, text: str) -> None:
     """Have a script planned."""
     parts = [text[at : at + 600] for at in range(0, len(text), 600)]
     for number, part in enumerate(parts, start=1):
-        arm.ask(requests.Program(text=part, more=number < len(parts)))
+        arm.ask(requests.Program(text=part, more=number < len(parts), speed=UNHURRIED))
 
 
-def program(arm: Client, wanted: Callable[[answers.Program], bool]) -> answers.Program:
+def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.Progress:
     """What is told of the program as soon as it is as wanted."""
     while True:
         told = arm.look(answers.State).program
         if told is not None and wanted(told):
             return told
-        if told is not None and told.status in ("refused", "stopped", "failed"):
+        if told is not None and told.status in ("refused", "stopped", "failed", "done"):
             sys.exit(f"The program {told.name} is {told.status}: {told.why}")
         time.sleep(0.02)
 
 
 def tile(page: ViserPage) -> NDArray[np.uint8]:
-    """The middle of the scene."""
+    """The middle of the scene, once the page has found room for all of it again."""
+
+    def fits() -> bool:
+        _, top, _, height = page.scene_rectangle()
+        size = page.page.viewport_size
+        return size is not None and TILE[1] <= height <= size["height"] - top
+
+    # A banner of ours moves the scene down while the picture is old.
+    page.wait_until(fits, "the scene to fit its window", seconds=60.0)
     left, top, width, height = page.scene_rectangle()
     picture = page.picture()
     across, down = TILE
