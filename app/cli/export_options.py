@@ -21,7 +21,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pose",
-        type=_numbers,
+        type=joint_values,
         default=(),
         metavar="Q",
         help="values of the driven joints in rad or m with commas between, gripper last, such as "
@@ -40,7 +40,8 @@ def _listed() -> str:
     return "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def joint_values(text: str) -> tuple[float, ...]:
+    """Of a list with commas between [rad, m]."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
