@@ -57,6 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli import programs
 
             return programs.run(options) if options.command == "run" else programs.demo(options)
+        if options.command == "export" and options.format == "html":
+            from app.cli.page import write_page
+
+            return write_page(options)
         if options.command == "export":
             from app.cli.export import export
 

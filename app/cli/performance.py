@@ -90,6 +90,17 @@ def played(plan: Planned) -> Rehearsal:
     return rehearsal
 
 
+def chosen(
+    run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path
+) -> Performance:
+    """What a person chose: a script or a demo by its name, a table, or else a pose."""
+    if run is not None:
+        return of_script(run, urdf)
+    if trajectory is not None:
+        return of_trajectory(trajectory, urdf)
+    return of_pose(pose, urdf)
+
+
 def of_script(name: str, urdf: Path) -> Performance:
     """Of a demo or of a script in a file, with a bar. Raises InputError with what is wrong."""
     text = DEMOS[name]().text if name in DEMOS else text_of(Path(name))

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.cli.assembly import described
-from app.cli.performance import Performance, of_pose, of_script, of_trajectory
+from app.cli.performance import Performance, chosen
 from app.cli.progress import progress
 from app.control.session import Session
 from app.control.state import State
@@ -56,7 +56,7 @@ def render(options: argparse.Namespace) -> int:
     if kind == ".mp4":
         check_filmable(options.size, options.fps)
     shot = _Shot(Preset[options.camera.upper()], options.size, options.theme.title())
-    shown = performance(options)
+    shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
         stage = Stage(shown.model, shown.session, load_props())
@@ -66,15 +66,6 @@ def render(options: argparse.Namespace) -> int:
         _film(path, shown, shot, options.fps, options.urdf)
     print(f"{path}: {path.stat().st_size} bytes")
     return 0
-
-
-def performance(options: argparse.Namespace) -> Performance:
-    """What is to be shown."""
-    if options.run is not None:
-        return of_script(options.run, options.urdf)
-    if options.trajectory is not None:
-        return of_trajectory(options.trajectory, options.urdf)
-    return of_pose(options.pose, options.urdf)
 
 
 class _Shot(NamedTuple):

@@ -32,7 +32,18 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         help="values of the driven joints in rad with commas between, gripper last, such as "
         "--pose=0,-1.2,1.4,0.1,0,0.2 (default: the home posture)",
     )
-    add_run_choice(shown)
+    shown.add_argument(
+        "--trajectory",
+        type=Path,
+        metavar="FILE",
+        help="a motion; .csv with the columns t,theta1,...,theta5,gripper or .json with lists of "
+        "these names",
+    )
+    shown.add_argument(
+        "--run",
+        metavar="SCRIPT",
+        help="circle, pour or the file of a script, whose run is the motion",
+    )
     parser.add_argument(
         "--at",
         type=float,
@@ -59,22 +70,6 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         default=URDF_PATH,
         metavar="FILE",
         help="another arm: pan, three parallel axes, roll (default: the Katana450)",
-    )
-
-
-def add_run_choice(group: argparse._MutuallyExclusiveGroup) -> None:
-    """The ways to say which motion is meant."""
-    group.add_argument(
-        "--trajectory",
-        type=Path,
-        metavar="FILE",
-        help="a motion; .csv with the columns t,theta1,...,theta5,gripper or .json with lists of "
-        "these names",
-    )
-    group.add_argument(
-        "--run",
-        metavar="SCRIPT",
-        help="circle, pour or the file of a script, whose run is the motion",
     )
 
 

@@ -136,7 +136,10 @@ def _with_leaders(path: Path, mechanism: Mechanism) -> Mechanism:
 
 
 def shapes_of(visual: Visual) -> Sequence[Shape]:
-    """Its surfaces, one a material, in the frame of its body; RobotDescriptionError if it is none."""
+    """Its surfaces, one a material, in the frame of its body.
+
+    Raises RobotDescriptionError if it is no mesh.
+    """
     plain = Material(
         "plain {:02x}{:02x}{:02x}".format(*visual.colour),
         (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),

@@ -30,9 +30,7 @@ def check_filmable(size: tuple[int, int], fps: float) -> None:
             "pip install 'katana450[report]'"
         )
     if any(side % 2 for side in size):
-        raise InputError(
-            f"A film has an even number of pixels a side, not {size[0]}x{size[1]}."
-        )
+        raise InputError(f"A film has an even number of pixels a side, not {size[0]}x{size[1]}.")
     if not SLOWEST <= fps <= FASTEST:
         raise InputError(f"A film has {SLOWEST:g} to {FASTEST:g} pictures a second, not {fps:g}.")
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from app.render import room
 from app.render.camera import Camera
-from app.render.light import Light, reaching
+from app.render.light import TILE, Light, reaching
 from app.render.scene import Bools, Floats, Ints, Item, Scene
 from app.render.shading import Stuff, developed, shaded
 from app.render.sight import FLOOR, NOWHERE, Sight, look, through
@@ -96,6 +96,10 @@ class _Take:
         rough = np.flatnonzero(self._ends(sight, shown))
         if len(rough):
             colours[rough] = self._finer(rough, rows, columns, sight, light)
+        # The background has so little contrast that its steps would show.
+        plain = sight.item == NOWHERE
+        finer = (TILE[rows[plain] % 4, columns[plain] % 4] - 7.5) / (16.0 * 255.0)
+        colours[plain] = np.clip(colours[plain] + finer[:, None], 0.0, 1.0)
         return Picture(
             np.rint(255.0 * colours).astype(np.uint8).reshape(height, width, 3),
             shown.astype(np.int32).reshape(height, width),
@@ -163,11 +167,9 @@ class _Take:
             seen = self._sight(x, y)
             found, _ = self._light(seen, self._near(which, seen, sight, light), y)
             total += developed(found)
-        return total / len(CORNERS)
+        return total / np.float32(len(CORNERS))
 
-    def _near(
-        self, which: npt.NDArray[np.intp], seen: Sight, sight: Sight, light: Light
-    ) -> Light:
+    def _near(self, which: npt.NDArray[np.intp], seen: Sight, sight: Sight, light: Light) -> Light:
         """The light of the pixel round each whose surface is most like what is seen."""
         width, height = self._camera.size
         row, column = np.divmod(which, width)

@@ -42,9 +42,9 @@ def floor(theme: Theme, camera: Camera, sight: Sight, light: Light, behind: Floa
         colour += share * (np.array(line, dtype=np.float32) / 255.0 - colour)
     dark = (1.0 - theme.shadow * (1.0 - light.key)) * (1.0 - CORNERS * (1.0 - light.sky))
     shown = light_of(colour * dark[:, None])
-    across = np.hypot(*(sight.points[:, :2] - np.array(camera.position[:2])).T)
-    left = np.clip(1.0 - across / FADES, 0.0, 1.0)[:, None]
-    return (behind + left * (shown - behind)).astype(np.float32)
+    east, north = (sight.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
+    left = np.clip(1.0 - np.hypot(east, north) / FADES, 0.0, 1.0)[:, None]
+    return np.asarray(behind + left * (shown - behind), dtype=np.float32)
 
 
 CORNERS = 0.45

@@ -19,7 +19,7 @@ Bools = npt.NDArray[np.bool_]
 
 
 class Item(NamedTuple):
-    """A shape where it is: (4, 4) of its frame in the base frame [m]. name: of the link or thing."""
+    """name: of the link or thing. T: (4, 4) of the frame of its shape in the base frame [m]."""
 
     name: str
     shape: Shape
@@ -86,7 +86,8 @@ def light_of(srgb: npt.NDArray[Any]) -> Floats:
 def unit(v: npt.NDArray[Any]) -> Floats:
     """Vectors (..., 3) of length 1; 0 stays 0."""
     length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
-    return np.divide(v, length, out=np.zeros_like(v), where=length > 0.0).astype(np.float32)
+    found = np.divide(v, length, out=np.zeros_like(v), where=length > 0.0)
+    return np.asarray(found, dtype=np.float32)
 
 
 def smooth(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> FloatArray:

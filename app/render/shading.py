@@ -39,8 +39,8 @@ class Stuff(NamedTuple):
 DIELECTRIC = 0.04
 """What anything but metal mirrors, looked at straight."""
 
-ZENITH, HORIZON = 1.05, 0.72
-"""How bright the sky is, as a white surface."""
+ZENITH, HORIZON = 1.35, 1.05
+"""How bright the sky is that surfaces mirror, as a white surface."""
 
 BOUNCED = 0.35
 """Of the sky, from below and from what hides it."""
@@ -55,7 +55,7 @@ BOXES = (
 def shaded(
     stuff: Stuff, normals: Floats, directions: Floats, light: Light, lamps: tuple[Lamp, ...]
 ) -> Floats:
-    """(n, 3) light. directions: (n, 3) of the rays that see it. Of the lamps the first has shadows."""
+    """(n, 3) light. directions: (n, 3) of the rays that see it. The first lamp has shadows."""
     view = -directions
     facing = np.maximum(_dot(normals, view), 1e-3)
     metal = stuff.metallic[:, None]
@@ -74,7 +74,7 @@ def shaded(
         total += sent * towards[:, None] * each.colour
     sky, up = light.sky, 0.5 + 0.5 * normals[:, 2]
     dome = sky * (BOUNCED + (0.92 - BOUNCED) * up) + (1.0 - sky) * 0.5 * BOUNCED
-    mirrored = 2.0 * facing[:, None] * normals - view
+    mirrored = np.asarray(2.0 * facing[:, None] * normals - view, dtype=np.float32)
     seen = _room(mirrored, stuff.rough) * (0.25 + 0.75 * sky)
     share, rest = _karis(stuff.rough, facing)
     total += SKY * (flat * dome[:, None] + (f0 * share[:, None] + rest[:, None]) * seen[:, None])
@@ -90,7 +90,8 @@ def _microfacets(half: Floats, facing: Floats, towards: Floats, alpha: Floats) -
     square = alpha * alpha
     spread = square / (half * half * (square - 1.0) + 1.0) ** 2
     hidden = (1.0 - alpha) * 2.0 * towards * facing + alpha * (towards + facing)
-    return np.minimum(spread * 0.5 / np.maximum(hidden, 1e-3), BRIGHTEST)
+    found = np.minimum(spread * 0.5 / np.maximum(hidden, 1e-3), BRIGHTEST)
+    return np.asarray(found, dtype=np.float32)
 
 
 BRIGHTEST = 6.0
@@ -107,7 +108,7 @@ def _room(r: Floats, rough: Floats) -> Floats:
         wide = sharp / (1.0 + 6.0 * rough * rough)
         along = r @ unit(np.array(towards)) - 1.0
         found = found + bright * (wide / sharp) ** 0.5 * np.exp(wide * along)
-    return found
+    return np.asarray(found, dtype=np.float32)
 
 
 def _karis(rough: Floats, facing: Floats) -> tuple[Floats, Floats]:
@@ -117,7 +118,7 @@ def _karis(rough: Floats, facing: Floats) -> tuple[Floats, Floats]:
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("ni,ni->n", a, b)
+    return np.asarray(np.einsum("ni,ni->n", a, b), dtype=np.float32)
 
 
 def developed(light: Floats) -> Floats:
@@ -129,4 +130,3 @@ def developed(light: Floats) -> Floats:
 
 
 SHOULDER = 0.75
-

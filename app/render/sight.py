@@ -42,8 +42,14 @@ class Sight:
 
     def some(self, which: Bools) -> Sight:
         """Of the rays alone that ``which`` (n,) says."""
-        parts = self.directions, self.distance, self.points, self.normals, self.flat, self.item
-        return Sight(*(part[which] for part in parts))
+        return Sight(
+            self.directions[which],
+            self.distance[which],
+            self.points[which],
+            self.normals[which],
+            self.flat[which],
+            self.item[which],
+        )
 
 
 def look(scene: Scene, tracer: Tracer, eye: Floats, directions: Floats, floor: float) -> Sight:
@@ -54,7 +60,7 @@ def look(scene: Scene, tracer: Tracer, eye: Floats, directions: Floats, floor: f
     np.divide(floor - eye[2], down, out=to_floor, where=down < -STEEPNESS)
     nearest = np.minimum(met.distance, AWAY)
     on_floor = (to_floor > 0.0) & (to_floor < nearest)
-    distance = np.where(on_floor, to_floor, nearest)
+    distance = np.where(on_floor, to_floor, nearest).astype(np.float32)
     hit = np.flatnonzero(met.face != NOTHING)
     normals = np.zeros_like(directions)
     normals[:, 2] = 1.0
@@ -62,7 +68,7 @@ def look(scene: Scene, tracer: Tracer, eye: Floats, directions: Floats, floor: f
     normals[hit], flat[hit] = _normals(scene, met, directions, hit)
     item = np.where(on_floor, FLOOR, NOWHERE).astype(np.int32)
     item[hit] = scene.item[met.face[hit]]
-    points = eye + distance[:, None] * directions
+    points = _ends(eye, distance, directions)
     return Sight(directions, distance, points, normals, flat, item)
 
 
@@ -74,12 +80,16 @@ def through(
     hit = np.flatnonzero(met.distance < before.distance)
     directions, distance = before.directions[hit], met.distance[hit]
     normals, flat = _normals(scene, met, before.directions, hit)
-    points = eye + distance[:, None] * directions
+    points = _ends(eye, distance, directions)
     return hit, Sight(directions, distance, points, normals, flat, scene.item[met.face[hit]])
 
 
 def _from(eye: Floats, directions: Floats) -> Floats:
     return np.tile(eye, (len(directions), 1))
+
+
+def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
+    return np.asarray(eye + distance[:, None] * directions, dtype=np.float32)
 
 
 def _normals(

@@ -22,7 +22,7 @@ from app.robot.conduit import Stretch
 from app.robot.model import RobotModel
 from app.robot.props import Props
 from app.robot.visual import Visual
-from app.view.conduit import PITCH, RUBBER, poses, ring
+from app.view.conduit import PITCH, poses, ring
 from app.view.things import COLOUR, form
 
 CONDUIT, TABLE = "conduit", "table"

@@ -94,9 +94,7 @@ def stage_pictures(
             items += _lines(program, model, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
-        found[f"{name}.png"] = png(
-            picture(items, stage.water(state), camera, LIGHT, RAYS).pixels
-        )
+        found[f"{name}.png"] = png(picture(items, stage.water(state), camera, LIGHT, RAYS).pixels)
     return found
 
 

@@ -42,9 +42,7 @@ def furnish(server: viser.ViserServer) -> None:
     scene.add_light_directional(
         "/light/key", intensity=1.7, cast_shadow=True, color=(255, 250, 242), position=KEY
     )
-    scene.add_light_directional(
-        "/light/rim", intensity=0.9, color=(226, 238, 255), position=RIM
-    )
+    scene.add_light_directional("/light/rim", intensity=0.9, color=(226, 238, 255), position=RIM)
     scene.add_light_directional("/light/fill", intensity=0.35, position=FILL)
     scene.configure_environment_map("studio", environment_intensity=0.45)
     _paint(scene, LIGHT)
