@@ -22,13 +22,13 @@ from app.robot.model import load
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def katana450(*options: str) -> subprocess.CompletedProcess[str]:
+def katana450(*options: str, seconds: float = 60.0) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "app", *options],
         capture_output=True,
         text=True,
         cwd=ROOT,
-        timeout=60,
+        timeout=seconds,
         check=False,
     )
 
@@ -101,7 +101,7 @@ def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
 
 def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     """Initial configuration, grasping, approaching, emptying: its figures 9 to 12."""
-    done = katana450("demo", "pour", "--headless", "--report", str(tmp_path))
+    done = katana450("demo", "pour", "--headless", "--report", str(tmp_path), seconds=150.0)
     assert done.returncode == 0, done.stderr
     shown = []
     for name in ("initial", "grasping", "approaching", "emptying"):
