@@ -86,7 +86,7 @@ class _Take:
     def picture(self) -> Picture:
         width, height = self._camera.size
         rows, columns = np.divmod(np.arange(width * height, dtype=np.int32), width)
-        x, y = columns + np.float32(0.5), rows + np.float32(0.5)
+        x, y = _spots(columns, 0.5), _spots(rows, 0.5)
         sight = self._sight(x, y)
         towards = room.LAMPS[0].towards
         light = reaching(sight, self._tracer, towards, (width, height), self._rays)
@@ -162,8 +162,7 @@ class _Take:
         """(k, 3) colours of pixels, each looked at four times; lit as the likest spot near by."""
         total = np.zeros((len(which), 3), dtype=np.float32)
         for right, down in CORNERS:
-            x = columns[which] + np.float32(right)
-            y = rows[which] + np.float32(down)
+            x, y = _spots(columns[which], right), _spots(rows[which], down)
             seen = self._sight(x, y)
             found, _ = self._light(seen, self._near(which, seen, sight, light), y)
             total += developed(found)
@@ -192,6 +191,10 @@ TURN = 0.02
 
 OTHER = 1.0
 """[m] The same of two items."""
+
+
+def _spots(pixels: Ints, within: float) -> Floats:
+    return np.add(pixels, within, dtype=np.float32)
 
 
 def _surface(scene: Scene, sight: Sight, light: Light) -> Floats:

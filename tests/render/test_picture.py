@@ -63,7 +63,7 @@ def test_the_arm_covers_what_pillow_says(
 ) -> None:
     """Another program's projection of another reader's meshes, posed by that reader."""
     view: Viewpoint = camera(katana)
-    at = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))  # type: ignore[arg-type]
+    at = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))
     scene = Scene.of(workshop.stage.arm(workshop.session.begin(np.array(pose[:5]), pose[5], 0.0)))
     # Through the middle of each pixel, as in a picture, but without its light.
     y, x = np.mgrid[0.5:SIZE, 0.5:SIZE].reshape(2, -1).astype(np.float32)
