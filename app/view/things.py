@@ -129,6 +129,14 @@ class ThingNodes:
 
 def _plain(thing: Thing) -> bytes:
     """A GLB file of its form."""
+    mesh = form(thing)
+    mesh.visual.face_colors = (*COLOUR, 255)
+    glb: Any = mesh.export(file_type="glb", include_normals=True)
+    return bytes(glb)
+
+
+def form(thing: Thing) -> Any:
+    """A trimesh of it on z = 0 of its own frame [m]."""
     match thing.form:
         case Form.BOX:
             mesh = trimesh.creation.box(thing.size)
@@ -138,6 +146,4 @@ def _plain(thing: Thing) -> bytes:
         case _:
             mesh = trimesh.creation.icosphere(subdivisions=3, radius=thing.size[0])
     mesh.apply_translation((0.0, 0.0, 0.5 * thing.height))
-    mesh.visual.face_colors = (*COLOUR, 255)
-    glb: Any = mesh.export(file_type="glb", include_normals=True)
-    return bytes(glb)
+    return mesh
