@@ -13,8 +13,8 @@ from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.planning.path import point_derivatives
 from app.planning.tool_path import ToolPath
-from app.programs.handling import POURING
 from app.programs.order import Go
+from app.programs.pouring import POURING
 from app.programs.program import Program
 from app.render.camera import Camera
 from app.render.line import tube
