@@ -104,6 +104,14 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     why: str = ""
 
 
+class Value(msgspec.Struct, frozen=True, kw_only=True):
+    """What a field of a node of the VRML world is: a number, or as many as its type has."""
+
+    node: str
+    field: str
+    value: float | Numbers
+
+
 class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
@@ -121,6 +129,7 @@ class State(Answer, frozen=True, kw_only=True):
         windows: how many pages and programs are open.
         water: of the cup; null where there is none.
         program: the one that is planned or runs, or ran last.
+        fields: of the VRML world, for who watches some.
     """
 
     t: float
@@ -146,6 +155,7 @@ class State(Answer, frozen=True, kw_only=True):
     windows: int
     water: Water | None
     program: Progress | None = None
+    fields: tuple[Value, ...] = ()
 
 
 class Arm(Answer, frozen=True, kw_only=True):
@@ -248,7 +258,50 @@ class Things(Answer, frozen=True, kw_only=True):
     things: list[Thing]
 
 
-AnyAnswer = Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop | Things
+class Values(Answer, frozen=True, kw_only=True):
+    """What the fields are that were asked for, in that order."""
+
+    values: list[Value]
+
+
+class Field(msgspec.Struct, frozen=True, kw_only=True):
+    """One of a node's; ``type`` as VRML97 calls it. ``settable``: by ``set``, else only read."""
+
+    field: str
+    type: str
+    value: float | Numbers
+    settable: bool
+
+
+class Node(msgspec.Struct, frozen=True, kw_only=True):
+    """A node of the VRML world by its DEF name, and what it is of: a joint, link or thing."""
+
+    node: str
+    kind: str
+    of: str
+    fields: list[Field]
+
+
+class World(Answer, frozen=True, kw_only=True):
+    """All that can be set and got by name. Lengths in m, angles in rad, z up."""
+
+    nodes: list[Node]
+
+
+AnyAnswer = (
+    Welcome
+    | Done
+    | Refused
+    | Echo
+    | State
+    | Arm
+    | Ledger
+    | Branches
+    | Loop
+    | Things
+    | Values
+    | World
+)
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
 

@@ -47,6 +47,8 @@ Matrix4 = tuple[Row, Row, Row, Row]
 
 Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
 Name = Annotated[str, Meta(min_length=1, max_length=40)]
+FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
+NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
 
 
 class Frame(Enum):
@@ -273,6 +275,42 @@ class Fill(Request, frozen=True, kw_only=True):
     ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
 
+class Named(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A field of a node of the VRML world, by its DEF name."""
+
+    node: NodeName
+    field: NodeName
+
+
+class Setting(Named, frozen=True, kw_only=True):
+    """What such a field is to be; null for how it is made."""
+
+    value: FieldValue
+
+
+class Set(Request, frozen=True, kw_only=True):
+    """Set a field of the VRML world by the DEF name of its node, as VR Sink does; ``more`` at once.
+
+    Either all are set or, where one cannot be, none. The names are those of `katana450 export
+    vrml`; ``look`` at ``world`` lists them. A joint is never put anywhere: its ``rotation`` is an
+    order to go there, by the rules of ``joints``. ``value`` null: a colour, a transparency or a
+    choice as it is made.
+    """
+
+    node: NodeName
+    field: NodeName
+    value: FieldValue
+    more: tuple[Setting, ...] = ()
+
+
+class Get(Request, frozen=True, kw_only=True):
+    """Tell what a field of the VRML world is now, as VR Source does, and ``more`` of them."""
+
+    node: NodeName
+    field: NodeName
+    more: tuple[Named, ...] = ()
+
+
 class Order(Enum):
     """What a program can be told."""
 
@@ -307,16 +345,20 @@ class Steer(Request, frozen=True, kw_only=True):
 
 
 class Watch(Request, frozen=True, kw_only=True):
-    """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less."""
+    """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less.
+
+    ``fields``: of the VRML world, whose values each state is to bring.
+    """
 
     hz: Annotated[float, Meta(ge=0.0, le=MOST_STATES)]
+    fields: tuple[Named, ...] = ()
 
 
 class Look(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
-    the things around it."""
+    the things around it, the VRML world."""
 
-    at: Literal["state", "arm", "ledger", "branches", "loop", "things"] = "state"
+    at: Literal["state", "arm", "ledger", "branches", "loop", "things", "world"] = "state"
 
 
 AnyRequest = (
@@ -351,6 +393,8 @@ AnyRequest = (
     | Place
     | Remove
     | Fill
+    | Set
+    | Get
     | Program
     | Steer
     | Watch

@@ -19,6 +19,7 @@ READABLE = {
     "branches": answers.Branches,
     "loop": answers.Loop,
     "things": answers.Things,
+    "world": answers.World,
 }
 
 

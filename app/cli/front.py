@@ -140,7 +140,9 @@ def _serve(
         from app.cli.assembly import described
         from app.exchange.reachability_file import load_map
         from app.exchange.scripts import Scripts
+        from app.exchange.urdf_mechanism import load_mechanism
         from app.gateway.motion import Motion
+        from app.gateway.nodes import Nodes, body_of
         from app.runtime.link import FrontEnd
         from app.runtime.navigator import Navigator
         from app.view.view import View
@@ -160,7 +162,9 @@ def _serve(
             (gateway.steering, Scripts(settings.programs)),
         )
         navigator.tell = gateway.announce
-        gateway.attach(Motion(model, session, link, navigator, view.let_go))
+        mechanism, _ = load_mechanism(robot[0])
+        nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
+        gateway.attach(Motion(model, session, link, navigator, nodes, view.let_go))
         link.start()
         view.start()
         telling.send(READY)

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.control.state import Finding, Reason, State, Target
-from app.geometry.arrays import FloatArray
+import numpy as np
+
+from app.control.commands import Shift
+from app.control.state import Finding, JointTarget, Reason, State, Target
+from app.control.things import Thing
+from app.geometry.arrays import FloatArray, frozen
 
 
 def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]) -> State:
@@ -37,3 +41,35 @@ def leaving(state: State) -> State:
     if state.following is None:
         return state
     return replace(state, following=replace(state.following, leaving=True))
+
+
+def turned(state: State, values: tuple[tuple[int, float], ...]) -> JointTarget:
+    """Some axes, counted from 0, to other angles [rad], the rest to where they were going."""
+    q = np.array(state.goal)
+    for axis, value in values:
+        q[axis] = value
+    return JointTarget(frozen(q))
+
+
+def removed(state: State, name: str) -> State:
+    """Without the thing of that name, and what it looked like; what is held stays."""
+    things = tuple(each for each in state.things if each.held or each.name != name)
+    if any(each.name == name for each in things):
+        return state
+    return replace(state, things=things, looks=state.looks.without(name))
+
+
+def shifted(state: State, shift: Shift) -> State:
+    """With the thing elsewhere, unless it is held."""
+
+    def there(thing: Thing) -> Thing:
+        if thing.name != shift.name or thing.held:
+            return thing
+        T = np.array(thing.T)
+        if shift.position is not None:
+            T[:3, 3] = shift.position
+        if shift.R is not None:
+            T[:3, :3] = shift.R
+        return replace(thing, T=T)
+
+    return replace(state, things=tuple(map(there, state.things)))

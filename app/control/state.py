@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from app.control.following import Following
+from app.control.looks import ALL_AS_MADE, Looks
 from app.control.pouring import Poured
 from app.control.things import Thing
 from app.geometry.arrays import FloatArray
@@ -153,6 +154,7 @@ class State:
         things: what stands around or is held, and can be put elsewhere.
         grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
         poured: the water of the cup; None where there is none.
+        looks: how links and things are shown.
         let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
         following: the plan the arm is on and where on it, until it is told to go elsewhere; None
             when it is on none.
@@ -182,6 +184,7 @@ class State:
     things: tuple[Thing, ...] = ()
     grip: float | None = None
     poured: Poured | None = None
+    looks: Looks = ALL_AS_MADE
 
     @property
     def status(self) -> Status:

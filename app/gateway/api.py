@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 ROOT = f"/api/v{requests.VERSION}"
 
-QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things")
+QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world")
 """Each is a path of its own."""
 
 PROGRAM = re.compile(r"[A-Za-z0-9_-]{8,64}")

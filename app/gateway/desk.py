@@ -44,6 +44,11 @@ class Desk:
                 return answers.Echo(n=n)
             case requests.Look(at=at):
                 return self.look(at)
+            case requests.Get(node=node, field=field, more=more):
+                arm, first = hub.present(), requests.Named(node=node, field=field)
+                return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
+        if isinstance(request, requests.Set):
+            return answers.Done(ticket=hub.move(window, self._setting(request)))
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
@@ -113,6 +118,12 @@ class Desk:
                 return cmd.TakeBranch(Branch(shoulder, elbow))
         return None
 
+    def _setting(self, asked: requests.Set) -> cmd.Command:
+        """What sets fields of the VRML world, all at once."""
+        arm = self._hub.present()
+        first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
+        return arm.nodes.command(arm.state, (first, *asked.more))
+
     def _thing(self, asked: requests.Place) -> Thing:
         """What is to be put where; what is not said of it stays as it is."""
         T = np.array(asked.T)
@@ -163,6 +174,9 @@ class Desk:
                 return answers.Branches(choices=[tell.choice(each) for each in choices])
             case "things":
                 return tell.things(hub)
+            case "world":
+                arm = hub.present()
+                return arm.nodes.world(arm.state)
             case "loop":
                 return tell.loop(hub.present().lateness)
         return tell.state(hub)

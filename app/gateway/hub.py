@@ -22,6 +22,7 @@ from app.control.things import Surroundings
 from app.errors import LeaseError
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
+from app.gateway.nodes import Nodes
 from app.gateway.performer import Performer
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
@@ -45,6 +46,9 @@ class Arm(Protocol):
 
     @property
     def model(self) -> RobotModel: ...
+
+    @property
+    def nodes(self) -> Nodes: ...
 
     @property
     def snapshot(self) -> Snapshot: ...

@@ -15,6 +15,7 @@ from app.control.session import Session
 from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import InputError
+from app.gateway.nodes import Nodes
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.programs.bench import Rig
@@ -34,10 +35,13 @@ class Motion:
         session: Session,
         link: FrontEnd,
         navigator: Navigator,
+        nodes: Nodes,
         let_go: Callable[[], None],
     ) -> None:
-        """``let_go`` takes the handles of the view out of every hand."""
+        """``nodes``: all that has a name in its VRML world. ``let_go`` takes the handles of the
+        view out of every hand."""
         self.model = model
+        self.nodes = nodes
         self._session = session
         self._link = link
         self._board = link.board

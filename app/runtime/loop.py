@@ -97,4 +97,5 @@ def _differs(a: State, b: State) -> bool:
         or a.findings != b.findings
         or a.things is not b.things
         or a.poured is not b.poured
+        or a.looks is not b.looks
     )

@@ -85,21 +85,30 @@ class ArmNodes(FrameTree):
 
     def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
         super().__init__(server, "/arm", model)
-        for body in model.bodies:
-            for number, visual in enumerate(body.visuals):
-                name = f"{self.path[body.name]}/shape{number}"
-                if visual.glb is not None:
-                    server.scene.add_glb(
-                        name,
-                        visual.glb.read_bytes(),
-                        wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
-                        position=visual.T_body_visual[:3, 3],
-                    )
-                else:
-                    mesh = visual.mesh
-                    server.scene.add_mesh_simple(
-                        name, mesh.vertices, mesh.faces, color=visual.colour, flat_shading=True
-                    )
+        self.shapes = {
+            body.name: [
+                _as_made(server, f"{self.path[body.name]}/shape{number}", visual)
+                for number, visual in enumerate(body.visuals)
+            ]
+            for body in model.bodies
+        }
+        """Of each link, as they are made."""
+
+
+def _as_made(
+    server: viser.ViserServer, name: str, visual: Visual
+) -> viser.GlbHandle | viser.MeshHandle:
+    if visual.glb is None:
+        mesh = visual.mesh
+        return server.scene.add_mesh_simple(
+            name, mesh.vertices, mesh.faces, color=visual.colour, flat_shading=True
+        )
+    return server.scene.add_glb(
+        name,
+        visual.glb.read_bytes(),
+        wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
+        position=visual.T_body_visual[:3, 3],
+    )
 
 
 COAT = 1e-3

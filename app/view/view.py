@@ -28,6 +28,7 @@ from app.view.conduit import Conduits
 from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
+from app.view.paint import PaintNodes
 from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
@@ -94,6 +95,7 @@ class View:
         self._things = ThingNodes(server, props, session.surroundings, self._put_from_gizmo)
         state = board.snapshot.state
         self._arm = ArmNodes(server, model)
+        self._paint = PaintNodes(server, model, self._arm, self._things, session.surroundings)
         self._conduits = Conduits(server, model, self._arm)
         self._tint = Tint(server, model, self._arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
@@ -178,6 +180,7 @@ class View:
             self._arm.move(angles)
             self._conduits.move(angles)
             self._things.follow(state)
+            self._paint.follow(state)
             self._show_water(state)
             self._tint.follow(state)
             self._show_goal(state)

@@ -21,6 +21,7 @@ from app.errors import LeaseError
 from app.gateway import tell
 from app.gateway.door import Visitor
 from app.gateway.hub import TICK, Hub, Window, key_of
+from app.gateway.nodes import Nodes
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.programs.bench import Rig
@@ -37,6 +38,7 @@ class FakeArm:
 
     # What a hub does not ask for.
     model: RobotModel
+    nodes: Nodes
     snapshot: Snapshot
     ready: FloatArray
     lateness: Lateness
