@@ -62,8 +62,8 @@ raises `RefusedError`, whose text says why and what to do.
 
 [examples/octave](../examples/octave) has the few functions it takes (`katana_open`, `katana_say`,
 `katana_hear`, `katana_go`), kinematics in m-code, and the paper's circle streamed as joint angles.
-LabVIEW and Simulink connect alike: a TCP client block to the port of `--lines`, a JSON object and a
-line feed each way.
+`circle_by_name.m` sets rotations of the VRML world by DEF name instead, as VR Sink does. LabVIEW and
+Simulink connect alike: [simulink](simulink.md).
 
 ## By hand
 

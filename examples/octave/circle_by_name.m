@@ -24,16 +24,8 @@ heard = zeros (places, 5);
 for k = 1:places
   on_circle = [0.150, 0.100 * sin(angles(k)), -0.110 + 0.100 * cos(angles(k))];
   asked(k, :) = katana_ik (on_circle, deg2rad (75 - 13 * cos (angles(k))), 0, tip);
-  katana_set (arm, axes, "rotation", [about, asked(k, :)']);
-  do
-    pause (0.05);
-    rotations = katana_get (arm, axes, "rotation");
-    katana_say (arm, struct ("do", "look"));
-    state = katana_hear (arm, "state");
-    if ischar (state.stopped)
-      error ("katana: %s", state.stopped);
-    end
-  until ! state.moving && norm (rotations(:, 4)' - asked(k, :)) < 1e-3
+  katana_rest (arm, katana_set (arm, axes, "rotation", [about, asked(k, :)']));
+  rotations = katana_get (arm, axes, "rotation");
   heard(k, :) = rotations(:, 4)';
 end
 colour = katana_get (arm, {"upper_arm_link_paint"}, "diffuseColor");
