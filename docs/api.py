@@ -33,7 +33,7 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 | **websocket** `/api/v{version}/socket?name=NAME` | requests up, answers and states down |
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
 | **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` of 8 to 64 letters and digits tells programs apart |
-| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world` | what `look` tells |
+| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `look` tells |
 | **HTTP** `POST /api/v{version}/stop` | STOP |
 | **HTTP** `GET /api/v{version}/openapi.json` | all this as OpenAPI |
 
@@ -93,7 +93,7 @@ def page() -> str:
         _kind(kind, None)
         for kind in (
             *(answers.Finding, answers.Water, answers.Line, answers.Choice, answers.Thing),
-            *(answers.Value, answers.Node, answers.Field),
+            *(answers.Value, answers.Node, answers.Field, answers.Link),
         )
     ]
     return "\n".join(parts)

@@ -122,7 +122,8 @@ class State(Answer, frozen=True, kw_only=True):
         goal: (n,) where it goes, the nearest to what was wished.
         gripper, gripper_goal: the finger joint.
         tool: the frame that ``T`` (4, 4), ``pitch`` and ``roll`` are of; T in the frame {S}.
-        branch: shoulder and elbow. reading: which numbers of a target count.
+        branch: shoulder and elbow. reading: which numbers of a target count. All these are null
+            where there are only joints; see ``arm``.
         status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
         speed: share of full speed.
         holder: name of who holds the arm. stopped: why nothing moves after a STOP.
@@ -139,12 +140,12 @@ class State(Answer, frozen=True, kw_only=True):
     goal: Numbers
     gripper: float
     gripper_goal: float
-    tool: str
-    T: list[Numbers]
-    pitch: float
-    roll: float
-    branch: tuple[str, str]
-    reading: str
+    tool: str | None
+    T: list[Numbers] | None
+    pitch: float | None
+    roll: float | None
+    branch: tuple[str, str] | None
+    reading: str | None
     status: str
     moving: bool
     why: str
@@ -168,7 +169,9 @@ class Arm(Answer, frozen=True, kw_only=True):
         tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one of
             them.
         gripper: closed and open [rad], and its speed [rad/s]; null without fingers.
-        T_base_shoulder: (4, 4) the frame {S} in the base frame.
+        T_base_shoulder: (4, 4) the frame {S} in the base frame; null where there are only joints.
+        slides: (n,) whether each joint slides; its numbers are in m then.
+        joints_only: why no tool can be brought to a pose; empty where one can.
     """
 
     name: str
@@ -180,9 +183,11 @@ class Arm(Answer, frozen=True, kw_only=True):
     jerk: Numbers
     ready: Numbers
     tools: dict[str, list[Numbers]]
-    default_tool: str
+    default_tool: str | None
     gripper: tuple[float, float, float] | None
-    T_base_shoulder: list[Numbers]
+    T_base_shoulder: list[Numbers] | None
+    slides: list[bool]
+    joints_only: str
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True):
@@ -288,6 +293,19 @@ class World(Answer, frozen=True, kw_only=True):
     nodes: list[Node]
 
 
+class Link(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a link is: ``T`` (4, 4) in the base frame."""
+
+    name: str
+    T: list[Numbers]
+
+
+class Links(Answer, frozen=True, kw_only=True):
+    """All of them, the base first."""
+
+    links: list[Link]
+
+
 AnyAnswer = (
     Welcome
     | Done
@@ -301,6 +319,7 @@ AnyAnswer = (
     | Things
     | Values
     | World
+    | Links
 )
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)

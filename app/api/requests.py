@@ -38,6 +38,8 @@ LEAST_SHARE = 0.01
 MOST_STATES = 100
 """States a second that one can be told: as many as there are."""
 
+MOST_JOINTS = 32
+
 Rates = tuple[float, float, float, float, float]
 """Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
 
@@ -154,16 +156,16 @@ class Speed(Request, frozen=True, kw_only=True):
 
 
 class Joint(Request, frozen=True, kw_only=True):
-    """Drive one joint; ``axis`` counts from 1."""
+    """Drive one joint; ``axis`` counts from 1. What slides is told in m."""
 
-    axis: Annotated[int, Meta(ge=1, le=5)]
+    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
     value: float
 
 
 class Joints(Request, frozen=True, kw_only=True):
     """Drive all joints to ``q``; they arrive together, on a straight line in joint space."""
 
-    q: Annotated[list[float], Meta(min_length=1, max_length=16)]
+    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
 
 
 class Servo(Request, frozen=True, kw_only=True):
@@ -173,8 +175,8 @@ class Servo(Request, frozen=True, kw_only=True):
     other comes for 0.2 s the arm comes to rest.
     """
 
-    q: Annotated[list[float], Meta(min_length=1, max_length=16)]
-    qd: Annotated[list[float], Meta(min_length=1, max_length=16)] | None = None
+    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
+    qd: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)] | None = None
 
 
 class Pose(Request, frozen=True, kw_only=True):
@@ -356,9 +358,9 @@ class Watch(Request, frozen=True, kw_only=True):
 
 class Look(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
-    the things around it, the VRML world."""
+    the things around it, the VRML world, where its links are."""
 
-    at: Literal["state", "arm", "ledger", "branches", "loop", "things", "world"] = "state"
+    at: Literal["state", "arm", "ledger", "branches", "loop", "things", "world", "links"] = "state"
 
 
 AnyRequest = (

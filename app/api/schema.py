@@ -20,6 +20,7 @@ READABLE = {
     "loop": answers.Loop,
     "things": answers.Things,
     "world": answers.World,
+    "links": answers.Links,
 }
 
 

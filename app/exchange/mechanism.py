@@ -78,6 +78,7 @@ class Joint:
         lower, upper: limits [rad] or [m], infinite where there are none.
         leader: the joint whose value it follows, by its own name when it is driven itself.
         factor, offset: value = factor * leader + offset.
+        speed: the most of it [rad/s] or [m/s], infinite where none is named.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Joint:
     leader: str
     factor: float = 1.0
     offset: float = 0.0
+    speed: float = math.inf
 
     def motion(self, value: float) -> FloatArray:
         """(4, 4) that the joint adds at ``value`` of its own."""

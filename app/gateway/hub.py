@@ -20,6 +20,7 @@ from app.control.pouring import Pouring
 from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import LeaseError
+from app.exchange.machine import Machine
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
 from app.gateway.nodes import Nodes
@@ -45,7 +46,10 @@ class Arm(Protocol):
     """What the gateway asks of the arm; ``Motion`` is one."""
 
     @property
-    def model(self) -> RobotModel: ...
+    def model(self) -> RobotModel | Machine: ...
+
+    @property
+    def robot(self) -> RobotModel: ...
 
     @property
     def nodes(self) -> Nodes: ...

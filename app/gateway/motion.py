@@ -9,12 +9,14 @@ import numpy as np
 from app.api.requests import Rates
 from app.control import commands as cmd
 from app.control.choices import Choice
+from app.control.joint_session import JointSession
 from app.control.ledger import Entry
 from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import InputError
+from app.exchange.machine import Machine
 from app.gateway.nodes import Nodes
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
@@ -23,6 +25,7 @@ from app.robot.model import RobotModel
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.link import FrontEnd
+from app.runtime.mailbox import CommandSink
 from app.runtime.navigator import Navigator
 
 
@@ -31,21 +34,22 @@ class Motion:
 
     def __init__(
         self,
-        model: RobotModel,
-        session: Session,
+        model: RobotModel | Machine,
+        session: Session | JointSession,
         link: FrontEnd,
-        navigator: Navigator,
+        navigator: Navigator | None,
         nodes: Nodes,
         let_go: Callable[[], None],
     ) -> None:
-        """``nodes``: all that has a name in its VRML world. ``let_go`` takes the handles of the
-        view out of every hand."""
+        """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
+        has a name in its VRML world. ``let_go`` takes the handles of the view out of every hand."""
         self.model = model
         self.nodes = nodes
         self._session = session
         self._link = link
         self._board = link.board
         self._navigator = navigator
+        self._sink: CommandSink = link if navigator is None else navigator
         self._let_go = let_go
 
     @property
@@ -70,8 +74,17 @@ class Motion:
 
     @property
     def rig(self) -> Rig:
-        """What programs are planned for."""
-        return Rig(self._session, self.model.T_base_shoulder)
+        """What programs are planned for. Raises InputError where there are only joints."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
+        return Rig(self._session, self.robot.T_base_shoulder)
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm. Raises InputError, and says why, where there are only joints."""
+        if isinstance(self.model, Machine):
+            raise InputError(f"Only its joints can be driven. {self.model.joints.why}")
+        return self.model
 
     @property
     def lateness(self) -> Lateness:
@@ -79,12 +92,12 @@ class Motion:
         return self._board.lateness
 
     def choices(self) -> tuple[Choice, ...]:
-        """The branches there are to choose from."""
+        """The branches there are to choose from. Raises InputError where there are none."""
         return self._session.choices(self.state)
 
     def put(self, command: cmd.Command) -> int:
         """Any command; its ticket. Raises InputError for one that cannot be."""
-        return self._navigator.put(command)
+        return self._sink.put(command)
 
     @property
     def state(self) -> State:
@@ -104,7 +117,7 @@ class Motion:
     @property
     def busy(self) -> bool:
         """Whether a way is being worked out that the arm will then go."""
-        return self._navigator.busy
+        return self._navigator is not None and self._navigator.busy
 
     def beat(self) -> None:
         """Tell the arm that somebody watches over it."""
@@ -112,12 +125,12 @@ class Motion:
 
     def stop(self) -> None:
         """Rest as fast as the arm can; it obeys nothing until it is released."""
-        self._navigator.put(cmd.Stop())
+        self._sink.put(cmd.Stop())
         self._let_go()
 
     def release(self) -> None:
         """After a stop: obey again. Nothing moves by this."""
-        self._navigator.put(cmd.Release())
+        self._sink.put(cmd.Release())
 
     def hold(self) -> None:
         """Come to rest and forget every target; no hand holds a handle any more."""
@@ -125,7 +138,9 @@ class Motion:
         self._put(cmd.Reset())
 
     def jog(self, rates: Rates, frame: JogFrame) -> None:
-        """Go with these rates for a moment."""
+        """Go with these rates for a moment. Raises InputError where there are only joints."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
         self._put(cmd.Jog(np.array(rates), frame))
 
     def limit(self, share: float) -> None:
@@ -134,7 +149,7 @@ class Motion:
 
     def _put(self, command: cmd.Command) -> None:
         try:
-            self._navigator.put(command)
+            self._sink.put(command)
         except InputError:
             # The mailbox is full: what is asked again and again is, and a stop always has room.
             return

@@ -18,6 +18,7 @@ from app.control.looks import Colour, Trait
 from app.control.state import State
 from app.control.things import Surroundings, Thing
 from app.errors import InputError
+from app.exchange.machine import Machine
 from app.exchange.mechanism import PLAIN, Joint, Mechanism
 from app.exchange.vrml_names import Dressed, Names
 from app.exchange.vrml_node import WIDTHS, Type
@@ -56,6 +57,16 @@ def body_of(model: RobotModel, mechanism: Mechanism) -> Body:
         gripper=fingers[0] if fingers else None,
         values=lambda state: model.joint_angles(state.q, state.gripper),
         links=frozenset(body.name for body in model.bodies),
+    )
+
+
+def machine_of(machine: Machine) -> Body:
+    """A mechanism that is driven joint by joint."""
+    return Body(
+        axes={name: axis for axis, name in enumerate(machine.joints.names)},
+        gripper=None,
+        values=lambda state: machine.values(state.q),
+        links=frozenset(link.name for link in machine.mechanism.links),
     )
 
 
@@ -120,6 +131,14 @@ class Nodes:
                 )
                 for name, node in self._nodes(state).items()
             ]
+        )
+
+    def links(self, state: State) -> answers.Links:
+        """Where every link is."""
+        frames = self._mechanism.frames(self._body.values(state))
+        there = self._body.links
+        return answers.Links(
+            links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items() if n in there]
         )
 
     def read(self, state: State, asked: Iterable[requests.Named]) -> tuple[answers.Value, ...]:

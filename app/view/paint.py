@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import trimesh
@@ -14,12 +14,10 @@ import viser
 from app.control.looks import AS_MADE, Choice, Look, Looks
 from app.control.state import State
 from app.control.things import Surroundings, Thing
-from app.exchange.mechanism import PLAIN, main_colour
-from app.exchange.urdf_mechanism import shapes_of
+from app.exchange.mechanism import PLAIN, Shape, main_colour
 from app.geometry import so3
-from app.robot.model import RobotModel
 from app.view.posing import place, turn
-from app.view.scene import ArmNodes, Colour
+from app.view.scene import add_shape, of_255
 from app.view.things import ThingNodes
 
 
@@ -38,8 +36,20 @@ class _Coat:
         for shape in self.shapes:
             shape.visible = look.choice is Choice.PAINTED
             if shape.visible:
-                shape.color = _of_255(look.colour or self.colour)
+                shape.color = of_255(look.colour or self.colour)
                 shape.opacity = 1.0 - look.transparency if look.transparency > 0.0 else None
+
+
+class Links(Protocol):
+    """The nodes of a robot's links, by name: its shapes as they are made, and what they are."""
+
+    @property
+    def shapes(self) -> Mapping[str, Sequence[Any]]: ...
+
+    @property
+    def path(self) -> Mapping[str, str]: ...
+
+    def surfaces(self, link: str) -> Sequence[Shape]: ...
 
 
 class PaintNodes:
@@ -48,16 +58,15 @@ class PaintNodes:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
-        arm: ArmNodes,
-        things: ThingNodes,
-        surroundings: Surroundings,
+        links: Links,
+        things: ThingNodes | None = None,
+        surroundings: Surroundings | None = None,
     ) -> None:
+        """``things``, ``surroundings``: what stands around and where; None where nothing does."""
         self._server = server
-        self._arm = arm
+        self._links = links
         self._things = things
         self._surroundings = surroundings
-        self._bodies = {body.name: body for body in model.bodies}
         self._coats: dict[str, _Coat] = {}
         self._seen = Looks()
         self._around: tuple[Thing, ...] = ()
@@ -69,7 +78,7 @@ class PaintNodes:
         if looks != self._seen or (fresh and looks.changed):
             names = {name for each in (self._seen, looks) for name, _ in each.changed}
             for name in names:
-                if name in self._bodies:
+                if name in self._links.shapes:
                     self._show_link(name, looks.of(name))
                 elif name in things:
                     self._show_thing(name, looks.of(name))
@@ -81,42 +90,38 @@ class PaintNodes:
         self._seen, self._around = looks, state.things
 
     def _show_link(self, name: str, look: Look) -> None:
-        for shape in self._arm.shapes[name]:
-            shape.visible = look.choice is Choice.MADE
+        for made in self._links.shapes[name]:
+            made.visible = look.choice is Choice.MADE
         if look.choice is Choice.PAINTED and name not in self._coats:
-            path, visuals = self._arm.path[name], self._bodies[name].visuals
-            self._coats[name] = _Coat(
-                [
-                    self._mesh(f"{path}/paint{number}", visual.mesh)
-                    for number, visual in enumerate(visuals)
-                ],
-                main_colour([shape for visual in visuals for shape in shapes_of(visual)]),
-            )
+            surfaces = self._links.surfaces(name)
+            colour, path = main_colour(surfaces), self._links.path[name]
+            shapes = [
+                add_shape(self._server, f"{path}/paint{number}", surface, colour)
+                for number, surface in enumerate(surfaces)
+            ]
+            self._coats[name] = _Coat(shapes, colour)
         if name in self._coats:
             self._coats[name].show(look)
 
     def _show_thing(self, name: str, look: Look) -> None:
+        assert self._things is not None
         node = self._things.node(name)
         node.visible = look.choice is Choice.MADE
         if look.choice is Choice.PAINTED and name not in self._coats:
             path = f"/paint/{len(self._coats)}"
             made = self._server.scene.add_frame(path, show_axes=False)
-            scene = trimesh.load_scene(io.BytesIO(node.glb_data), file_type="glb")
-            self._coats[name] = _Coat([self._mesh(f"{path}/shape", scene.to_mesh())], PLAIN, made)
+            mesh = trimesh.load_scene(io.BytesIO(node.glb_data), file_type="glb").to_mesh()
+            shape = self._server.scene.add_mesh_simple(
+                f"{path}/shape", mesh.vertices, np.asarray(mesh.faces)
+            )
+            self._coats[name] = _Coat([shape], PLAIN, made)
         if name in self._coats:
             self._coats[name].show(look)
 
     def _pose(self, thing: Thing, state: State) -> None:
+        assert self._surroundings is not None
         T = self._surroundings.pose(thing, np.append(state.q, state.gripper))
         px, py, pz = T[:3, 3].tolist()
         w, i, j, k = so3.to_quaternion(T[:3, :3]).tolist()
         place(self._coats[thing.name].node, (px, py, pz))
         turn(self._coats[thing.name].node, (w, i, j, k))
-
-    def _mesh(self, name: str, mesh: Any) -> viser.MeshHandle:
-        return self._server.scene.add_mesh_simple(name, mesh.vertices, np.asarray(mesh.faces))
-
-
-def _of_255(colour: tuple[float, float, float]) -> Colour:
-    red, green, blue = (round(255.0 * part) for part in colour)
-    return red, green, blue

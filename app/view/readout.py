@@ -34,7 +34,7 @@ def page(model: RobotModel, state: State) -> str:
     mood = "moving" if state.moving and state.status is Status.OK else state.status.value
     why = sentence(state)
     return (
-        f"<style>{_style()}</style><div class='k450'>"
+        f"<style>{style()}</style><div class='k450'>"
         f"<p class='status {mood}'><b>{escape(headline(state))}</b>"
         f"<span>{escape(why) or '&nbsp;'}</span></p>"
         f"<table><thead><tr><th>{escape(state.tool)} in {{S}}</th><th>now</th><th>goal</th>"
@@ -66,5 +66,6 @@ def _numbers(T: FloatArray) -> list[str]:
 
 
 @cache
-def _style() -> str:
+def style() -> str:
+    """Of all that panels show as HTML."""
     return (STATIC / "panel.css").read_text(encoding="utf-8")

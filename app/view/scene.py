@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from app.exchange.mechanism import Shape
+from app.exchange.urdf_mechanism import shapes_of
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.robot.model import RobotModel
@@ -93,6 +95,11 @@ class ArmNodes(FrameTree):
             for body in model.bodies
         }
         """Of each link, as they are made."""
+        self._visuals = {body.name: body.visuals for body in model.bodies}
+
+    def surfaces(self, link: str) -> list[Shape]:
+        """What its shapes are, one a material."""
+        return [shape for visual in self._visuals[link] for shape in shapes_of(visual)]
 
 
 def _as_made(
@@ -182,3 +189,19 @@ def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     # One vertex a corner: half of what goes over the wire.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     return mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces)
+
+
+def add_shape(
+    server: viser.ViserServer, name: str, shape: Shape, colour: tuple[float, float, float]
+) -> viser.MeshHandle:
+    """A shape in one colour, sRGB 0..1."""
+    faces = shape.faces.astype(np.uint32)
+    return server.scene.add_mesh_simple(
+        name, shape.vertices.astype(np.float32), faces, color=of_255(colour)
+    )
+
+
+def of_255(colour: tuple[float, float, float]) -> Colour:
+    """As viser counts colours."""
+    red, green, blue = (round(255.0 * part) for part in colour)
+    return red, green, blue

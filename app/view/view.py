@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import logging
-import threading
 import time
 
 import numpy as np
@@ -26,10 +22,11 @@ from app.runtime.mailbox import CommandSink
 from app.view.cameras import Cameras, Preset
 from app.view.conduit import Conduits
 from app.view.ellipsoid import Ellipsoid
+from app.view.follower import Follower
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
 from app.view.paint import PaintNodes
-from app.view.panel import READOUT_INTERVAL, Panel
+from app.view.panel import Panel
 from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
 from app.view.room import furnish
@@ -40,8 +37,6 @@ from app.view.traces import Traces
 from app.view.water import WaterNodes
 from app.view.workcell import Workcell
 from app.water.around import Around
-
-log = logging.getLogger(__name__)
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
@@ -59,7 +54,7 @@ GHOST_FROM = np.deg2rad(0.2)
 """[rad] The ghost shows while a joint is farther than this from its goal."""
 
 
-class View:
+class View(Follower):
     """Shows each new snapshot to every browser; hands what people do to the mailbox."""
 
     def __init__(
@@ -79,23 +74,17 @@ class View:
 
         Raises ConfigurationError for the map of another arm.
         """
-        self._server = server
+        super().__init__(server, board, frame_rate)
         self._session = session
         self._model = model
-        self._board = board
         self._mailbox = mailbox
-        self._interval = 1.0 / frame_rate
-        self._stopping = threading.Event()
-        self.failed = threading.Event()
-        """Set when it shows nothing any more."""
-        self._thread = threading.Thread(target=self._run, name="view", daemon=True)
         furnish(server)
         props = load_props()
         Workcell(server, props)
         self._things = ThingNodes(server, props, session.surroundings, self._put_from_gizmo)
         state = board.snapshot.state
         self._arm = ArmNodes(server, model)
-        self._paint = PaintNodes(server, model, self._arm, self._things, session.surroundings)
+        self._paint = PaintNodes(server, self._arm, self._things, session.surroundings)
         self._conduits = Conduits(server, model, self._arm)
         self._tint = Tint(server, model, self._arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
@@ -121,19 +110,6 @@ class View:
             )
         self.show(board.snapshot)
 
-    def start(self) -> None:
-        """Follow the control loop in a thread of the view's own."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop following, and close the server."""
-        self._stopping.set()
-        if self._thread.is_alive():
-            self._thread.join()
-        # viser would say goodbye in its own words.
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
-
     def let_go(self) -> None:
         """Take the handle out of every hand: what is dragged on with it moves nothing."""
         self._gizmo.let_go()
@@ -151,26 +127,6 @@ class View:
 
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
         self._cameras.give(client, preset, self._board.snapshot.state)
-
-    def _run(self) -> None:
-        try:
-            self._follow()
-        except Exception:
-            log.exception("The view met an error.")
-            self.failed.set()
-
-    def _follow(self) -> None:
-        seen = self._board.snapshot
-        settled = True
-        while not self._stopping.is_set():
-            # After the last change the read-out still owes its final numbers.
-            snapshot = self._board.wait_for_change(seen, 0.5 if settled else READOUT_INTERVAL)
-            settled = snapshot is seen
-            seen = snapshot
-            due = time.perf_counter() + self._interval
-            self.show(snapshot)
-            # Motion is shown at the frame rate, what a person does at once.
-            self._board.wait_for_command(snapshot, due - time.perf_counter())
 
     def show(self, snapshot: Snapshot) -> None:
         """Send every browser what has changed."""

@@ -31,7 +31,7 @@ class Shown:
         self.server = server
         self.arm = ArmNodes(server, model)
         self.things = ThingNodes(server, props, around, lambda _: None)
-        self.paint = PaintNodes(server, model, self.arm, self.things, around)
+        self.paint = PaintNodes(server, self.arm, self.things, around)
         self.state = replace(session.begin(session.ready, 0.0, 0.0), things=things_of(props))
         self.show()
 
