@@ -246,7 +246,7 @@ class Limiter:
         )
         if beside > STRAIGHT:
             return None
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             of_axis = 1.0 / np.abs(d)
         line.current_position, line.target_position = [0.0], [length]
         line.current_velocity, line.current_acceleration = [v], [a]

@@ -30,7 +30,7 @@ def tree(seed: int, links: int = 8) -> str:
             f'<child link="link{number}"/><origin xyz="{_row(xyz)}" rpy="{_row(rpy)}"/>'
             f'<axis xyz="{_row(axis / np.linalg.norm(axis))}"/>'
             f'<limit lower="{-between(0.1, 0.5)}" upper="{between(0.1, 0.5)}" '
-            f'velocity="{between(1.0, 3.0)}" effort="1"/>'
+            f'velocity="{between(2.0, 4.0)}" effort="1"/>'
         )
         if follows:
             leader, factor = driven[number % len(driven)], between(-0.9, 0.9)

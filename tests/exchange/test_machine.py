@@ -1,0 +1,68 @@
+"""Mechanisms made ready to be driven: limits that followers keep too, and what cannot be driven."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.errors import RobotDescriptionError
+from app.exchange.machine import load_machine
+from tests.exchange.conftest import GANTRY
+from tests.exchange.trees import tree
+
+
+def test_what_follows_binds_what_it_follows() -> None:
+    machine = load_machine(GANTRY, "why")
+    joints = machine.joints
+    assert joints.names == ("rail", "turn", "grip")
+    assert joints.slides == (True, False, False)
+    # Of "grip too" = 0.1 - grip in (-2, 2) and "out" = -0.04 + ... nothing is nearer than its own.
+    np.testing.assert_allclose(joints.lower, (-0.4, -math.pi, -1.0))
+    np.testing.assert_allclose(joints.upper, (0.4, math.pi, 0.5))
+    assert joints.speed[1] == 1.0
+    assert any("'turn' has no speed of its own: 1 rad/s" in note for note in machine.notes)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_posture_inside_the_limits_takes_any_joint_beyond_its_own(
+    tmp_path: Path, seed: int
+) -> None:
+    path = tmp_path / "tree.urdf"
+    path.write_text(tree(seed, 6 + seed))
+    machine = load_machine(path, "why")
+    joints, random = machine.joints, np.random.default_rng(seed)
+    for share in (0.0, 1.0, random.uniform(size=joints.n)):
+        values = machine.values(joints.lower + share * (joints.upper - joints.lower))
+        for name, value in values.items():
+            joint = machine.mechanism.joints[name]
+            assert joint.lower - 1e-12 <= value <= joint.upper + 1e-12
+
+
+def test_a_way_is_that_of_the_link_that_goes_farthest() -> None:
+    machine = load_machine(GANTRY, "why")
+    q = np.zeros(3)
+    assert machine.way(q, q) == 0.0
+    assert machine.way(q, np.array((0.25, 0.0, 0.0))) == pytest.approx(0.25)
+
+
+LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
+<joint name="j" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
+<limit lower="0.1" upper="0.1" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('<robot name="r"><link name="a"/></robot>', "r has no joint that could be driven"),
+        (LOCKED, "'j' of r cannot be driven.*from 0.1 to 0.1"),
+        ("<robot", "no robot description|not a robot description"),
+    ],
+)
+def test_what_cannot_be_driven_is_told(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "r.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotDescriptionError, match=said):
+        load_machine(path, "why")
