@@ -24,6 +24,9 @@ GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Reset()}
 STEPS = 400
 """Of a slider from end to end, at least."""
 
+FINEST = 100.0
+"""[1/mm, 1/deg] The ends of a slider are rounded to as much, inside the limits."""
+
 
 class MachinePanel:
     """Sliders show the goal; the read-out shows where the joints are."""
@@ -42,7 +45,7 @@ class MachinePanel:
         self._told = ""
         listen: Listen = listener(put)
         self._readout = gui.add_html(page(joints, state))
-        gui.add_markdown(f"**Joints only.** {joints.why}")
+        gui.add_html(f"<div class='k450'><p><b>Joints only.</b> {escape(joints.why)}</p></div>")
         with gui.add_folder("Joints"):
             self._sliders = [self._slider(axis, state, listen) for axis in range(joints.n)]
         gestures = gui.add_button_group(
@@ -75,10 +78,12 @@ class MachinePanel:
 
     def _slider(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
         joints = self._joints
-        low, high = (shown(joints, axis, float(end[axis])) for end in (joints.lower, joints.upper))
+        low = math.ceil(FINEST * shown(joints, axis, float(joints.lower[axis]))) / FINEST
+        high = math.floor(FINEST * shown(joints, axis, float(joints.upper[axis]))) / FINEST
         slides = joints.slides[axis]
         slider = self._gui.add_slider(
-            joints.names[axis],
+            # With its number, as sentences have it; no name can pass for that of another control.
+            f"{axis + 1}. {joints.names[axis]}",
             min=low,
             max=high,
             step=10.0 ** math.floor(math.log10((high - low) / STEPS)),
@@ -99,7 +104,7 @@ def shown(joints: Joints, axis: int, value: float) -> float:
 def page(joints: Joints, state: State) -> str:
     """The read-out for ``state``, as HTML."""
     rows = "".join(
-        f"<tr><th>{escape(name)}</th>"
+        f"<tr><th>{axis + 1}. {escape(name)}</th>"
         f"<td data-now='{axis}'>{signed(shown(joints, axis, float(state.q[axis])), 1)}</td>"
         f"<td data-goal='{axis}'>{signed(shown(joints, axis, float(state.goal[axis])), 1)}</td>"
         f"<td class='unit'>{'mm' if joints.slides[axis] else '°'}</td></tr>"

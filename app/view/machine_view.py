@@ -33,6 +33,7 @@ class MachineView(Follower):
         self._machine = machine
         self._sink = sink
         furnish(server)
+        server.gui.set_panel_label(machine.mechanism.name)
         look = camera(machine.mechanism)
         server.initial_camera.position = look.eye
         server.initial_camera.look_at = look.target

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from app.errors import RobotDescriptionError
+from app.exchange.c_source import c_files
+from app.exchange.glb import glb_files
 from app.exchange.machine import load_machine
+from app.exchange.urdf_package import package_files
+from app.exchange.vrml import vrml_files
+from app.exchange.vrml_text import read_world
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 
@@ -66,3 +71,22 @@ def test_what_cannot_be_driven_is_told(tmp_path: Path, text: str, said: str) -> 
     path.write_text(text)
     with pytest.raises(RobotDescriptionError, match=said):
         load_machine(path, "why")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_can_be_driven_can_be_exported(tmp_path: Path, seed: int) -> None:
+    path = tmp_path / "tree.urdf"
+    path.write_text(tree(seed))
+    machine = load_machine(path, "why")
+    mechanism, values = machine.mechanism, machine.values(machine.joints.upper)
+    made = (
+        vrml_files(mechanism, values),
+        c_files(mechanism, values),
+        glb_files(mechanism, values, None),
+        package_files(path),
+    )
+    for files in made:
+        assert files
+        assert all(files.values())
+    world = read_world(made[0]["tree.wrl"].decode())
+    assert set(machine.joints.names) <= set(world.named())

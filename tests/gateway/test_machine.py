@@ -172,12 +172,13 @@ def test_a_slider_moves_it_in_its_own_unit(server: AppServer, machine: Machine) 
     async def act() -> None:
         async with opened(server.url) as (peer, control):
             name = machine.joints.names[machine.joints.slides.index(True)]
-            props = peer.controls[name]["props"]
             index = machine.joints.names.index(name)
-            assert props["max"] == pytest.approx(1e3 * machine.joints.upper[index])
+            label = f"{index + 1}. {name}"
+            props = peer.controls[label]["props"]
+            assert props["max"] == pytest.approx(1e3 * machine.joints.upper[index], abs=0.01)
             assert "mm" in props["hint"]
             assert "Go to pose" not in peer.controls
-            await peer.set(name, value=60.0)
+            await peer.set(label, value=60.0)
             async with asyncio.timeout(5.0):
                 while True:
                     _, _, body = ask(f"{server.url}/api/v1/state")
