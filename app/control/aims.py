@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.control.commands import Shift
+from app.control.commands import Dress, SetAxes, SetJoint, Shift
+from app.control.looks import Look
 from app.control.state import Finding, JointTarget, Reason, State, Target
 from app.control.things import Thing
 from app.geometry.arrays import FloatArray, frozen
@@ -43,10 +44,12 @@ def leaving(state: State) -> State:
     return replace(state, following=replace(state.following, leaving=True))
 
 
-def turned(state: State, values: tuple[tuple[int, float], ...]) -> JointTarget:
-    """Some axes, counted from 0, to other angles [rad], the rest to where they were going."""
+def turned(state: State, command: SetJoint | SetAxes) -> JointTarget:
+    """Some axes to other angles, the rest to where they were going."""
     q = np.array(state.goal)
-    for axis, value in values:
+    for axis, value in (
+        ((command.axis, command.value),) if isinstance(command, SetJoint) else command.values
+    ):
         q[axis] = value
     return JointTarget(frozen(q))
 
@@ -73,3 +76,13 @@ def shifted(state: State, shift: Shift) -> State:
         return replace(thing, T=T)
 
     return replace(state, things=tuple(map(there, state.things)))
+
+
+def look_of(state: State, name: str) -> Look:
+    """How the link or thing of that name is shown."""
+    return state.looks.of(name)
+
+
+def dressed(state: State, dress: Dress) -> State:
+    """With one trait of a look changed."""
+    return replace(state, looks=state.looks.having(dress.name, dress.trait, dress.value))

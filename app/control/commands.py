@@ -359,6 +359,10 @@ Command = (
 )
 
 
+THINGS = (Place, Shift, Remove, Fill, Dress)
+"""Those about what stands around and what is seen: no joint moves by them."""
+
+
 def _check_finite(what: str, value: object) -> None:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise InputError(f"{what} has to be a finite number, not {value!r}.")

@@ -15,7 +15,7 @@ import numpy as np
 
 from app import tolerances
 from app.control import commands as cmd
-from app.control.aims import gone, turned, without
+from app.control.aims import dressed, gone, turned, without
 from app.control.choices import Choice
 from app.control.joints import Joints
 from app.control.pouring import Pouring
@@ -150,18 +150,16 @@ class JointSession:
                 return self._aim(state, self._limiter.halt(state.motion))
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
-            case cmd.SetJoint(axis=axis, value=value):
-                return self._aim(state, turned(state, ((axis, value),)).q)
-            case cmd.SetAxes(values=values):
-                return self._aim(state, turned(state, values).q)
+            case cmd.SetJoint() | cmd.SetAxes():
+                return self._aim(state, turned(state, command).q)
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
             case cmd.Servo(q=q, qd=qd):
                 return self._keep_up(state, q, qd)
             case cmd.Home() | cmd.Stretch():
                 return self._aim(state, self.ready)
-            case cmd.Dress(name=name, trait=trait, value=value):
-                return replace(state, looks=state.looks.having(name, trait, value))
+            case cmd.Dress():
+                return dressed(state, command)
             case cmd.Together(commands=commands):
                 return functools.reduce(self._take, commands, state)
         return state

@@ -11,7 +11,7 @@ import numpy as np
 from app import tolerances
 from app.collision.world import World
 from app.control import commands as cmd
-from app.control.aims import gone, leaving, removed, shifted, turned, without
+from app.control.aims import dressed, gone, leaving, removed, shifted, turned, without
 from app.control.arm import Arm
 from app.control.checks import check
 from app.control.choices import Choice, choice, choices, wish, wish_on
@@ -48,9 +48,7 @@ TOOL_SPEED = 0.5
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
-THINGS = (cmd.Place, cmd.Shift, cmd.Remove, cmd.Fill, cmd.Dress)
-
-SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Together, *THINGS)
+SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Together, *cmd.THINGS)
 """What counts while a stop holds the arm."""
 
 AT_START = 1e-6
@@ -207,10 +205,8 @@ class Session:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
                 return leaving(replace(state, jogging=jogging, since=None, let_go=False))
-            case cmd.SetJoint(axis=axis, value=value):
-                return self._aim(state, turned(state, ((axis, value),)))
-            case cmd.SetAxes(values=values):
-                return self._aim(state, turned(state, values))
+            case cmd.SetJoint() | cmd.SetAxes():
+                return self._aim(state, turned(state, command))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
             case cmd.Servo(q=q, qd=qd):
@@ -249,8 +245,8 @@ class Session:
                 return removed(state, name)
             case cmd.Shift():
                 return shifted(state, command)
-            case cmd.Dress(name=name, trait=trait, value=value):
-                return replace(state, looks=state.looks.having(name, trait, value))
+            case cmd.Dress():
+                return dressed(state, command)
             case cmd.Together(commands=commands):
                 return functools.reduce(self._take, commands, state)
             case cmd.Fill(volume=volume):

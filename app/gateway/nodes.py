@@ -14,6 +14,7 @@ import numpy as np
 
 from app.api import answers, requests
 from app.control import commands as cmd
+from app.control.aims import look_of
 from app.control.looks import Colour, Trait
 from app.control.state import State
 from app.control.things import Surroundings, Thing
@@ -268,7 +269,7 @@ def _dress(name: str, of: str, dressed: Dressed, colour: Colour) -> dict[str, _N
             {
                 "whichChoice": _Field(
                     Type.INT,
-                    lambda state: float(state.looks.of(name).choice.value),
+                    lambda state: float(look_of(state, name).choice.value),
                     put(Trait.CHOICE),
                 )
             },
@@ -279,12 +280,12 @@ def _dress(name: str, of: str, dressed: Dressed, colour: Colour) -> dict[str, _N
             {
                 "diffuseColor": _Field(
                     Type.COLOR,
-                    lambda state: list(state.looks.of(name).colour or colour),
+                    lambda state: list(look_of(state, name).colour or colour),
                     put(Trait.COLOUR),
                 ),
                 "transparency": _Field(
                     Type.FLOAT,
-                    lambda state: state.looks.of(name).transparency,
+                    lambda state: look_of(state, name).transparency,
                     put(Trait.TRANSPARENCY),
                 ),
             },

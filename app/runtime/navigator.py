@@ -20,10 +20,7 @@ log = logging.getLogger(__name__)
 REST_SECONDS = 5.0
 """[s] In which an arm that is to set out from rest has come to it."""
 
-PASSIVE = (
-    *(cmd.SpeedScale, cmd.Place, cmd.Shift, cmd.Remove, cmd.Fill, cmd.Dress),
-    cmd.SetGripper,
-)
+PASSIVE = (cmd.SpeedScale, cmd.SetGripper, *cmd.THINGS)
 """Commands that leave a way under work as it is."""
 
 
