@@ -315,16 +315,14 @@ def _out_of_the_hand(orders: _Orders, name: str, value: FieldValue | None) -> li
 
 def _about(name: str, axis: FloatArray, rotation: list[float]) -> float:
     """The angle [rad] about ``axis`` of a rotation, which must be about that alone."""
-    given, angle = np.array(rotation[:3]), rotation[3]
+    angle = rotation[3]
     if angle == 0.0:
         return 0.0
-    size = float(np.linalg.norm(given))
-    beside = float(np.linalg.norm(np.cross(axis, given)))
-    if size == 0.0 or beside > ASIDE * size:
-        raise InputError(
-            f"{name} turns about {_shown(axis)}, and cannot turn about {_shown(given)}."
-        )
-    return math.copysign(angle, angle * float(axis @ given))
+    given = _unit(rotation[:3])
+    if given is None or float(np.linalg.norm(np.cross(axis, given))) > ASIDE:
+        about = _shown(np.array(rotation[:3]))
+        raise InputError(f"{name} turns about {_shown(axis)}, and cannot turn about {about}.")
+    return angle if float(axis @ given) > 0.0 else -angle
 
 
 def _along(name: str, axis: FloatArray, translation: list[float]) -> float:
@@ -342,11 +340,21 @@ def _shown(vector: FloatArray) -> str:
 
 def _rotation(name: str, given: list[float]) -> FloatArray:
     """(3, 3) of a VRML rotation: an axis, and an angle about it [rad]."""
-    axis = np.array(given[:3])
-    size = float(np.linalg.norm(axis))
-    if size == 0.0 and given[3] != 0.0:
+    if given[3] == 0.0:
+        return np.eye(3)
+    axis = _unit(given[:3])
+    if axis is None:
         raise InputError(f"{name} cannot turn about an axis without a direction.")
-    return so3.exp(given[3] * axis / size) if size else np.eye(3)
+    return so3.exp(math.remainder(given[3], math.tau) * axis)
+
+
+def _unit(given: list[float]) -> FloatArray | None:
+    """The direction of a vector of any length; None of one without."""
+    largest = max(map(abs, given))
+    if largest == 0.0:
+        return None
+    scaled = np.array([number / largest for number in given])
+    return np.asarray(scaled / np.linalg.norm(scaled))
 
 
 def _axis_angle(R: FloatArray) -> list[float]:

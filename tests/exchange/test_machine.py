@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.errors import RobotDescriptionError
+from app.cli.assembly import Described, Jointed, recognised
+from app.control import commands as cmd
+from app.errors import InputError, RobotDescriptionError
 from app.exchange.c_source import c_files
 from app.exchange.glb import glb_files
 from app.exchange.machine import load_machine
 from app.exchange.urdf_package import package_files
 from app.exchange.vrml import vrml_files
 from app.exchange.vrml_text import read_world
+from app.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
+
+ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 
 def test_what_follows_binds_what_it_follows() -> None:
@@ -90,3 +96,25 @@ def test_what_can_be_driven_can_be_exported(tmp_path: Path, seed: int) -> None:
         assert all(files.values())
     world = read_world(made[0]["tree.wrl"].decode())
     assert set(machine.joints.names) <= set(world.named())
+
+
+def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_path: Path) -> None:
+    whole = (ARMS / "pincherx_150.urdf").read_text()
+    elbow = whole.index('<joint name="elbow"')
+    before, after = whole[:elbow], whole[elbow:]
+    tilt = math.radians(12.0)
+    skewed = f'<axis xyz="{math.sin(tilt)} {math.cos(tilt)} 0"/>'
+    path = tmp_path / "skewed.urdf"
+    path.write_text(before + re.sub(r'<axis xyz="[^"]*"/>', skewed, after, count=1))
+    found = recognised(Settings(), path, None)
+    assert isinstance(found, Jointed)
+    why = found.machine.joints.why
+    assert "axis 3 must be parallel to axis 2 and is 12 deg off" in why
+    assert f"Joints only. {why}" in found.notes
+    with pytest.raises(InputError, match="12 deg off"):
+        found.session.check(cmd.SetPose(np.eye(4)))
+    straight = recognised(Settings(), ARMS / "pincherx_150.urdf", None)
+    assert isinstance(straight, Described)
+    # Whoever names a tool wants to send it somewhere.
+    with pytest.raises(RobotDescriptionError, match="12 deg off"):
+        recognised(Settings(), path, found.machine.mechanism.links[-1].name)

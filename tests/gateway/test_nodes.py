@@ -113,6 +113,10 @@ def test_joints_are_told_to_go_and_never_put(
     )
     assert isinstance(said, cmd.SetAxes)
     assert dict(said.values) == {int(each[-1]) - 1: angle for each, angle in wanted.items()}
+    # However long the axis is told.
+    huge = [setting(n, "rotation", [1e200 * x for x in rotation(n, 0)[:3]] + [a])
+            for n, a in wanted.items()]  # fmt: skip
+    assert nodes.command(state, huge) == said
     # The other way round about the axis turned round, and an axis of any length, is the same.
     turned = [setting(n, "rotation", [-2.0 * x for x in rotation(n, 0)[:3]] + [-a])
               for n, a in wanted.items()]  # fmt: skip
@@ -161,6 +165,7 @@ def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
             "axis_2 turns about 0 1 0, and cannot turn about 1 0 0",
         ),
         ("axis_2", "rotation", [0, 0, 0, 0.1], "cannot turn about 0 0 0"),
+        ("axis_2", "rotation", [1e300, 1e300, 0, 0.1], "cannot turn about 1e"),
         ("axis_2", "rotation", [0, 1, 0], "SFRotation, which is 4 numbers"),
         ("axis_2", "rotation", 0.1, "SFRotation, which is 4 numbers"),
         ("axis_2", "rotation", [0, 1, 0, math.inf], "finite"),
@@ -181,6 +186,33 @@ def test_what_cannot_be_set_is_refused_with_all_that_came_with_it(
     fine = setting("axis_1", "rotation", [0, 0, 1, 0.1])
     with pytest.raises(InputError, match=said):
         nodes.command(state, [fine, setting(node, field, value)])
+
+
+names = st.sampled_from(
+    ["axis_1", "axis_5", "finger_right_joint", "finger_left_joint", "left_cube", "pan_link_look",
+     "pan_link_paint", "left_cube_paint", "base_link_look", "axis", ""]
+)  # fmt: skip
+fields = st.sampled_from(
+    ["rotation", "translation", "center", "whichChoice", "diffuseColor", "transparency", "x"]
+)
+numbers = st.floats() | st.sampled_from([0.0, 1.0, -1.0, 0.5])
+anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
+def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
+    nodes: Nodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
+) -> None:
+    try:
+        command = nodes.command(state, [setting(*each) for each in said])
+    except InputError:
+        return
+    rules.check(command)
+    after = rules.step(state, [command], 0.01)
+    for node in nodes.world(after).nodes:
+        for each in node.fields:
+            assert np.isfinite(np.array(each.value)).all()
 
 
 def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
