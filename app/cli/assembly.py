@@ -10,9 +10,12 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
+from app.control.joint_session import JointSession
 from app.control.session import Session
 from app.control.things import Hand, Thing
 from app.drivers.simulated import SimulatedDriver
+from app.errors import RobotDescriptionError
+from app.exchange.machine import Machine, load_machine
 from app.robot.bare import bare
 from app.robot.collision import hand_of, table, things_of, world_of
 from app.robot.model import RobotModel, load
@@ -65,12 +68,37 @@ def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     return Described(model, session, tuple(notes))
 
 
+class Jointed(NamedTuple):
+    """Likewise of a mechanism that is driven joint by joint."""
+
+    machine: Machine
+    session: JointSession
+    notes: tuple[str, ...]
+
+
+def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described | Jointed:
+    """An arm of the family with all it can do; of any other mechanism, its joints.
+
+    Raises RobotDescriptionError for what is neither, or where a tool was asked for.
+    """
+    try:
+        return described(settings, urdf, tool)
+    except RobotDescriptionError as error:
+        if tool is not None or settings.bare or not urdf.is_file():
+            raise
+        machine = load_machine(urdf, str(error))
+        notes = (*machine.notes, f"Joints only. {error}")
+        return Jointed(machine, JointSession(machine.joints, machine.way), notes)
+
+
 class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
     def __init__(self, settings: Settings, urdf: Path, tool: str | None) -> None:
-        model, session, self.notes = described(settings, urdf, tool)
-        driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
+        found = recognised(settings, urdf, tool)
+        arm = found.model.arm if isinstance(found, Described) else found.machine.joints
+        session, self.notes = found.session, found.notes
+        driver = SimulatedDriver(arm, session.ready, gripper=0.0)
         self._mailbox = Mailbox(session.check)
         self._loop = ControlLoop(session, driver, self._mailbox, MonotonicClock(), settings.rate)
         self._silence = settings.silence

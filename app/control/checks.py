@@ -16,6 +16,12 @@ def check(arm: Arm, pouring: Pouring | None, command: cmd.Command) -> None:
     match command:
         case cmd.SetJoint(axis=axis) if axis >= n:
             raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
+        case cmd.SetAxes(values=values):
+            for axis, value in values:
+                check(arm, pouring, cmd.SetJoint(axis, value))
+        case cmd.Together(commands=commands):
+            for each in commands:
+                check(arm, pouring, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
             raise InputError(f"This arm has {n} joints, the command {q.size}.")
         case cmd.SetTool(name=name):

@@ -16,6 +16,7 @@ class Type(Enum):
     """Of a field: how many numbers make one value, and whether there can be any number of them."""
 
     BOOL = "SFBool"
+    INT = "SFInt32"
     INT_LIST = "MFInt32"
     FLOAT = "SFFloat"
     FLOAT_LIST = "MFFloat"
@@ -34,6 +35,7 @@ class Type(Enum):
 
 WIDTHS: Mapping[Type, int] = MappingProxyType(
     {
+        Type.INT: 1,
         Type.INT_LIST: 1,
         Type.FLOAT: 1,
         Type.FLOAT_LIST: 1,
@@ -73,6 +75,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "ambientIntensity": Type.FLOAT,
         },
         "Group": _CHILDREN,
+        "Switch": {"whichChoice": Type.INT, "choice": Type.NODE_LIST},
         "Transform": {
             "translation": Type.VECTOR,
             "center": Type.VECTOR,
@@ -86,6 +89,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "specularColor": Type.COLOR,
             "ambientIntensity": Type.FLOAT,
             "shininess": Type.FLOAT,
+            "transparency": Type.FLOAT,
         },
         "IndexedFaceSet": {
             "solid": Type.BOOL,

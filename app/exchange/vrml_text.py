@@ -215,6 +215,8 @@ class _Reader:
                 return self._string()
             case Type.STRING_LIST:
                 return tuple(self._items(self._string))
+            case Type.INT:
+                return self._integer()
             case Type.INT_LIST:
                 return tuple(self._items(self._integer))
         width = WIDTHS[kind]

@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 ROOT = f"/api/v{requests.VERSION}"
 
-QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things")
+QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "links")
 """Each is a path of its own."""
 
 PROGRAM = re.compile(r"[A-Za-z0-9_-]{8,64}")
@@ -70,6 +70,8 @@ class Api:
                 return _json(self._desk.look(at))
             except LeaseError as error:
                 raise HTTPException(TOO_SOON, str(error)) from error
+            except InputError as error:
+                return _json(answers.Refused(why=str(error)), REFUSED)
 
         return read
 

@@ -44,6 +44,11 @@ class Desk:
                 return answers.Echo(n=n)
             case requests.Look(at=at):
                 return self.look(at)
+            case requests.Get(node=node, field=field, more=more):
+                arm, first = hub.present(), requests.Named(node=node, field=field)
+                return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
+        if isinstance(request, requests.Set):
+            return answers.Done(ticket=hub.move(window, self._setting(request)))
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
@@ -113,11 +118,17 @@ class Desk:
                 return cmd.TakeBranch(Branch(shoulder, elbow))
         return None
 
+    def _setting(self, asked: requests.Set) -> cmd.Command:
+        """What sets fields of the VRML world, all at once."""
+        arm = self._hub.present()
+        first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
+        return arm.nodes.command(arm.state, (first, *asked.more))
+
     def _thing(self, asked: requests.Place) -> Thing:
         """What is to be put where; what is not said of it stays as it is."""
         T = np.array(asked.T)
         if asked.frame is requests.Frame.SHOULDER:
-            T = self._hub.present().model.T_base_shoulder @ T
+            T = self._hub.present().robot.T_base_shoulder @ T
         known = self._out_of_the_hand(asked.name)
         form = None if known is None else known.form
         size = None if known is None else known.size
@@ -136,7 +147,7 @@ class Desk:
     def _out_of_the_hand(self, name: str) -> Thing | None:
         """The thing of that name, if there is one. Raises InputError when it is held."""
         arm = self._hub.present()
-        if any(part.name == name for part in arm.model.bodies) or name == "table":
+        if any(part.name == name for part in arm.robot.bodies) or name == "table":
             raise InputError(f"{name!r} is no thing that can be put elsewhere.")
         known = next((each for each in arm.state.things if each.name == name), None)
         if known is not None and known.held:
@@ -147,7 +158,7 @@ class Desk:
         """(4, 4) from ``frame`` into {S}."""
         if frame is requests.Frame.SHOULDER:
             return np.eye(4)
-        return se3.inverse(self._hub.present().model.T_base_shoulder)
+        return se3.inverse(self._hub.present().robot.T_base_shoulder)
 
     def look(self, at: str) -> answers.Answer:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
@@ -156,6 +167,9 @@ class Desk:
             case "arm":
                 arm = hub.present()
                 return tell.arm(arm.model, arm.ready.tolist())
+            case "links":
+                arm = hub.present()
+                return arm.nodes.links(arm.state)
             case "ledger":
                 return answers.Ledger(lines=[tell.line(line) for line in hub.journal.lines])
             case "branches":
@@ -163,6 +177,9 @@ class Desk:
                 return answers.Branches(choices=[tell.choice(each) for each in choices])
             case "things":
                 return tell.things(hub)
+            case "world":
+                arm = hub.present()
+                return arm.nodes.world(arm.state)
             case "loop":
                 return tell.loop(hub.present().lateness)
         return tell.state(hub)

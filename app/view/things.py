@@ -60,6 +60,10 @@ class ThingNodes:
         """Take the handles out of every hand."""
         self._dragged = None
 
+    def node(self, name: str) -> Any:
+        """The node of the thing of that name; KeyError when there never was one."""
+        return self._nodes[name]
+
     def follow(self, state: State) -> None:
         """Put everything where ``state`` has it."""
         changed = state.things is not self._seen
