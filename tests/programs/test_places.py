@@ -16,7 +16,7 @@ from tests.programs.conftest import Stage
 from tests.programs.test_pour import check_poured
 
 CASES = range(50) if "KATANA450_LONG" in os.environ else (1, 2, 9)
-"""Where the cup, where the basin is out of reach, and where it takes another pitch; else all of them."""
+"""Cup out of reach, basin out of reach, another pitch; all of them with `KATANA450_LONG`."""
 
 
 def spots(number: int) -> tuple[Spot, Spot]:
