@@ -6,11 +6,14 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.arm import Arm
-from app.control.pouring import Pouring
+from app.control.pouring import CUP, Pouring
+from app.control.things import Hand, Mount, Thing
 from app.errors import InputError
 
+NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
 
-def check(arm: Arm, pouring: Pouring | None, command: cmd.Command) -> None:
+
+def check(arm: Arm, pouring: Pouring | None, hand: Hand | None, command: cmd.Command) -> None:
     """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
     n = arm.chain.n
     match command:
@@ -24,7 +27,23 @@ def check(arm: Arm, pouring: Pouring | None, command: cmd.Command) -> None:
             if pouring is None:
                 raise InputError("There is no cup to fill.")
             pouring.check(volume)
+        case cmd.Furnish(things=things, volume=volume):
+            for thing in things:
+                _check_hand(hand, thing)
+            if volume is not None:
+                if pouring is None or all(thing.name != CUP for thing in things):
+                    raise InputError("There is no cup to fill.")
+                pouring.check(volume)
+        case cmd.Place(thing=thing):
+            _check_hand(hand, thing)
+        case cmd.Attach(to=Mount.HAND) if hand is None:
+            raise InputError(NO_HAND)
         case cmd.Follow(plan=plan):
             chains = [segment.path.chain for segment in plan.segments]
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
                 raise InputError("The plan was made for another arm.")
+
+
+def _check_hand(hand: Hand | None, thing: Thing) -> None:
+    if thing.fixed and hand is None:
+        raise InputError(NO_HAND)

@@ -115,7 +115,7 @@ class Put:
 
     def lay(self, bench: Bench) -> None:
         thing = _thing(bench, self.name)
-        if thing.held:
+        if thing.carried:
             raise InputError(f"{self.name} is in the hand: set it down first.")
         T = se3.from_rotation_translation(thing.T[:3, :3], (self.x, self.y, 0.0))
         put = replace(thing, T=T)
@@ -308,11 +308,16 @@ def _thing(bench: Bench, name: str) -> Thing:
 def _overlap(one: Thing, other: Thing) -> bool:
     """Whether two things on the table are in each other, taken for round."""
     apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
-    return apart < max(one.size[:2]) * _ROUND[one.form] + max(other.size[:2]) * _ROUND[other.form]
+    return apart < _round(one) + _round(other)
 
 
-_ROUND = {Form.BOX: 0.71, Form.CYLINDER: 1.0, Form.SPHERE: 1.0}
-"""Of the largest side or the radius, how far a form reaches from its middle."""
+def _round(thing: Thing) -> float:
+    """[m] How far it reaches from its middle."""
+    return max(thing.extent[:2]) * _ROUND[thing.form]
+
+
+_ROUND = {Form.BOX: 0.71, Form.CYLINDER: 1.0, Form.SPHERE: 1.0, Form.MESH: 0.71}
+"""Of the largest side or the radius."""
 
 
 def _tool(bench: Bench, name: str) -> None:

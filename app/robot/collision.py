@@ -75,13 +75,14 @@ def standing_around(props: Props) -> tuple[Part, ...]:
     return (table(), *(obstacle(each.name, each.T_shape, each.shape) for each in things))
 
 
-def hand_of(model: RobotModel, world: World) -> Hand | None:
-    """The fingers and what they hang on; None for an arm without."""
+def hand_of(model: RobotModel, world: World) -> Hand:
+    """The fingers and what they hang on; without any, what the last joint turns."""
     driven = {body.name for body in model.bodies if body.joint in model.fingers}
     fingers = [part for part in world.parts if part.name in driven]
-    if not fingers:
-        return None
-    palm = int(world.linkage.parent[fingers[0].mover])
+    if fingers:
+        palm = int(world.linkage.parent[fingers[0].mover])
+    else:
+        palm = int(np.flatnonzero(world.linkage.variable == model.arm.chain.n - 1)[-1])
     return Hand(palm, tuple(part.name for part in fingers))
 
 

@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 REST_SECONDS = 5.0
 """[s] In which an arm that is to set out from rest has come to it."""
 
-PASSIVE = (cmd.SpeedScale, cmd.Place, cmd.Remove, cmd.Fill, cmd.SetGripper)
+PASSIVE = (cmd.SpeedScale, cmd.Place, cmd.Remove, cmd.Attach, cmd.Furnish, cmd.Fill, cmd.SetGripper)
 """Commands that leave a way under work as it is."""
 
 
