@@ -232,7 +232,10 @@ class Loop(Answer, frozen=True, kw_only=True):
 
 
 class Thing(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that stands around or is held; ``T`` (4, 4) in the base frame. See ``place``."""
+    """Something that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
+
+    ``fixed``: to the hand. ``colour``: null for its own.
+    """
 
     name: str
     form: str
@@ -240,6 +243,12 @@ class Thing(msgspec.Struct, frozen=True, kw_only=True):
     T: list[Numbers]
     can_be_held: bool
     held: bool
+    mesh: str | None = None
+    scale: float = 1.0
+    colour: str | None = None
+    opacity: float = 1.0
+    hidden: bool = False
+    fixed: bool = False
 
 
 class Things(Answer, frozen=True, kw_only=True):
@@ -248,7 +257,31 @@ class Things(Answer, frozen=True, kw_only=True):
     things: list[Thing]
 
 
-AnyAnswer = Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop | Things
+class Mesh(Answer, frozen=True, kw_only=True):
+    """A file that was uploaded and can now be placed.
+
+    ``key``: for ``place``. ``name``: of the file, and of no thing there is. ``said``: what was
+    read, in words. ``size``: along x, y, z [m].
+    """
+
+    key: str
+    name: str
+    said: str
+    size: Numbers
+    triangles: int
+
+
+class Scene(Answer, frozen=True, kw_only=True):
+    """A scene that was uploaded and can now be loaded. ``key``: for ``load``."""
+
+    key: str
+    things: list[str]
+    said: str
+
+
+AnyAnswer = (
+    Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop | Things | Mesh | Scene
+)
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
 

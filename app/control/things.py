@@ -189,16 +189,18 @@ def furnished_with(things: tuple[Thing, ...], wanted: tuple[Thing, ...]) -> tupl
     return (*held, *left)[:MOST]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hand:
     """What the arm takes things with.
 
     palm: the piece of the linkage that fingers hang on, the last of the arm where it has none.
-    fingers: their names among the parts.
+    fingers: their names among the parts. T_palm_tool: (4, 4) the frame of the default tool in that
+    of the palm.
     """
 
     palm: int
     fingers: tuple[str, ...]
+    T_palm_tool: FloatArray
 
 
 class Surroundings:
@@ -242,14 +244,18 @@ class Surroundings:
 
     def taken(self, thing: Thing, x: FloatArray) -> Thing:
         """``thing`` in the hand, where it is."""
-        return replace(thing, T=se3.inverse(self._palm(x)) @ thing.T, held=True)
+        return replace(thing, T=self.into_hand(thing.T, x), held=True)
+
+    def into_hand(self, T: FloatArray, x: FloatArray) -> FloatArray:
+        """``T`` (4, 4) in the base frame, in that of the hand at ``x`` (k,)."""
+        return se3.inverse(self._palm(x)) @ T
 
     def mounted(self, thing: Thing, to: Mount, x: FloatArray) -> Thing:
         """``thing`` fixed to the hand, or to it no more. What the fingers hold stays with them."""
         if thing.held or (to is Mount.HAND and (thing.fixed or self.hand is None)):
             return thing
         if to is Mount.HAND:
-            return replace(thing, T=se3.inverse(self._palm(x)) @ thing.T, fixed=True)
+            return replace(thing, T=self.into_hand(thing.T, x), fixed=True)
         if to is Mount.TABLE:
             return self.left(thing, x)
         return replace(thing, T=self.pose(thing, x), fixed=False)

@@ -14,8 +14,9 @@ import numpy as np
 from app.control import commands as cmd
 from app.control.plans import plan_along
 from app.control.pouring import CUP
+from app.control.room import girth
 from app.control.state import State
-from app.control.things import Form, Thing
+from app.control.things import Thing
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray
@@ -308,16 +309,7 @@ def _thing(bench: Bench, name: str) -> Thing:
 def _overlap(one: Thing, other: Thing) -> bool:
     """Whether two things on the table are in each other, taken for round."""
     apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
-    return apart < _round(one) + _round(other)
-
-
-def _round(thing: Thing) -> float:
-    """[m] How far it reaches from its middle."""
-    return max(thing.extent[:2]) * _ROUND[thing.form]
-
-
-_ROUND = {Form.BOX: 0.71, Form.CYLINDER: 1.0, Form.SPHERE: 1.0, Form.MESH: 0.71}
-"""Of the largest side or the radius."""
+    return apart < girth(one) + girth(other)
 
 
 def _tool(bench: Bench, name: str) -> None:

@@ -83,7 +83,10 @@ def hand_of(model: RobotModel, world: World) -> Hand:
         palm = int(world.linkage.parent[fingers[0].mover])
     else:
         palm = int(np.flatnonzero(world.linkage.variable == model.arm.chain.n - 1)[-1])
-    return Hand(palm, tuple(part.name for part in fingers))
+    chain = model.arm.chain
+    T_base_palm = world.linkage.poses(np.zeros(chain.n + 1))[palm]
+    T_palm_tool = se3.inverse(T_base_palm) @ model.T_base_shoulder @ chain.M
+    return Hand(palm, tuple(part.name for part in fingers), frozen(T_palm_tool))
 
 
 def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:

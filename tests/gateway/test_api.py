@@ -21,7 +21,7 @@ import pytest
 from app.api import answers, requests, schema
 from app.cli.main import main
 from app.client import AsyncClient, Client, RefusedError, aconnect, connect
-from app.client.asynchronous import LostError
+from app.client.files import LostError
 from app.kinematics.forward import forward
 from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
