@@ -100,12 +100,13 @@ def _told(
         *(_round(1e3 * each, LENGTH_DIGITS) for each in T[:3, 3]),
         *(_round(each, ANGLE_DIGITS) for each in np.degrees(so3.to_rpy(T[:3, :3]))),
     ]
-    if thing.scale != 1.0:
-        told["scale"] = float(f"{thing.scale:.12g}")
+    scale, opacity = (float(f"{each:.12g}") for each in (thing.scale, thing.look.opacity))
+    if scale != 1.0:
+        told["scale"] = scale
     if thing.look.colour is not None:
         told["colour"] = "#{:02x}{:02x}{:02x}".format(*thing.look.colour)
-    if thing.look.opacity != 1.0:
-        told["opacity"] = float(f"{thing.look.opacity:.12g}")
+    if opacity != 1.0:
+        told["opacity"] = opacity
     for name, true in (("hidden", thing.look.hidden), ("can_be_held", thing.can_be_held)):
         if true:
             told[name] = True

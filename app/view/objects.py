@@ -31,13 +31,18 @@ class ObjectsPanel:
     """A folder of controls, all of the one object that is chosen."""
 
     def __init__(
-        self, server: viser.ViserServer, put: Callable[[cmd.Command], int], state: State
+        self,
+        server: viser.ViserServer,
+        put: Callable[[cmd.Command], int],
+        state: Callable[[], State],
     ) -> None:
+        """``state``: the newest."""
         self._put = put
-        self._things = state.things
+        self._state = state
+        self._things = state().things
         self._shown: Thing | None = None
         gui = server.gui
-        names = _names(state.things)
+        names = _names(self._things)
         with gui.add_folder("Objects", expand_by_default=False):
             self._choice = gui.add_dropdown(
                 "Object", names, hint="What the rest of this folder is about"
@@ -78,7 +83,7 @@ class ObjectsPanel:
                 hint="Hand: it goes with the hand and counts as a part of it. Table: it is set "
                 "down below. Here: it stays where it is, in the air too",
             )
-            self._acts = gui.add_button_group("Object's", (OWN, REMOVE))
+            self._acts = gui.add_button_group("And", (OWN, REMOVE))
         self._on(self._colour, lambda thing: _recoloured(thing, self._colour.value))
         self._on(
             self._opacity,
@@ -96,18 +101,17 @@ class ObjectsPanel:
         """Show what there is. ``caught_up``: see ``Panel``."""
         if not caught_up:
             return
-        if state.things is not self._things:
-            self._things = state.things
-            names = _names(state.things)
-            if names != tuple(self._choice.options):
-                new = [name for name in names if name not in self._choice.options]
-                chosen = self._choice.value
-                self._choice.options = names
-                if new or chosen not in names:
-                    # What has just come is what one wants to touch.
-                    self._choice.value = new[-1] if new else names[0]  # type: ignore[misc]
-                elif self._choice.value != chosen:
-                    self._choice.value = chosen  # type: ignore[misc]  # viser has it read-only
+        self._things = state.things
+        names = _names(state.things)
+        if names != tuple(self._choice.options):
+            new = [name for name in names if name not in self._choice.options]
+            chosen = self._choice.value
+            self._choice.options = names
+            if new or chosen not in names:
+                # What has just come is what one wants to touch.
+                self._choice.value = new[-1] if new else names[0]  # type: ignore[misc]
+            elif self._choice.value != chosen:
+                self._choice.value = chosen  # type: ignore[misc]  # viser has it read-only
         self._show(self._chosen())
 
     def _chosen(self) -> Thing | None:
@@ -139,6 +143,8 @@ class ObjectsPanel:
             if event.client_id is None:
                 return
             try:
+                # What is shown may be older than what was put there meanwhile.
+                self._things = self._state().things
                 thing = self._chosen()
                 if thing is None:
                     raise InputError("There is no object: add one first.")

@@ -60,6 +60,9 @@ def test_an_object_is_brought_moved_changed_and_removed(
         page.wait_until(lambda: "1040 × 1040 × 240 mm" in said(page), "the other unit")
         page.page.select_option("#unit", "mm")
         page.wait_until(lambda: "104 × 104 × 24 mm" in said(page), "the first again")
+        page.wait_until(
+            lambda: len(page.messages("MeshMessage", node=SHAPE)) == 3, "each of them in the scene"
+        )
         np.testing.assert_allclose(place_of(page), moved, atol=1e-9)
 
         page.type_number("Scale", 1.5)
