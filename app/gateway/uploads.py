@@ -28,7 +28,10 @@ RATE, AT_ONCE = 0.5, 10.0
 WAITING = 4
 """Files that are read or wait for it."""
 
-NOT_ALLOWED, NOT_NOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 403, 409, 413, 422, 429
+PATIENCE = 60.0
+"""[s] Until a file is here and read, whoever sends it slowly."""
+
+NOT_ALLOWED, TOO_SLOW, NOT_NOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 403, 408, 409, 413, 422, 429
 
 T = TypeVar("T")
 
@@ -100,7 +103,10 @@ class Uploads:
             return _json(answers.Refused(why=why), TOO_MANY)
         self._waiting += 1
         try:
-            return _json(await keep())
+            async with asyncio.timeout(PATIENCE):
+                return _json(await keep())
+        except TimeoutError:
+            return _json(answers.Refused(why=f"That took more than {PATIENCE:g} s."), TOO_SLOW)
         except InputError as error:
             return _json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
         except LeaseError as error:

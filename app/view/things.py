@@ -11,7 +11,8 @@ import trimesh
 import viser
 
 from app.control.commands import Command, Place
-from app.control.state import State
+from app.control.solid import Solid
+from app.control.state import Reason, State
 from app.control.things import Form, Surroundings, Thing
 from app.exchange.creases import Drawn, drawn, glb
 from app.exchange.meshes import Meshes
@@ -21,12 +22,16 @@ from app.robot.props import Props
 from app.robot.visual import Visual
 from app.view.guard import WORKSPACE
 from app.view.posing import place, turn
+from app.view.tint import Tint
 
 HANDLE = 0.09
 """[m] Length of a handle's arrows: they end outside cup and basin."""
 
 COLOUR = (148, 163, 184)
 """Of what has none of its own."""
+
+COAT = 1.005
+"""[1] A coat is so much larger, that it does not flicker with what it coats."""
 
 FACETS = 48
 """Of what is round."""
@@ -76,9 +81,17 @@ class ThingNodes:
         changed = state.things is not self._seen
         if changed:
             self._take_in(state.things)
+        near = {
+            part
+            for finding in state.findings
+            if finding.reason is Reason.CONTACT
+            for part in finding.parts or ()
+        }
         for thing in state.things:
             if changed or thing.carried:
                 self._pose(thing, np.append(state.q, state.gripper))
+            if thing.name not in self._props:
+                self._shapes[thing.name].warn(thing, near=thing.name in near)
 
     def _take_in(self, things: tuple[Thing, ...]) -> None:
         self._seen = things
@@ -159,6 +172,8 @@ class _Shape:
         """``prop``: the GLB file of what has one and is no other form."""
         self._scene = server.scene
         self._path = f"{path}/shape"
+        self._coat_path = f"{path}/contact"
+        self._coat: viser.MeshHandle | None = None
         self._meshes = meshes
         self._prop = prop
         self._node: Any = None
@@ -173,10 +188,31 @@ class _Shape:
         if now != self._is:
             self._is = now
             self._node = self._made(thing, own=own)
+            if self._coat is not None:
+                self._coat.remove()
+                self._coat = None
         if not own:
             _set(self._node, "color", thing.look.colour or COLOUR)
             _set(self._node, "opacity", _opacity(thing))
         _set(self._node, "scale", thing.scale)
+
+    def warn(self, thing: Thing, *, near: bool) -> None:
+        """Coat it, as long as the arm is ``near``, in what it counts as."""
+        if self._coat is None and near:
+            body = _plain(thing) if thing.solid is None else _hull(thing.solid)
+            surface = _of(body)
+            self._coat = self._scene.add_mesh_simple(
+                self._coat_path,
+                (COAT * surface.vertices).astype(np.float32),
+                surface.faces.astype(np.uint32),
+                color=Tint.COLOUR,
+                opacity=Tint.OPACITY,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        if self._coat is not None:
+            _set(self._coat, "visible", near)
+            _set(self._coat, "scale", thing.scale)
 
     def _made(self, thing: Thing, *, own: bool) -> Any:
         # viser replaces the node of the name.
@@ -210,12 +246,17 @@ class _Shape:
             if mesh is not None:
                 return mesh.drawn
             # Known to the arm from before this process began.
-            return _of(trimesh.Trimesh(thing.solid.corners).convex_hull)
+            return _of(_hull(thing.solid))
         if self._prop is not None:
             made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop).mesh
             made.merge_vertices(merge_tex=True, merge_norm=True)
             return _of(made)
         return _of(_plain(thing))
+
+
+def _hull(solid: Solid) -> Any:
+    """What a mesh counts as."""
+    return trimesh.Trimesh(solid.corners).convex_hull
 
 
 def _plain(thing: Thing) -> Any:

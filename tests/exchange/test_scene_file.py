@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -296,3 +297,13 @@ def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: 
     assert all(other().key != mesh.key for other in others)
     with pytest.raises(InputError, match="A unit is one of mm, cm, in, m"):
         read_mesh(ring(), "ring.stl", "ft")
+
+
+def test_the_scene_of_the_documents_is_understood() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "scenes.md"
+    text = page.read_text(encoding="utf-8").partition("```yaml\n")[2].partition("```")[0]
+    draft = parsed(re.sub(r".*sha256.*\n", "", text))
+    assert [entry.name for entry in draft.entries] == ["cup", "bracket"]
+    assert draft.entries[1].mesh == MeshFile("meshes/bracket.stl", "mm", "z", None)
+    assert draft.entries[1].fixed
+    assert draft.water == pytest.approx(1.5e-4)

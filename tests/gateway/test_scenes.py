@@ -98,8 +98,8 @@ def test_a_mesh_is_placed_fixed_to_the_hand_and_met(
     assert told.name == "ring 2"
     assert told.triangles == 576
     np.testing.assert_allclose(told.size, (0.104, 0.104, 0.024), atol=1e-6)
-    inches = arm.upload(ring, "in").key
-    assert inches != told.key
+    other = arm.upload(ring, "cm").key
+    assert other != told.key
     form = requests.Form.MESH
     arm.ask(requests.Place(name="it", form=form, mesh=told.key, scale=0.5, opacity=0.4))
     until(lambda: "it" in things(arm))
