@@ -6,6 +6,7 @@ Source of the ears: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, IntArray
 
@@ -61,37 +62,45 @@ def _ears(points: FloatArray) -> IntArray:
     flat = np.delete(points, axis, axis=1)
     if (normal[axis] < 0.0) != (axis == 1):
         flat = flat[:, ::-1]
-    left = list(range(len(flat)))
+    count = len(flat)
+    before, ahead = [*range(-1, count - 1)], [*range(1, count), 0]
+    before[0] = count - 1
+    left = np.ones(count, dtype=bool)
+    is_ear = [_is_ear(flat, left, before[b], b, ahead[b]) for b in range(count)]
     found: list[tuple[int, int, int]] = []
-    at = missed = 0
-    while len(left) > 3:
-        at %= len(left)
-        a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
+    b = missed = 0
+    while len(found) < count - 2:
+        a, c = before[b], ahead[b]
         # When nothing is an ear the polygon crosses itself, and any corner will do.
-        if missed >= len(left) or _is_ear(flat, left, a, b, c):
+        if is_ear[b] or missed > count:
             found.append((a, b, c))
-            del left[at]
+            left[b] = False
+            ahead[a], before[c] = c, a
+            # Of the others none becomes an ear by this, or ceases to be one.
+            for corner in (a, c):
+                is_ear[corner] = _is_ear(flat, left, before[corner], corner, ahead[corner])
             missed = 0
             # A corner farther on, so that long rows of ears do not end in one point.
-            at += 1
+            c = ahead[c]
         else:
             missed += 1
-            at += 1
-    return np.array([*found, tuple(left)], dtype=np.int64)
+        b = c
+    return np.array(found, dtype=np.int64)
 
 
-def _is_ear(flat: FloatArray, left: list[int], a: int, b: int, c: int) -> bool:
+def _is_ear(flat: FloatArray, left: npt.NDArray[np.bool_], a: int, b: int, c: int) -> bool:
+    """Whether the corner b turns left and none of those left is in its triangle."""
     ends = flat[[a, b, c]]
     if _turn(ends[0], ends[1], ends[2:])[0] <= 0.0:
         return False
     others = flat[left]
-    others = others[(others[:, None] != ends).any(axis=2).all(axis=1)]
     inside = (
         (_turn(ends[0], ends[1], others) >= 0.0)
         & (_turn(ends[1], ends[2], others) >= 0.0)
         & (_turn(ends[2], ends[0], others) >= 0.0)
     )
-    return not inside.any()
+    # Its own corners do not count, nor those that a bridge to a hole puts there once more.
+    return bool((others[inside][:, None] == ends).all(axis=2).any(axis=1).all())
 
 
 def _turn(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:

@@ -49,20 +49,26 @@ class Surface:
 
     def tidy(self) -> Surface:
         """With equal vertices made one, and without what is of no face or spans no triangle."""
-        rows = np.ascontiguousarray(self.vertices[self.faces.ravel()]) + 0.0
+        rows, faces = _used(self.vertices, self.faces)
+        # Adding zero makes 0 of -0.
+        rows = rows + 0.0
         order = np.lexsort(rows.T)
         first = np.ones(len(rows), dtype=bool)
         first[1:] = (np.diff(rows[order], axis=0) != 0.0).any(axis=1)
         number = np.empty(len(rows), dtype=np.int64)
         number[order] = np.cumsum(first) - 1
-        faces = number.reshape(-1, 3)
+        faces = number[faces]
         a, b, c = faces.T
         kept = (a != b) & (b != c) & (c != a)
-        colours = None if self.colours is None else self.colours[kept]
-        used = np.unique(faces[kept])
-        return Surface(
-            rows[order][first][used], np.searchsorted(used, faces[kept]).reshape(-1, 3), colours
-        )
+        vertices, faces = _used(rows[order][first], faces[kept])
+        return Surface(vertices, faces, None if self.colours is None else self.colours[kept])
+
+
+def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Those vertices that are of a face, and the faces with their new indices."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    return vertices[used], (np.cumsum(used) - 1)[faces]
 
 
 @dataclass(frozen=True, eq=False)
