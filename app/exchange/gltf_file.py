@@ -23,6 +23,7 @@ from app.exchange.surface import (
     Surface,
     check_triangles,
     display,
+    doubles,
     of_polygons,
 )
 from app.geometry import se3, so3
@@ -301,7 +302,7 @@ class _File:
         accessor = self._document.accessors[number]
         if accessor.normalized and rows.dtype.kind in "iu":
             return np.maximum(rows / float(np.iinfo(rows.dtype).max), -1.0)
-        return rows.astype(np.float64)
+        return doubles(rows)
 
     def _rows(self, number: int, width: int | None) -> npt.NDArray[Any]:
         """(count, width) of an accessor as it is; any width if None."""

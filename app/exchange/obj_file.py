@@ -110,7 +110,7 @@ class _Lines:
                 index = int(word.partition("/")[0])
             except ValueError:
                 raise self._wrong(line, f"{word[:20]!r} is no corner of a face") from None
-            if index == 0 or index < -count:
+            if index == 0 or not -count <= index < 1 << 31:
                 raise self._wrong(line, f"there is no vertex {index}")
             self._corners.append(index - 1 if index > 0 else count + index)
         self._sizes.append(len(words))

@@ -10,16 +10,14 @@ import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, IntArray
 
-MOST_CORNERS = 2000
-"""Of a concave polygon; the effort grows as their square. Larger ones become fans."""
-
 
 def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray]:
     """Triangles (m, 3) as places in `corners`, and (m,) the polygon each is of.
 
     vertices: (n, 3) finite. corners: (k,) indices of them, polygon after polygon. sizes: (p,)
     corners each. A polygon of k corners gives k - 2 triangles, in its own sense of turning; one
-    that crosses itself gives as many, somehow.
+    that crosses itself gives as many, somehow. The effort grows as the square of the corners of a
+    concave one.
     """
     starts = np.cumsum(sizes) - sizes
     triangles, owners = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
@@ -28,7 +26,7 @@ def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntAr
         places = starts[polygons][:, None] + np.arange(size)
         fan = np.column_stack((np.zeros(size - 2), np.arange(1, size - 1), np.arange(2, size)))
         local = np.broadcast_to(fan.astype(np.int64), (len(polygons), size - 2, 3)).copy()
-        if 3 < size <= MOST_CORNERS:
+        if size > 3:
             points = vertices[corners[places]]
             for number in np.flatnonzero(_concave(points)).tolist():
                 local[number] = _ears(points[number])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -90,9 +91,10 @@ class Pile:
         self._triangles = 0
 
     def add(self, part: Surface) -> None:
-        """Raises InputError for more triangles than may be."""
+        """Raises InputError for more triangles than may be, and for places that are not finite."""
         self._triangles += len(part.faces)
         check_triangles(self._triangles, self._name)
+        check_finite(part.vertices, self._name)
         self._parts.append(part)
 
     def surface(self) -> Surface:
@@ -157,6 +159,12 @@ def of_polygons(
     elif colours is not None:
         colours = colours[polygon]
     return Surface(vertices, corners[triangles], colours)
+
+
+def doubles(values: npt.NDArray[Any]) -> FloatArray:
+    """The same numbers in double precision, quietly where one is no number."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
 
 
 def check_finite(vertices: FloatArray, name: str) -> None:
