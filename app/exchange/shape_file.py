@@ -150,7 +150,12 @@ def read_shape_guarded(
     """
     file = label(name)
     _check(data, file, unit)
-    words = [format.value, file, repr(unit), "" if up is None else up.value]
+    words = [
+        format.value,
+        file,
+        "" if unit is None else str(float(unit)),
+        "" if up is None else up.value,
+    ]
     # One thread: a pool for every core would take address space, which is what is bounded.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     try:
@@ -203,7 +208,8 @@ def thing_name(name: str) -> str:
 def _check(data: bytes, file: str, unit: float | None) -> None:
     if len(data) > MOST_BYTES:
         raise InputError(
-            f"{file} has {len(data) / 1e6:.1f} MB; at most {MOST_BYTES // 1_000_000} are read; save it coarser."
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {MOST_BYTES // 1_000_000} are read; "
+            "save it coarser, or as a binary file."
         )
     if unit is not None and not (math.isfinite(unit) and unit > 0.0):
         raise InputError(f"The unit has to be a length in metres above 0, not {unit}.")

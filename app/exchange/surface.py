@@ -131,6 +131,7 @@ def of_polygons(
     name: str,
     colours: Colours | None = None,
     corner_colours: FloatArray | None = None,
+    vertex_colours: FloatArray | None = None,
 ) -> Surface:
     """The surface of polygons, concave ones too.
 
@@ -141,6 +142,7 @@ def of_polygons(
         name: of the file.
         colours: (p, 4) a polygon.
         corner_colours: (k, 4) 0..1 a corner; a triangle has the mean of its three.
+        vertex_colours: (n, 4) 0..1 a vertex; the same.
 
     Raises InputError for indices of no vertex, coordinates that are no finite numbers, and more
     triangles than may be.
@@ -149,12 +151,14 @@ def of_polygons(
     wrong = (corners < 0) | (corners >= len(vertices))
     if wrong.any():
         raise InputError(
-            f"{name} has a face with vertex {int(corners[wrong][0])}, "
-            f"but its vertices are 0 to {len(vertices) - 1}."
+            f"{name} has a face with vertex {int(corners[wrong][0])}, counted from 0, "
+            f"but only {len(vertices)} vertices."
         )
     check_finite(vertices[corners], name)
     triangles, polygon = cut(vertices, corners, sizes)
-    if corner_colours is not None:
+    if vertex_colours is not None:
+        colours = as_bytes(vertex_colours[corners[triangles]].mean(axis=1))
+    elif corner_colours is not None:
         colours = as_bytes(corner_colours[triangles].mean(axis=1))
     elif colours is not None:
         colours = colours[polygon]
