@@ -5,6 +5,8 @@ Source of the ears: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 import numpy.typing as npt
 
@@ -65,24 +67,26 @@ def _ears(points: FloatArray) -> IntArray:
     before[0] = count - 1
     left = np.ones(count, dtype=bool)
     is_ear = [_is_ear(flat, left, before[b], b, ahead[b]) for b in range(count)]
+    ears = deque(b for b in range(count) if is_ear[b])
     found: list[tuple[int, int, int]] = []
-    b = missed = 0
+    b = 0
     while len(found) < count - 2:
-        a, c = before[b], ahead[b]
+        while ears and not is_ear[ears[0]]:
+            ears.popleft()
         # When nothing is an ear the polygon crosses itself, and any corner will do.
-        if is_ear[b] or missed > count:
-            found.append((a, b, c))
-            left[b] = False
-            ahead[a], before[c] = c, a
-            # Of the others none becomes an ear by this, or ceases to be one.
-            for corner in (a, c):
-                is_ear[corner] = _is_ear(flat, left, before[corner], corner, ahead[corner])
-            missed = 0
-            # A corner farther on, so that long rows of ears do not end in one point.
-            c = ahead[c]
-        else:
-            missed += 1
-        b = c
+        b = ears.popleft() if ears else ahead[b]
+        a, c = before[b], ahead[b]
+        found.append((a, b, c))
+        left[b] = is_ear[b] = False
+        ahead[a], before[c] = c, a
+        # Of the others none becomes an ear by this, or ceases to be one.
+        for corner in (a, c):
+            was, is_ear[corner] = (
+                is_ear[corner],
+                _is_ear(flat, left, before[corner], corner, ahead[corner]),
+            )
+            if is_ear[corner] and not was:
+                ears.append(corner)
     return np.array(found, dtype=np.int64)
 
 

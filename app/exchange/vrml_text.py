@@ -37,8 +37,9 @@ LONGEST = 160
 DEEPEST = 200
 """Nodes in nodes; a file that goes deeper is refused before Python's stack ends."""
 
+# Possessive, so that what does not match fails at once, whatever a stranger wrote.
 _TOKEN = re.compile(
-    r'[\s,]*(?:#[^\n\r]*[\s,]*)*("(?:[^"\\]|\\.)*"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
+    r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
 )
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _ZERO_AFTER = re.compile(r"\.0(?![0-9e])")

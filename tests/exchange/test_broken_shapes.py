@@ -394,9 +394,9 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     read = 0
     for _ in range(MUTATIONS):
-        start = time.perf_counter()
+        start = time.process_time()
         read += looked_at(mutated(data, chance), format) is not None
-        assert time.perf_counter() - start < SECONDS
+        assert time.process_time() - start < SECONDS
     assert read < MUTATIONS
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MEMORY
 
