@@ -23,6 +23,7 @@ from app.exchange.surface import (
     Surface,
     check_triangles,
     display,
+    doubles,
     of_polygons,
 )
 from app.geometry import se3, so3
@@ -249,16 +250,13 @@ class _File:
         corners = self._corners(index, primitive.mode)
         if primitive.targets:
             self._left_out["changes of shape"] += 1
-        colours = self._colours(primitive, len(points))
-        # An index that is none is refused by of_polygons.
-        safe = np.minimum(corners, len(points) - 1) if len(points) else corners[:0]
         return of_polygons(
             points,
             corners,
             np.full(len(corners) // 3, 3),
             self._name,
-            corner_colours=colours[safe] if colours is not None and len(colours) > 1 else None,
-        ).painted(None if colours is None or len(colours) != 1 else colours[0].tolist())
+            vertex_colours=self._colours(primitive, len(points)),
+        )
 
     def _corners(self, index: IntArray, mode: int) -> IntArray:
         """(3 m,) of triangles, strips or fans."""
@@ -277,7 +275,7 @@ class _File:
         return index[places.ravel()] if count else index[:0]
 
     def _colours(self, primitive: Primitive, count: int) -> FloatArray | None:
-        """(count, 4) or (1, 4), sRGB 0..1, of the vertices or of all; None without material."""
+        """(count, 4) sRGB and opacity 0..1 of the vertices; None without any."""
         factor = None
         if primitive.material is not None:
             material = self._document.materials[primitive.material].pbr_metallic_roughness
@@ -293,7 +291,8 @@ class _File:
             factor = own if factor is None else own * factor
         if factor is None:
             return None
-        return np.column_stack((display(factor[:, :3]), factor[:, 3]))
+        shown = np.column_stack((display(factor[:, :3]), factor[:, 3]))
+        return np.broadcast_to(shown, (count, 4))
 
     def _numbers(self, number: int, width: int | None) -> FloatArray:
         """(count, width) of an accessor; whole numbers that stand for 0..1 or -1..1 as these."""
@@ -301,7 +300,7 @@ class _File:
         accessor = self._document.accessors[number]
         if accessor.normalized and rows.dtype.kind in "iu":
             return np.maximum(rows / float(np.iinfo(rows.dtype).max), -1.0)
-        return rows.astype(np.float64)
+        return doubles(rows)
 
     def _rows(self, number: int, width: int | None) -> npt.NDArray[Any]:
         """(count, width) of an accessor as it is; any width if None."""

@@ -75,19 +75,17 @@ class _Lines:
 
     def reading(self) -> Reading:
         """Of all lines."""
-        corners = np.array(self._corners, dtype=np.int64)
-        corner_colours = None
+        vertex_colours = None
         if self._colours:
-            colours = np.full((len(self._vertices), 4), 0.8)
-            colours[:, 3] = 1.0
-            colours[list(self._colours), :3] = list(self._colours.values())
-            corner_colours = colours[corners]
+            vertex_colours = np.full((len(self._vertices), 4), 0.8)
+            vertex_colours[:, 3] = 1.0
+            vertex_colours[list(self._colours), :3] = list(self._colours.values())
         surface = of_polygons(
             np.array(self._vertices, dtype=np.float64).reshape(-1, 3),
-            corners,
+            np.array(self._corners, dtype=np.int64),
             np.array(self._sizes, dtype=np.int64),
             self._name,
-            corner_colours=corner_colours,
+            vertex_colours=vertex_colours,
         )
         return Reading(surface, tuple(self._left_out))
 
@@ -110,7 +108,7 @@ class _Lines:
                 index = int(word.partition("/")[0])
             except ValueError:
                 raise self._wrong(line, f"{word[:20]!r} is no corner of a face") from None
-            if index == 0 or index < -count:
+            if index == 0 or not -count <= index < 1 << 31:
                 raise self._wrong(line, f"there is no vertex {index}")
             self._corners.append(index - 1 if index > 0 else count + index)
         self._sizes.append(len(words))

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.errors import InputError
-from app.exchange.surface import Colours, Reading, as_bytes, of_polygons
+from app.exchange.surface import Reading, as_bytes, doubles, of_polygons
 from app.geometry.arrays import FloatArray
 
 TYPES = {
@@ -68,18 +68,22 @@ def read_ply(data: bytes, name: str) -> Reading:
     vertices, faces = found.get("vertex", {}), found.get("face", {})
     if not all(axis in vertices and vertices[axis].sizes is None for axis in "xyz"):
         raise InputError(f"{name} has no vertices with x, y and z.")
-    points = np.column_stack([vertices[axis].values for axis in "xyz"]).astype(np.float64)
+    points = np.column_stack([doubles(vertices[axis].values) for axis in "xyz"])
     listed = next((faces[key] for key in CORNERS if key in faces), None)
     if listed is None or listed.sizes is None:
         listed = Column(np.zeros(0), np.zeros(0, dtype=np.int64), "i4")
     assert listed.sizes is not None
-    corners = listed.values.astype(np.int64)
-    painted = _paint(vertices)
-    corner_colours = None
-    if painted is not None and corners.size and 0 <= corners.min() <= corners.max() < len(points):
-        corner_colours = painted[corners] / 255.0
+    # What is no number of a vertex becomes one that is none.
+    usable = np.abs(doubles(listed.values)) < 2.0**53
+    corners = np.where(usable, listed.values, -1).astype(np.int64)
+    colours, of_vertices = _paint(faces), _paint(vertices)
     surface = of_polygons(
-        points, corners, listed.sizes, name, _paint(faces), corner_colours=corner_colours
+        points,
+        corners,
+        listed.sizes,
+        name,
+        None if colours is None else as_bytes(colours),
+        vertex_colours=of_vertices if colours is None else None,
     )
     others = [f"{e.rows} {e.name}" for e in elements if e.name not in ("vertex", "face") and e.rows]
     return Reading(surface, tuple(others))
@@ -124,15 +128,15 @@ def _last(elements: dict[str, Element]) -> Element:
     return next(reversed(elements.values()))
 
 
-def _paint(columns: dict[str, Column]) -> Colours | None:
-    """(rows, 4), of numbers 0..1 or 0..255 by their type; None where there are no colours."""
+def _paint(columns: dict[str, Column]) -> FloatArray | None:
+    """(rows, 4) 0..1, of numbers 0..1 or 0..255 by their type; None where there are no colours."""
     found = [columns[key] for key in PAINT if key in columns and columns[key].sizes is None]
     if len(found) < 3:
         return None
     scales = [1.0 if each.numbers.startswith("f") else 255.0 for each in found]
-    parts = [each.values / scale for each, scale in zip(found, scales, strict=True)]
+    parts = [doubles(each.values) / scale for each, scale in zip(found, scales, strict=True)]
     parts += [np.ones(len(parts[0]))] * (4 - len(parts))
-    return as_bytes(np.column_stack(parts))
+    return np.column_stack(parts)
 
 
 class _Text:
@@ -141,9 +145,9 @@ class _Text:
     def __init__(self, body: bytes, name: str) -> None:
         self._name, self._at = name, 0
         try:
-            self._numbers = np.array(body.split(), dtype=np.bytes_).astype(np.float64)
+            self._numbers = np.array(list(map(float, body.split())), dtype=np.float64)
         except ValueError as error:
-            raise InputError(f"{name} is broken: {error}.") from error
+            raise InputError(f"{name} is broken: {str(error)[:80]}.") from error
 
     def columns(self, element: Element) -> dict[str, Column]:
         """Of the rows that come next."""

@@ -5,12 +5,12 @@ Source of the ears: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
+import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, IntArray
-
-MOST_CORNERS = 2000
-"""Of a concave polygon; the effort grows as their square. Larger ones become fans."""
 
 
 def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray]:
@@ -18,7 +18,8 @@ def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntAr
 
     vertices: (n, 3) finite. corners: (k,) indices of them, polygon after polygon. sizes: (p,)
     corners each. A polygon of k corners gives k - 2 triangles, in its own sense of turning; one
-    that crosses itself gives as many, somehow.
+    that crosses itself gives as many, somehow. The effort grows as the square of the corners of a
+    concave one.
     """
     starts = np.cumsum(sizes) - sizes
     triangles, owners = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
@@ -27,7 +28,7 @@ def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntAr
         places = starts[polygons][:, None] + np.arange(size)
         fan = np.column_stack((np.zeros(size - 2), np.arange(1, size - 1), np.arange(2, size)))
         local = np.broadcast_to(fan.astype(np.int64), (len(polygons), size - 2, 3)).copy()
-        if 3 < size <= MOST_CORNERS:
+        if size > 3:
             points = vertices[corners[places]]
             for number in np.flatnonzero(_concave(points)).tolist():
                 local[number] = _ears(points[number])
@@ -61,37 +62,47 @@ def _ears(points: FloatArray) -> IntArray:
     flat = np.delete(points, axis, axis=1)
     if (normal[axis] < 0.0) != (axis == 1):
         flat = flat[:, ::-1]
-    left = list(range(len(flat)))
+    count = len(flat)
+    before, ahead = [*range(-1, count - 1)], [*range(1, count), 0]
+    before[0] = count - 1
+    left = np.ones(count, dtype=bool)
+    is_ear = [_is_ear(flat, left, before[b], b, ahead[b]) for b in range(count)]
+    ears = deque(b for b in range(count) if is_ear[b])
     found: list[tuple[int, int, int]] = []
-    at = missed = 0
-    while len(left) > 3:
-        at %= len(left)
-        a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
+    b = 0
+    while len(found) < count - 2:
+        while ears and not is_ear[ears[0]]:
+            ears.popleft()
         # When nothing is an ear the polygon crosses itself, and any corner will do.
-        if missed >= len(left) or _is_ear(flat, left, a, b, c):
-            found.append((a, b, c))
-            del left[at]
-            missed = 0
-            # A corner farther on, so that long rows of ears do not end in one point.
-            at += 1
-        else:
-            missed += 1
-            at += 1
-    return np.array([*found, tuple(left)], dtype=np.int64)
+        b = ears.popleft() if ears else ahead[b]
+        a, c = before[b], ahead[b]
+        found.append((a, b, c))
+        left[b] = is_ear[b] = False
+        ahead[a], before[c] = c, a
+        # Of the others none becomes an ear by this, or ceases to be one.
+        for corner in (a, c):
+            was, is_ear[corner] = (
+                is_ear[corner],
+                _is_ear(flat, left, before[corner], corner, ahead[corner]),
+            )
+            if is_ear[corner] and not was:
+                ears.append(corner)
+    return np.array(found, dtype=np.int64)
 
 
-def _is_ear(flat: FloatArray, left: list[int], a: int, b: int, c: int) -> bool:
+def _is_ear(flat: FloatArray, left: npt.NDArray[np.bool_], a: int, b: int, c: int) -> bool:
+    """Whether the corner b turns left and none of those left is in its triangle."""
     ends = flat[[a, b, c]]
     if _turn(ends[0], ends[1], ends[2:])[0] <= 0.0:
         return False
     others = flat[left]
-    others = others[(others[:, None] != ends).any(axis=2).all(axis=1)]
     inside = (
         (_turn(ends[0], ends[1], others) >= 0.0)
         & (_turn(ends[1], ends[2], others) >= 0.0)
         & (_turn(ends[2], ends[0], others) >= 0.0)
     )
-    return not inside.any()
+    # Its own corners do not count, nor those that a bridge to a hole puts there once more.
+    return bool((others[inside][:, None] == ends).all(axis=2).any(axis=1).all())
 
 
 def _turn(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:

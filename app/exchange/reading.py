@@ -30,7 +30,7 @@ def main(words: list[str]) -> None:
             data,
             Format(format),
             name,
-            None if unit == "None" else float(unit),
+            float(unit) if unit else None,
             Up(up) if up else None,
         )
     except InputError as error:

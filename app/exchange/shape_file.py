@@ -24,7 +24,7 @@ from app.exchange.gltf_file import read_gltf
 from app.exchange.obj_file import read_obj
 from app.exchange.ply_file import read_ply
 from app.exchange.stl_file import read_stl
-from app.exchange.surface import Colours, Reading, Surface, check_finite
+from app.exchange.surface import Colours, Reading, Surface
 from app.exchange.vrml_file import read_wrl
 from app.geometry.arrays import FloatArray, IntArray
 
@@ -96,6 +96,11 @@ class ShapeFile:
     unit: float
     said: str
 
+    def __post_init__(self) -> None:
+        for array in (self.vertices, self.faces, self.colours):
+            if array is not None:
+                array.setflags(write=False)
+
 
 def read_shape(
     data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
@@ -118,7 +123,6 @@ def read_shape(
     except RecursionError as error:
         raise InputError(f"{file} is broken: its parts lie too deep in each other.") from error
     surface = reading.surface.tidy()
-    check_finite(surface.vertices, file)
     if not len(surface.faces):
         without = f" It has {_listed(reading.left_out)}." if reading.left_out else ""
         raise InputError(f"{file} has no triangles.{without}")
@@ -146,7 +150,12 @@ def read_shape_guarded(
     """
     file = label(name)
     _check(data, file, unit)
-    words = [format.value, file, repr(unit), "" if up is None else up.value]
+    words = [
+        format.value,
+        file,
+        "" if unit is None else str(float(unit)),
+        "" if up is None else up.value,
+    ]
     # One thread: a pool for every core would take address space, which is what is bounded.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     try:
@@ -165,7 +174,8 @@ def read_shape_guarded(
         ) from error
     if done.returncode:
         raise InputError(
-            f"{file} cannot be read within {SECONDS:g} s and {MEMORY >> 20} MiB; save it simpler."
+            f"{file} cannot be read: it wants more than {SECONDS:g} s or {MEMORY >> 20} MiB, or is "
+            "broken in a new way; save it simpler."
         )
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
         if "error" in found:
@@ -198,7 +208,8 @@ def thing_name(name: str) -> str:
 def _check(data: bytes, file: str, unit: float | None) -> None:
     if len(data) > MOST_BYTES:
         raise InputError(
-            f"{file} has {len(data) / 1e6:.1f} MB; at most {MOST_BYTES // 1_000_000} are read."
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {MOST_BYTES // 1_000_000} are read; "
+            "save it coarser, or as a binary file."
         )
     if unit is not None and not (math.isfinite(unit) and unit > 0.0):
         raise InputError(f"The unit has to be a length in metres above 0, not {unit}.")
@@ -255,5 +266,5 @@ def _turned(axis: Up, told: Up | None) -> str:
 
 
 def _listed(parts: tuple[str, ...]) -> str:
-    few = parts[:8]
+    few = [part if len(part) <= LONGEST_NAME else f"{part[:LONGEST_NAME]}…" for part in parts[:8]]
     return ", ".join(few) + (f" and {len(parts) - 8} more" if len(parts) > 8 else "")

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from app.errors import InputError
-from app.exchange.surface import Colours, Reading, check_triangles, of_polygons
+from app.exchange.surface import Colours, Reading, check_triangles, doubles, of_polygons
 from app.geometry.arrays import FloatArray
 
 HEADER = 84
@@ -33,7 +33,7 @@ def read_stl(data: bytes, name: str) -> Reading:
         check_triangles(count, name)
         rows = np.frombuffer(data, TRIANGLE, count, HEADER)
         left_out = ("colours, which STL has no rule for",) if rows["extra"].any() else ()
-        return _reading(rows["corners"].astype(np.float64), name, left_out)
+        return _reading(doubles(rows["corners"]), name, left_out)
     if _SOLID.match(data) and (b"facet" in data.lower() or len(data) < HEADER):
         return _reading(_text(data, name), name)
     if len(data) < HEADER:
@@ -66,11 +66,14 @@ def _text(data: bytes, name: str) -> FloatArray:
     try:
         return np.array(found, dtype=object).astype(np.float64).reshape(-1, 3, 3)
     except ValueError as error:
-        raise InputError(f"{name} has coordinates that are no numbers: {error}.") from error
+        raise InputError(
+            f"{name} has coordinates that are no numbers: {str(error)[:80]}."
+        ) from error
 
 
 def _broken(data: bytes, at: int, name: str, what: str) -> InputError:
-    line = data.count(b"\n", 0, at) + 1
+    blank = len(data[at:]) - len(data[at:].lstrip())
+    line = data.count(b"\n", 0, at + blank) + 1
     return InputError(f"{name} is broken at line {line}: {what}.")
 
 

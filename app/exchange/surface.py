@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -49,20 +50,26 @@ class Surface:
 
     def tidy(self) -> Surface:
         """With equal vertices made one, and without what is of no face or spans no triangle."""
-        rows = np.ascontiguousarray(self.vertices[self.faces.ravel()]) + 0.0
+        rows, faces = _used(self.vertices, self.faces)
+        # Adding zero makes 0 of -0.
+        rows = rows + 0.0
         order = np.lexsort(rows.T)
         first = np.ones(len(rows), dtype=bool)
         first[1:] = (np.diff(rows[order], axis=0) != 0.0).any(axis=1)
         number = np.empty(len(rows), dtype=np.int64)
         number[order] = np.cumsum(first) - 1
-        faces = number.reshape(-1, 3)
+        faces = number[faces]
         a, b, c = faces.T
         kept = (a != b) & (b != c) & (c != a)
-        colours = None if self.colours is None else self.colours[kept]
-        used = np.unique(faces[kept])
-        return Surface(
-            rows[order][first][used], np.searchsorted(used, faces[kept]).reshape(-1, 3), colours
-        )
+        vertices, faces = _used(rows[order][first], faces[kept])
+        return Surface(vertices, faces, None if self.colours is None else self.colours[kept])
+
+
+def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Those vertices that are of a face, and the faces with their new indices."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    return vertices[used], (np.cumsum(used) - 1)[faces]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +91,10 @@ class Pile:
         self._triangles = 0
 
     def add(self, part: Surface) -> None:
-        """Raises InputError for more triangles than may be."""
+        """Raises InputError for more triangles than may be, and for places that are not finite."""
         self._triangles += len(part.faces)
         check_triangles(self._triangles, self._name)
+        check_finite(part.vertices, self._name)
         self._parts.append(part)
 
     def surface(self) -> Surface:
@@ -123,6 +131,7 @@ def of_polygons(
     name: str,
     colours: Colours | None = None,
     corner_colours: FloatArray | None = None,
+    vertex_colours: FloatArray | None = None,
 ) -> Surface:
     """The surface of polygons, concave ones too.
 
@@ -133,6 +142,7 @@ def of_polygons(
         name: of the file.
         colours: (p, 4) a polygon.
         corner_colours: (k, 4) 0..1 a corner; a triangle has the mean of its three.
+        vertex_colours: (n, 4) 0..1 a vertex; the same.
 
     Raises InputError for indices of no vertex, coordinates that are no finite numbers, and more
     triangles than may be.
@@ -141,16 +151,24 @@ def of_polygons(
     wrong = (corners < 0) | (corners >= len(vertices))
     if wrong.any():
         raise InputError(
-            f"{name} has a face with vertex {int(corners[wrong][0])}, "
-            f"but its vertices are 0 to {len(vertices) - 1}."
+            f"{name} has a face with vertex {int(corners[wrong][0])}, counted from 0, "
+            f"but only {len(vertices)} vertices."
         )
     check_finite(vertices[corners], name)
     triangles, polygon = cut(vertices, corners, sizes)
-    if corner_colours is not None:
+    if vertex_colours is not None:
+        colours = as_bytes(vertex_colours[corners[triangles]].mean(axis=1))
+    elif corner_colours is not None:
         colours = as_bytes(corner_colours[triangles].mean(axis=1))
     elif colours is not None:
         colours = colours[polygon]
     return Surface(vertices, corners[triangles], colours)
+
+
+def doubles(values: npt.NDArray[Any]) -> FloatArray:
+    """The same numbers in double precision, quietly where one is no number."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
 
 
 def check_finite(vertices: FloatArray, name: str) -> None:

@@ -167,7 +167,7 @@ class _Flattening:
             case "Shape":
                 pass
             case kind if kind not in SILENT and kind not in MAKERS and kind not in TEXTURES:
-                self._left_out[kind[:40]] += 1
+                self._left_out[kind] += 1
         return []
 
     def _shape(self, node: Node, T: FloatArray) -> None:
@@ -180,7 +180,7 @@ class _Flattening:
         if surface is not None:
             self._pile.add(surface.painted(_colour(node)).moved(T))
         elif geometry.kind != "NULL":
-            self._left_out[geometry.kind[:40]] += 1
+            self._left_out[geometry.kind] += 1
 
 
 def _nodes(value: Value | None) -> list[Node]:

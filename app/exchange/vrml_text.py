@@ -31,11 +31,15 @@ HEADER = "#VRML V2.0 utf8"
 LINE = 16
 """Rows of numbers a line: long enough to be small, short enough for old readers."""
 
+LONGEST = 160
+"""Characters of what an error tells of a file."""
+
 DEEPEST = 200
 """Nodes in nodes; a file that goes deeper is refused before Python's stack ends."""
 
+# Possessive, so that what does not match fails at once, whatever a stranger wrote.
 _TOKEN = re.compile(
-    r'[\s,]*(?:#[^\n\r]*[\s,]*)*("(?:[^"\\]|\\.)*"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
+    r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
 )
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _ZERO_AFTER = re.compile(r"\.0(?![0-9e])")
@@ -156,7 +160,8 @@ class Reader:
 
     def _error(self, what: str) -> InputError:
         line = self._text.count("\n", 0, self._at) + 1
-        return InputError(f"{self._name}, line {line}: {what}.")
+        short = what if len(what) <= LONGEST else f"{what[:LONGEST]}…"
+        return InputError(f"{self._name}, line {line}: {short}.")
 
     def _take(self) -> str:
         token = self._ahead
@@ -247,7 +252,8 @@ class Reader:
             case Type.INT:
                 return self._integer()
             case Type.INT_LIST:
-                return self._row(_INTEGERS, int) or tuple(self._items(self._integer))
+                whole = self._row(_INTEGERS, int)
+                return tuple(self._items(self._integer)) if whole is None else whole
         width = WIDTHS[kind]
         if kind not in LISTS:
             row = tuple(self._float() for _ in range(width))
@@ -255,7 +261,9 @@ class Reader:
         # One value of a list may stand without brackets.
         if self._ahead != "[":
             return tuple(self._float() for _ in range(width))
-        numbers = self._row(_NUMBERS, float) or tuple(self._items(self._float))
+        numbers = self._row(_NUMBERS, float)
+        if numbers is None:
+            numbers = tuple(self._items(self._float))
         if len(numbers) % width:
             raise self._error(f"{len(numbers)} numbers are no rows of {width}")
         return numbers
@@ -269,15 +277,17 @@ class Reader:
             yield one()
         self._take()
 
-    def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...]:
-        """A list that holds plain numbers alone, at once; nothing if it is not that simple."""
+    def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...] | None:
+        """A list that holds plain numbers alone, at once; None if it is not that simple."""
+        if self._ahead != "[":
+            return None
         end = self._text.find("]", self._next)
-        plain = self._text[self._next : end].replace(",", " ") if end >= 0 else ""
-        if self._ahead != "[" or not pattern.fullmatch(plain):
-            return ()
+        plain = self._text[self._next : end].replace(",", " ")
+        if end < 0 or not pattern.fullmatch(plain):
+            return None
         numbers = tuple(map(one, plain.split()))
         if not all(map(math.isfinite, numbers)):
-            return ()
+            return None
         self._next = end
         self._take()
         self._take()
