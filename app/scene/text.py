@@ -122,10 +122,15 @@ def _round(value: float, digits: int) -> int | float:
 
 def _entry(value: Value) -> Entry:
     fields = Fields(value, "a thing")
-    form = Form(fields.need("form", choice(*(each.value for each in Form)), Form.BOX.value))
+    told = fields.need("form", choice(*(each.value for each in Form)), "")
+    form = Form(told) if told else Form.BOX
     size: tuple[float, ...] = ()
     mesh = None
-    if form is Form.MESH:
+    if not told:
+        # Which of the two it should have nobody knows.
+        fields.has("size")
+        fields.has("mesh")
+    elif form is Form.MESH:
         mesh = fields.need("mesh", _mesh, None)
     else:
         count = form.numbers

@@ -15,14 +15,21 @@ import pytest
 import trimesh
 
 from app.api import answers, requests
-from app.cli.main import main
+from app.cli.assembly import described
+from app.cli.furnishing import furnished
 from app.client import Client, RefusedError, connect
+from app.control.lease import Role
+from app.errors import InputError
 from app.exchange.scene_file import SCENE
 from app.exchange.shape_file import MOST_BYTES
+from app.gateway.access import AccessFile
 from app.gateway.uploads import AT_ONCE
 from app.kinematics.forward import forward
 from app.robot.model import RobotModel
+from app.settings import Settings
+from robot_description import URDF_PATH
 from tests.browser.server import APP, AppServer
+from tests.gateway import client
 from tests.gateway.client import ask
 
 
@@ -55,14 +62,24 @@ things:
 
 
 @pytest.fixture(scope="module")
-def server(ring: Path, scene: Path) -> Iterator[AppServer]:
-    with AppServer((*APP, "--scene", str(scene), "--object", f"{ring}@300,-400,50")) as server:
+def tokens(ring: Path) -> dict[str, str]:
+    """Of a link for each role."""
+    file, until = AccessFile.create(ring.with_name("access.json")), time.time() + 3600.0
+    return {role.value: file.give(role.value, role, until) for role in (Role.VIEWER, Role.OPERATOR)}
+
+
+@pytest.fixture(scope="module")
+def server(ring: Path, scene: Path, tokens: dict[str, str]) -> Iterator[AppServer]:
+    assert tokens
+    access = str(ring.with_name("access.json"))
+    begun = ("--scene", str(scene), "--object", f"{ring}@300,-400,50")
+    with AppServer((*APP, "--access", access, *begun)) as server:
         yield server
 
 
 @pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Test") as arm:
+def arm(server: AppServer, tokens: dict[str, str]) -> Iterator[Client]:
+    with connect(server.url, "Test", tokens["operator"]) as arm:
         arm.ask(requests.Acquire())
         yield arm
         arm.ask(requests.Release())
@@ -163,15 +180,20 @@ def test_a_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
         assert things(arm) == before
 
 
-def test_what_is_too_much_is_refused(server: AppServer, arm: Client, tmp_path: Path) -> None:
+def test_what_is_too_much_is_refused(
+    server: AppServer, arm: Client, tokens: dict[str, str]
+) -> None:
     url = f"{server.url}/api/v1"
+
+    def ask(url: str, **options: Any) -> tuple[int, dict[str, str], bytes]:
+        return client.ask(url, Authorization=f"Bearer {tokens['operator']}", **options)
+
     status, _, said = ask(f"{url}/mesh?name=a.stl", data=bytes(MOST_BYTES + 1))
     assert (status, said) == (413, b"That is too long.")
     for query in ("", "?name=a.exe", "?name=a.stl&unit=ft", f"?name={'a' * 200}.stl"):
         status, _, said = ask(f"{url}/mesh{query}", data=b"x")
         assert status in (422, 429), said
         assert json.loads(said)["is"] == "refused"
-    (tmp_path / "b.stl").write_bytes(b"nothing")
     seen = set()
     for _ in range(int(AT_ONCE) + 2):
         seen.add(ask(f"{url}/mesh?name=a.exe", data=b"")[0])
@@ -181,30 +203,34 @@ def test_what_is_too_much_is_refused(server: AppServer, arm: Client, tmp_path: P
     assert arm.look(answers.State).status == "ok"
 
 
-def test_who_only_watches_brings_nothing(tmp_path: Path, ring: Path, capsys: Any) -> None:
-    file = tmp_path / "access.json"
-    arguments = ["--file", str(file), "--name", "Eve", "--role", "viewer"]
-    assert main(["access", "give", *arguments]) == 0
-    token = capsys.readouterr().out.partition("#")[2].strip()
-    with AppServer((*APP, "--access", str(file))) as server:
-        with connect(server.url, "Eve", token) as watcher:
-            with pytest.raises(RefusedError, match="may watch"):
-                watcher.upload(ring)
-            assert watcher.save_scene()
-        assert ask(f"{server.url}/api/v1/mesh?name=ring.stl", data=ring.read_bytes())[0] == 401
-        assert ask(f"{server.url}/api/v1/scene")[0] == 401
+def test_who_only_watches_brings_nothing(
+    server: AppServer, ring: Path, tokens: dict[str, str]
+) -> None:
+    with connect(server.url, "Eve", tokens["viewer"]) as watcher:
+        with pytest.raises(RefusedError, match="may watch"):
+            watcher.upload(ring)
+        assert watcher.save_scene()
+    assert ask(f"{server.url}/api/v1/mesh?name=ring.stl", data=ring.read_bytes())[0] == 401
+    assert ask(f"{server.url}/api/v1/scene")[0] == 401
 
 
-def test_a_scene_that_cannot_be_keeps_the_server_from_starting(scene: Path, capsys: Any) -> None:
+def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path) -> None:
+    robot = described(Settings(), URDF_PATH, None)
     broken = scene.with_name("broken.yaml")
-    broken.write_text(scene.read_text().replace("form: mesh", "form: mush"))
-    assert main(["serve", "--port", "0", "--scene", str(broken)]) == 1
-    assert "line 7" in capsys.readouterr().err
-    assert main(["serve", "--port", "0", "--object", "/nowhere/it.stl"]) == 1
-    assert "/nowhere/it.stl cannot be read" in capsys.readouterr().err
-    broken.write_text(scene.read_text().replace("10, -68", "10, 168"))
-    assert main(["serve", "--port", "0", "--scene", str(broken)]) == 1
-    assert "limits" in capsys.readouterr().err
+    whole = scene.read_text()
+    for text, said in (
+        (whole.replace("form: mesh", "form: mush"), "broken.yaml:\nline 7, .*mush'.$"),
+        (whole.replace("10, -68", "10, 168").replace("form: mesh", "form: sphere"), "line 6"),
+        ("scene: 1\njoints: [0, 168, 85, 8, 0]\n", "limits"),
+        ("scene: 1\njoints: [0, 1]\n", "joint"),
+        ("scene: 1\nwater: 80\n", "no cup"),
+    ):
+        broken.write_text(text)
+        with pytest.raises(InputError, match=said):
+            furnished(robot, broken, [])
+    for told in ("/nowhere/it.stl", f"{scene}@1,2,x"):
+        with pytest.raises(InputError, match=r"it\.stl cannot be read|no format"):
+            furnished(robot, None, [told])
 
 
 def _rows(T: Any) -> requests.Matrix4:
