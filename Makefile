@@ -11,10 +11,12 @@ browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 long    := tests/browser/test_x_ite.py tests/exchange/test_c_source.py tests/exchange/test_vrml.py \
            tests/cli/test_export.py tests/cli/test_demo.py tests/gateway/test_programs.py
-alone   := tests/browser/test_gateway.py::test_a_thin_line_shows_few_pictures_but_no_old_ones
+heavy   := tests/control tests/kinematics tests/robot_description
+short   := $(long:%=--ignore=%)
+patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-drag \
+.PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-crowd bench-drag \
         bench-kinematics bench-load bench-start bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -44,22 +46,21 @@ exchange: $(dev_ok)           ## find the programs that read our exports, or ins
 	$(bin)/python tests/exchange/tools.py
 
 # Two at once, as many as there are cores: those that drive a browser, and beside them those that run
-# servers, then those that only compute. How old pictures are is looked at when nothing else runs.
+# servers; after each of them a share of those that only compute, which give way to the others.
 tests: $(dev_ok)
-	@( $(bin)/python -m pytest $(servers) $(long:%=--ignore=%) > $(VENV)/servers.log 2>&1; \
-	    status=$$?; nice -n 5 $(bin)/python -m pytest $(browser:%=--ignore=%) \
-	    $(servers:%=--ignore=%) $(long:%=--ignore=%) > $(VENV)/computed.log 2>&1 || status=1; \
+	@( $(bin)/python -m pytest $(servers) $(short) > $(VENV)/servers.log 2>&1; status=$$?; \
+	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) $(short) \
+	      > $(VENV)/computed.log 2>&1 || status=1; \
 	    exit $$status ) & beside=$$!; \
-	  $(bin)/python -m pytest $(browser) $(long:%=--ignore=%) --deselect $(alone); status=$$?; \
+	  $(bin)/python -m pytest $(browser) $(short); status=$$?; \
+	  $(patient) $(heavy) || status=1; \
 	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
-	  $(bin)/python -m pytest $(alone) || status=1; \
 	  exit $$status
 
-# What takes long: demos as commands, programs on live servers, exports read by other programs, and
-# 200 STOPs instead of 12.
-test-long: $(dev_ok) browser exchange ## the tests that `make test` leaves out because they take long
-	$(bin)/python -m pytest $(long) $(ARGS)
-	KATANA450_LONG=1 $(bin)/python -m pytest tests/browser/test_gateway.py $(ARGS)
+# With what takes long: demos as commands, programs on live servers, exports read by other programs; and
+# more of what `make test` does a few times: 200 STOPs instead of 12, 10,000 drags instead of 2,500.
+test-long: $(dev_ok) browser exchange ## every test with all its cases
+	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)
 
 robot: $(dev_ok)              ## rebuild all files of the robot from the numbers in robot_description/cad
 	$(bin)/python -m robot_description.cad
@@ -72,6 +73,9 @@ bench-view: $(dev_ok)         ## what one update of the view costs the server
 
 bench-load: $(dev_ok)         ## what a crowd, floods and hostile senders cost the control loop and STOP
 	$(bin)/python -m benchmarks.load $(ARGS)
+
+bench-crowd: $(dev_ok) browser ## mouse event to drawn frame, alone and among 31 watchers
+	$(bin)/python -m benchmarks.crowd $(ARGS)
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)

@@ -145,10 +145,10 @@ def main() -> None:
                 delays: dict[str, list[float]] = {"viser": [], "gateway": []}
                 for _ in range(options.turns):
                     for way, cost in costs.items():
-                        before, started = cpu_seconds(server.pid), time.perf_counter()
+                        before, started = cpu_seconds([server.pid]), time.perf_counter()
                         delays[way] += asyncio.run(measure(ports, way, size, options.seconds))
                         took = time.perf_counter() - started
-                        cost.append((cpu_seconds(server.pid) - before) / took)
+                        cost.append((cpu_seconds([server.pid]) - before) / took)
                 for way, cost in costs.items():
                     p50, p95 = np.percentile(delays[way], (50, 95))
                     print(

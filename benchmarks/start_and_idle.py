@@ -3,21 +3,25 @@
     python -m benchmarks.start_and_idle
 
 The app and the bare viser app take turns. The browser is open before the command is given, as a
-person's is, and goes to the address as soon as the port is open. CPU time is the server process's
-own, over the wall time of the rest, so a busy machine does not count.
+person's is, and goes to the address as soon as the port is open; a second window then loads the
+page of the server that runs. CPU time is that of the server's processes, over the wall time of the
+rest, so a busy machine does not count. Of the app is told what a page takes over the wire.
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import os
+import re
 import socket
 import statistics
 import time
+import urllib.request
 from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,8 +30,11 @@ from playwright.sync_api import Browser
 from tests.browser.chromium import launched
 from tests.browser.page import Drawing, ViserPage
 from tests.browser.server import APP, BARE_APP, AppServer
+from tests.gateway.client import SUBPROTOCOL, ask, enter, page_name, websocket
 
 SETTLE_SECONDS = 3.0
+SCENE_SECONDS = 1.0
+"""Of silence, after which a scene is all there: of an arm at rest nothing more comes."""
 OPEN_SECONDS = 30.0
 APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
     "app": (APP, ("/arm", "/target/move")),
@@ -36,16 +43,50 @@ APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
 
 
 class Times(NamedTuple):
-    """Seconds from the command to the open port, and to a page that can be used."""
+    """Seconds from the command to the open port, and to a page that can be used; and that a page
+    takes to load once the server runs."""
 
     port: float
     usable: float
+    load: float
 
 
-def cpu_seconds(pid: int) -> float:
-    """CPU time that a process and its threads have used [s]; Linux only."""
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def cpu_seconds(pids: Sequence[int]) -> float:
+    """CPU time that processes and their threads have used [s]; Linux only."""
+    ticks = 0
+    for pid in pids:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def over_the_wire(url: str) -> dict[str, int]:
+    """Bytes of our page and its files, of viser's page, and of the scene up to its last message."""
+    cookie = enter(url)
+    index = ask(f"{url}/")[2].decode()
+    files = ["/", *(f"/{name}" for name in re.findall(r'(?:src|href)="(static/[^"]+)"', index))]
+    return {
+        "our page": sum(compressed(url + file, cookie) for file in (*files, "/static/link.js")),
+        "viser's page": compressed(f"{url}/viser/", cookie),
+        "the scene": asyncio.run(scene_bytes(url, cookie)),
+    }
+
+
+def compressed(url: str, cookie: str) -> int:
+    """Bytes of the answer to a browser, which takes gzip."""
+    wanted = {"Cookie": cookie, "Accept-Encoding": "gzip"}
+    with urllib.request.urlopen(urllib.request.Request(url, headers=wanted)) as answer:
+        return len(answer.read())
+
+
+async def scene_bytes(url: str, cookie: str) -> int:
+    """What a browser is sent until it has all there is."""
+    path, taken = f"/viser?page={page_name()}", 0
+    async with websocket(url, path, cookie, subprotocols=[SUBPROTOCOL]) as socket:
+        with suppress(TimeoutError):
+            while True:
+                taken += len(await asyncio.wait_for(socket.recv(), SCENE_SECONDS))
+    return taken
 
 
 def wait_for_port(port: int) -> None:
@@ -71,14 +112,24 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
         wait_for_port(server.port)
         port = time.perf_counter() - started
         page = ViserPage.open(browser, server.url, nodes=nodes, drawing=Drawing.ALWAYS)
-        times = Times(port, time.perf_counter() - started)
+        usable = time.perf_counter() - started
         starting.result()
+        page.close()
+        began = time.perf_counter()
+        page = ViserPage.open(browser, server.url, nodes=nodes, drawing=Drawing.ALWAYS)
+        times = Times(port, usable, time.perf_counter() - began)
         share = None
         if idle:
             time.sleep(SETTLE_SECONDS)
-            before = cpu_seconds(server.pid)
+            pids = [server.pid] if app == "bare" else [server.pid, server.front]
+            before = cpu_seconds(pids)
             time.sleep(idle)
-            share = (cpu_seconds(server.pid) - before) / idle
+            share = (cpu_seconds(pids) - before) / idle
+            if app == "app":
+                print("over the wire:", end=" ")
+                # This thread runs Playwright's loop.
+                sizes = starter.submit(over_the_wire, server.url).result().items()
+                print(", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes))
         page.close()
     return times, share
 
@@ -97,11 +148,17 @@ def main() -> None:
                 last = number == options.starts
                 taken, shares[app] = one_start(browser, app, options.idle if last else 0.0)
                 times[app].append(taken)
-                print(f"{app:5} port {taken.port:.2f} s  usable {taken.usable:.2f} s", flush=True)
+                print(
+                    f"{app:5} port {taken.port:.2f} s  usable {taken.usable:.2f} s  "
+                    f"loaded anew {taken.load:.2f} s",
+                    flush=True,
+                )
     for app, all_taken in times.items():
         port = statistics.median(each.port for each in all_taken)
         usable = statistics.median(each.usable for each in all_taken)
+        load = statistics.median(each.load for each in all_taken)
         print(f"{app:5} median: port {port:.2f} s, usable page {usable:.2f} s", end="")
+        print(f", loaded anew {load:.2f} s", end="")
         print(f", at rest {100.0 * (shares[app] or 0.0):.1f} % of a core")
 
 

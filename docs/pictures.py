@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.api import answers, requests
 from app.client import Client, connect
+from app.programs.circle import CircleDemo
 from app.programs.pour import PourDemo
 from app.view.cameras import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
@@ -102,8 +103,13 @@ STAGES = (
 """Of the pouring demo, as in the paper's figures 9 to 12: the task, and how much of it is done."""
 
 
+UNHURRIED = 0.5
+"""Of full speed, so that no stage is over before it is seen."""
+
+
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
+    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 100})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
@@ -122,26 +128,54 @@ def pouring(page: ViserPage) -> None:
     imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
 
 
+def instruments(page: ViserPage) -> None:
+    """They show the paper's circle, up to where it was paused."""
+    url = page.page.url.split("/?")[0].rstrip("/")
+    # To draw the scene all the while would take the time that the plots need.
+    page.frame.evaluate("() => harness.draw(false)")
+    with connect(url, "Circle") as arm:
+        page.press_in_bar("Instruments")
+        send(arm, CircleDemo(tool="tcp").text)
+        program(arm, lambda told: told.status in ("ready", "refused"))
+        arm.ask(requests.Steer(order=requests.Order.RUN))
+        # The way to its start counts as a share of its own.
+        program(arm, lambda told: told.task == "circle" and told.share > 0.75)
+        program(arm, lambda told: told.task == "circle" and 0.05 < told.share < 0.3)
+        program(arm, lambda told: told.share > 0.75)
+        arm.ask(requests.Steer(order=requests.Order.PAUSE))
+        page.page.locator("#instruments").get_by_role("button", name="Pause").click()
+        page.page.wait_for_timeout(3000)
+        page.screenshot(IMAGES / "instruments.png")
+
+
 def send(arm: Client, text: str) -> None:
     """Have a script planned."""
     parts = [text[at : at + 600] for at in range(0, len(text), 600)]
     for number, part in enumerate(parts, start=1):
-        arm.ask(requests.Program(text=part, more=number < len(parts)))
+        arm.ask(requests.Program(text=part, more=number < len(parts), speed=UNHURRIED))
 
 
-def program(arm: Client, wanted: Callable[[answers.Program], bool]) -> answers.Program:
+def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.Progress:
     """What is told of the program as soon as it is as wanted."""
     while True:
         told = arm.look(answers.State).program
         if told is not None and wanted(told):
             return told
-        if told is not None and told.status in ("refused", "stopped", "failed"):
+        if told is not None and told.status in ("refused", "stopped", "failed", "done"):
             sys.exit(f"The program {told.name} is {told.status}: {told.why}")
         time.sleep(0.02)
 
 
 def tile(page: ViserPage) -> NDArray[np.uint8]:
-    """The middle of the scene."""
+    """The middle of the scene, once the page has found room for all of it again."""
+
+    def fits() -> bool:
+        _, top, _, height = page.scene_rectangle()
+        size = page.page.viewport_size
+        return size is not None and TILE[1] <= height <= size["height"] - top
+
+    # A banner of ours moves the scene down while the picture is old.
+    page.wait_until(fits, "the scene to fit its window", seconds=60.0)
     left, top, width, height = page.scene_rectangle()
     picture = page.picture()
     across, down = TILE
@@ -155,6 +189,7 @@ PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
     pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(38.0)),
+    instruments: Camera((0.9, -0.75, 0.7), (0.25, 0.0, 0.2), math.radians(45.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
 

@@ -103,6 +103,15 @@
     }
   };
 
+  // The page around follows viser's switch between light and dark.
+  const SCHEME = "data-mantine-color-scheme";
+  let scheme = null;
+  new MutationObserver(() => {
+    const now = document.documentElement.getAttribute(SCHEME);
+    if (scheme !== null && now !== scheme) outer?.katana?.theme(now);
+    scheme = now;
+  }).observe(document.documentElement, { attributeFilter: [SCHEME] });
+
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });
   window.addEventListener("blur", () => outer?.katana?.blur());

@@ -3,6 +3,7 @@
 const BEAT = 100; // ms; app/control/lease.py counts on it
 const AGAIN = 400; // ms
 const GIVE_UP = 3000; // ms for a connection to open, or of silence on one that is open
+const AHEAD = 3; // states asked for and not yet come: a slow line is asked less often
 
 let url = null;
 let socket = null;
@@ -10,6 +11,8 @@ let count = 0;
 let heard = 0;
 let opened = 0;
 const beats = new Map();
+let pace = null; // of asking for states, while somebody looks at them
+const looks = new Map();
 
 function connect() {
   socket = new WebSocket(url);
@@ -18,11 +21,13 @@ function connect() {
   mine.onopen = () => {
     heard = performance.now();
     beats.clear();
+    looks.clear();
     postMessage({ link: "up" });
   };
   mine.onmessage = ({ data }) => {
     heard = performance.now();
     const message = JSON.parse(data);
+    if (looks.has(message.id)) return shown(message);
     if (message.is !== "echo") return postMessage({ heard: message });
     const sent = beats.get(message.n);
     if (sent !== undefined) postMessage({ trip: heard - sent });
@@ -40,6 +45,24 @@ function say(message) {
   if (socket?.readyState !== WebSocket.OPEN) return false;
   socket.send(JSON.stringify(message));
   return true;
+}
+
+function look() {
+  if (looks.size >= AHEAD) return;
+  const id = (count += 1);
+  if (say({ do: "look", id })) looks.set(id, performance.now());
+}
+
+// Without an arm yet there is none to be shown.
+function shown(message) {
+  const took = performance.now() - looks.get(message.id);
+  looks.delete(message.id);
+  if (message.is === "state") postMessage({ heard: message, took });
+}
+
+function watch(hz) {
+  clearInterval(pace);
+  pace = hz > 0 ? setInterval(look, 1000 / hz) : null;
 }
 
 setInterval(() => {
@@ -64,5 +87,6 @@ onmessage = ({ data }) => {
   if (data.open) {
     url = data.open;
     connect();
-  } else if (!say(data.say)) postMessage({ unsaid: data.say.do });
+  } else if (data.watch !== undefined) watch(data.watch);
+  else if (!say(data.say)) postMessage({ unsaid: data.say.do });
 };

@@ -6,6 +6,8 @@
   const ANSWER = 250; // ms that a STOP may take before it is sent another way too
   const TOAST = 4000; // ms
   const NOT_YOU = 4401;
+  const QUIETLY = "quietly"; // the id of what is asked again until it is had
+  const OPEN = "katana450.instruments.open";
   // What of the address is for viser; anything else would be a stranger's wish.
   const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr|darkMode)$/;
 
@@ -20,21 +22,29 @@
   let silent = 0;
   let trip = null;
   let asking = null;
+  let press = null;
 
   // A page that is loaded anew is the same page; a second tab is another.
   function name() {
     const again = performance.getEntriesByType("navigation")[0]?.type === "reload";
     const old = again && sessionStorage.getItem("page");
-    const bytes = crypto.getRandomValues(new Uint8Array(16));
-    const fresh = [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    const fresh = unheardOf();
     sessionStorage.setItem("page", old || fresh);
     return old || fresh;
   }
 
+  function unheardOf() {
+    const bytes = crypto.getRandomValues(new Uint8Array(16));
+    return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  }
+
   // STOP
 
+  // A press is told until it is heard, and counts once: on a thin line the last telling may come
+  // after a reset.
   function stop() {
-    say({ do: "stop" });
+    press = unheardOf();
+    say({ do: "stop", press });
     Jog.quiet();
     stopButton.classList.add("asked");
     clearTimeout(asking);
@@ -42,7 +52,7 @@
   }
 
   function insist() {
-    fetch("stop", { method: "POST", keepalive: true }).then(
+    fetch(`stop?press=${press}`, { method: "POST", keepalive: true }).then(
       ({ ok }) => ok && stopped(),
       () => {},
     );
@@ -84,7 +94,9 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  window.katana = { key, blur };
+  // viser's page has a switch for this; until somebody uses it the system's choice counts.
+  const theme = (name) => (document.documentElement.dataset.theme = name);
+  window.katana = { key, blur, theme };
 
   // What is shown
 
@@ -176,6 +188,7 @@
   }
 
   worker.onmessage = ({ data }) => {
+    panel?.hear(data);
     if (data.link === "up") [up, silent] = [true, 0];
     else if (data.link === "down") {
       if (up) since = performance.now();
@@ -187,7 +200,7 @@
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopping") stopped();
-    else if (data.heard?.is === "refused") toast(data.heard.why);
+    else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
       // Only what is new of it.
       status = { ...status, ...data.heard };
@@ -219,6 +232,35 @@
   Jog.begin({ say, stop });
   Objects.begin({ say });
 
+  // The instruments, which come when they are first wanted.
+
+  const kept = storage();
+  let panel = null;
+
+  // A browser may refuse to keep anything.
+  function storage() {
+    try {
+      return window.localStorage;
+    } catch {
+      return null;
+    }
+  }
+
+  async function showInstruments(shown) {
+    const button = byId("instruments-button");
+    button.setAttribute("aria-expanded", String(shown));
+    kept?.setItem(OPEN, shown ? "yes" : "no");
+    if (shown && !panel) {
+      const { Panel } = await import("./instruments/panel.js");
+      const watch = (hz) => worker.postMessage({ watch: hz });
+      panel = new Panel(byId("instruments"), { say, watch, kept, quietly: QUIETLY });
+    }
+    panel?.show(button.getAttribute("aria-expanded") === "true");
+  }
+  byId("instruments-button").addEventListener("click", ({ currentTarget }) =>
+    showInstruments(currentTarget.getAttribute("aria-expanded") !== "true"),
+  );
+
   // Coming in
 
   // A link carries its token behind the #, which browsers send to nobody; it goes by POST, once.
@@ -237,5 +279,6 @@
     scene.src = `viser/?${new URLSearchParams([["page", page], ...query])}`;
     const { protocol, host } = location;
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });
+    if (kept?.getItem(OPEN) === "yes") showInstruments(true);
   });
 })();

@@ -74,6 +74,22 @@ class Finding(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float | None = None
 
 
+class Margins(msgspec.Struct, frozen=True, kw_only=True):
+    """How near the arm is to what it cannot pass.
+
+    ``limit``: of the joint that is nearest to one of its limits, how far that is [rad], negative
+    beyond it; ``axis``: which joint, counted from 1. ``smallest_singular_value`` [1]: of the
+    Jacobian over the arm's own length; 0 in a singularity. ``clearance``: how far the two ``parts``
+    that are nearest to each other are apart [m]; both null where nothing is looked at.
+    """
+
+    limit: float
+    axis: int
+    smallest_singular_value: float
+    clearance: float | None
+    parts: tuple[str, str] | None
+
+
 class Water(msgspec.Struct, frozen=True, kw_only=True):
     """Where the water is [ml], and how far the cup's lip is above it [m], negative as it flows."""
 
@@ -108,12 +124,20 @@ class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
     Attributes:
-        t: when, on the server's clock, which only goes forwards.
+        t: when, on the server's clock, which only goes forwards; an arm at rest is as it was then.
+        told: when this was said, on the same clock.
         ticket: of the last command that is heeded in it.
-        q, qd: (n,) where the arm is, and how fast its setpoints move.
+        q: (n,) where the arm is, as it says itself.
+        setpoint, qd: (n,) where it is told to be, and how fast that moves.
         goal: (n,) where it goes, the nearest to what was wished.
         gripper, gripper_goal: the finger joint.
         tool: the frame that ``T`` (4, 4), ``pitch`` and ``roll`` are of; T in the frame {S}.
+        tool_speed: of the tool point [m/s], by its setpoints.
+        holding: (n,) torques [N m] that hold the arm still there against its own weight; null where
+            its description tells no masses. What it carries besides is not counted.
+        margins: how near the arm is to what it cannot pass.
+        touching: the fingers that touch what may be held. held: what both hold; null with an empty
+            hand.
         branch: shoulder and elbow. reading: which numbers of a target count.
         status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
         speed: share of full speed.
@@ -124,8 +148,10 @@ class State(Answer, frozen=True, kw_only=True):
     """
 
     t: float
+    told: float
     ticket: int
     q: Numbers
+    setpoint: Numbers
     qd: Numbers
     goal: Numbers
     gripper: float
@@ -134,6 +160,11 @@ class State(Answer, frozen=True, kw_only=True):
     T: list[Numbers]
     pitch: float
     roll: float
+    tool_speed: float
+    holding: Numbers | None
+    margins: Margins
+    touching: list[str]
+    held: str | None
     branch: tuple[str, str]
     reading: str
     status: str

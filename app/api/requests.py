@@ -46,6 +46,10 @@ Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
 
 Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
+LONGEST_PRESS = 64
+"""Characters that tell one press of STOP from another."""
+
+Press = Annotated[str, Meta(min_length=1, max_length=LONGEST_PRESS)] | None
 Name = Annotated[str, Meta(min_length=1, max_length=40)]
 Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
 
@@ -109,8 +113,14 @@ class Beat(Request, frozen=True, kw_only=True):
     n: int = 0
 
 
-class Stop(Request, frozen=True):
-    """STOP: the arm comes to rest as fast as it can. Everybody may, at any time."""
+class Stop(Request, frozen=True, kw_only=True):
+    """STOP: the arm comes to rest as fast as it can. Everybody may, at any time.
+
+    Who says it again, for want of an answer, gives the same ``press``: it counts once, so that a
+    late one does not undo the reset that came in between.
+    """
+
+    press: Press = None
 
 
 class Reset(Request, frozen=True):

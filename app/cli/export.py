@@ -30,6 +30,8 @@ def export(options: argparse.Namespace) -> int:
     kind: str = options.format
     if options.trajectory is not None and kind not in MOVES:
         raise InputError(f"A file of {kind} holds no motion; {' and '.join(MOVES)} do.")
+    if options.run is not None:
+        raise InputError(f"A file of {kind} holds no run; html does.")
     if options.pose and kind not in POSED:
         raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED)} do.")
     mechanism, notes = load_mechanism(options.urdf)

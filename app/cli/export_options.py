@@ -10,6 +10,7 @@ FORMATS = {
     "c": "C arrays and draw functions a link, and an OpenGL viewer with its Makefile",
     "glb": "binary glTF 2.0, for browsers, Blender and game engines",
     "urdf": "a zip of a ROS package with the URDF and its meshes",
+    "html": "a page of a run with a slider of its time, which opens without a server",
 }
 
 
@@ -17,22 +18,32 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     """Put them into `parser`."""
     parser.add_argument("format", choices=tuple(FORMATS), help=_listed())
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="directory for the files"
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="directory for the files, or the file of html",
     )
     parser.add_argument(
         "--pose",
-        type=_numbers,
+        type=joint_values,
         default=(),
         metavar="Q",
         help="values of the driven joints in rad or m with commas between, gripper last, such as "
         "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
     )
-    parser.add_argument(
+    motion = parser.add_mutually_exclusive_group()
+    motion.add_argument(
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="vrml and glb: a motion the file plays by itself; .csv with the columns "
+        help="vrml, glb and html: a motion the file plays by itself; .csv with the columns "
         "t,theta1,...,theta5,gripper or .json with lists of these names",
+    )
+    motion.add_argument(
+        "--run",
+        metavar="SCRIPT",
+        help="html: circle, pour or the file of a script, whose run the page plays",
     )
 
 
@@ -40,7 +51,8 @@ def _listed() -> str:
     return "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def joint_values(text: str) -> tuple[float, ...]:
+    """Of a list with commas between [rad, m]."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:

@@ -10,6 +10,7 @@ from pathlib import Path
 from app.cli.access_options import add_access_options
 from app.cli.export_options import add_export_options
 from app.cli.programs_options import add_demo_options, add_run_options
+from app.cli.render_options import add_render_options
 from app.cli.version import version
 from app.cli.workspace_options import add_workspace_options
 from app.errors import KatanaError
@@ -63,10 +64,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli import programs
 
             return programs.run(options) if options.command == "run" else programs.demo(options)
+        if options.command == "export" and options.format == "html":
+            from app.cli.page import write_page
+
+            return write_page(options)
         if options.command == "export":
             from app.cli.export import export
 
             return export(options)
+        if options.command == "render":
+            from app.cli.render import render
+
+            return render(options)
         from app.cli.lines import Kinematics, answer_lines
 
         in_base_frame = options.frame == "base"
@@ -210,6 +219,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_run_options(commands.add_parser("run", help="run a script of your own"))
     add_demo_options(commands.add_parser("demo", help="run an experiment of the paper"))
+    add_render_options(
+        commands.add_parser("render", help="a picture or a film of the arm, without a browser")
+    )
     for command in with_an_arm:
         command.add_argument(
             "--urdf",

@@ -9,7 +9,7 @@ import numpy as np
 from app.collision.world import World
 from app.control.aims import without
 from app.control.state import Finding, Reason, State
-from app.control.things import Surroundings, Thing
+from app.control.things import Hand, Surroundings, Thing
 from app.geometry.arrays import FloatArray
 
 TOUCHING = 3e-4
@@ -41,6 +41,16 @@ def gripped(surroundings: Surroundings, world: World | None, state: State) -> St
             if min(felt.values()) <= TOUCHING:
                 return _closed(surroundings, state, thing, felt, x)
     return state
+
+
+def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
+    """The fingers that feel a thing, by what became of it when they closed."""
+    if hand is None:
+        return ()
+    if any(thing.held for thing in state.things):
+        return hand.fingers
+    away = [finding.parts for finding in state.findings if finding.reason is Reason.LOPSIDED]
+    return tuple(each for parts in away if parts for each in hand.fingers if each not in parts)
 
 
 def _felt(fingers: tuple[str, ...], world: World, thing: Thing, x: FloatArray) -> dict[str, float]:

@@ -47,7 +47,7 @@ def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
             if not visuals:
                 hung = [joint.origin for joint in joints.values() if joint.parent == name]
                 visuals = rods([origin[:3, 3] for origin in hung if origin is not None])
-            shapes = tuple(shape for visual in visuals for shape in _shapes(visual))
+            shapes = tuple(shape for visual in visuals for shape in shapes_of(visual))
             above = joints.get(name)
             if above is None:
                 found[name] = Link(name, None, frozen(np.eye(4)), None, shapes)
@@ -135,7 +135,11 @@ def _with_leaders(path: Path, mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, links=tuple(links))
 
 
-def _shapes(visual: Visual) -> Sequence[Shape]:
+def shapes_of(visual: Visual) -> Sequence[Shape]:
+    """Its surfaces, one a material, in the frame of its body.
+
+    Raises RobotDescriptionError if it is no mesh.
+    """
     plain = Material(
         "plain {:02x}{:02x}{:02x}".format(*visual.colour),
         (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),

@@ -14,6 +14,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from app.api.requests import LONGEST_PRESS
 from app.gateway import control_socket, files, headers, viser_page
 from app.gateway.api import Api
 from app.gateway.bucket import Bucket
@@ -79,7 +80,8 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
     async def stop(request: Request) -> Response:
         """The same as the button, for a page whose socket is gone."""
         visitor = _known(door, request)
-        hub.stop(visitor.name or "Somebody")
+        press = request.query_params.get("press", "")[:LONGEST_PRESS]
+        hub.stop(visitor.name or "Somebody", press or None)
         return Response(status_code=204)
 
     async def health(_request: Request) -> Response:
@@ -90,7 +92,7 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
 
     routes = [
         Route("/", page),
-        Route("/static/{name}", file),
+        Route("/static/{name:path}", file),
         Route("/viser/", viser_index),
         Route("/enter", enter, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),

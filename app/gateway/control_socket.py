@@ -1,4 +1,7 @@
-"""The page's own socket: STOP, signs of life, the lease and jogging up, the status down."""
+"""The page's own socket: STOP, signs of life, the lease, jogging and knobs up, the status down.
+
+States come down only as they are asked for, a few at a time, so a slow line has no backlog of them.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,9 @@ from app.gateway.hub import Hub, Window
 PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
 """The name a page gives itself; nobody else can guess it."""
 
-RATE, BURST = 100.0, 200.0
-"""Requests a second, and at once: ten signs of life, 25 jogs, and a hand on the buttons."""
+RATE, BURST = 160.0, 320.0
+"""Requests a second, and at once: ten signs of life, 25 jogs, 30 looks, and hands on knobs and
+buttons."""
 
 PUSH_EVERY = 0.1
 """[s] Between two looks at whether there is news."""

@@ -54,8 +54,8 @@ class Desk:
         """What is about who drives, and how."""
         hub = self._hub
         match request:
-            case requests.Stop():
-                hub.stop(window.person.name)
+            case requests.Stop(press=press):
+                hub.stop(window.person.name, press)
             case requests.Reset():
                 hub.reset(window)
             case requests.Acquire():

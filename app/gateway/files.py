@@ -50,9 +50,9 @@ class File:
 
 
 def load(folder: Path = STATIC) -> dict[str, File]:
-    """Every file of the page, by name."""
+    """Every file of the page, by its path in ``folder``."""
     return {
-        path.name: File.of(path.read_bytes(), TYPES[path.suffix])
-        for path in sorted(folder.iterdir())
+        path.relative_to(folder).as_posix(): File.of(path.read_bytes(), TYPES[path.suffix])
+        for path in sorted(folder.rglob("*"))
         if path.suffix in TYPES
     }

@@ -65,6 +65,7 @@ class Flow:
             self._bytes = sum(each.size for each in self._on_the_way)
         elif seen:
             size = sum(each.size for each in seen)
+            filled = 2 * self._bytes >= self._window
             self._bytes -= size
             took = t - seen[-1].t
             known = (
@@ -74,7 +75,9 @@ class Flow:
             self._told_at = t
             if t - seen[0].t > self._quickest + OVERDUE:
                 self._window = max(self._window // 2, LEAST)
-            else:
+            elif filled:
+                # A window that was never filled has not been tried: should the line grow thin, all
+                # of it would be on the way at once (RFC 7661, congestion window validation).
                 self._window = min(self._window + size // 2, MOST)
         return True
 

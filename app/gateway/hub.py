@@ -6,6 +6,7 @@ Lives in the gateway's one thread; what it decides reaches the arm through the m
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -16,6 +17,7 @@ from app.control.choices import Choice
 from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
 from app.control.ledger import Entry
+from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.state import State
 from app.control.things import Surroundings
@@ -39,7 +41,7 @@ TICK = 0.02
 """[s] Between two looks at whether somebody has fallen silent."""
 
 REMEMBERED = 256
-"""Pages that are known again when they come back."""
+"""Pages that are known again when they come back, and presses of STOP that are told again."""
 
 
 class Arm(Protocol):
@@ -68,6 +70,12 @@ class Arm(Protocol):
 
     @property
     def pouring(self) -> Pouring | None: ...
+
+    @property
+    def holding(self) -> FloatArray | None: ...
+
+    @property
+    def margins(self) -> Margins: ...
 
     @property
     def ledger(self) -> Sequence[Entry]: ...
@@ -143,6 +151,7 @@ class Hub:
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
+        self._presses: deque[str] = deque(maxlen=REMEMBERED)
         self._jogged = -JOG_TIME
         self._looked = clock()
 
@@ -195,6 +204,11 @@ class Hub:
         """It is closed."""
         del self._pictures[picture]
 
+    @property
+    def watching(self) -> int:
+        """Browsers that are sent pictures."""
+        return len(self._pictures)
+
     def age(self, window: Window) -> float:
         """How old the picture is that the window shows [s]."""
         of_it = [each for each, (key, _) in self._pictures.items() if key == window.person.key]
@@ -212,8 +226,12 @@ class Hub:
 
     # What people do
 
-    def stop(self, name: str) -> None:
-        """Anybody may, at any time."""
+    def stop(self, name: str, press: str | None = None) -> None:
+        """Anybody may, at any time. A ``press`` counts once, however often it is told."""
+        if press is not None:
+            if press in self._presses:
+                return
+            self._presses.append(press)
         self._halt(Stopped(name, f"{name} pressed STOP."))
 
     def reset(self, window: Window) -> None:

@@ -7,18 +7,22 @@ from collections.abc import Callable
 import numpy as np
 
 from app.api.requests import Rates
+from app.collision.world import World
 from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.ledger import Entry
+from app.control.margins import Margins, margins
 from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
+from app.kinematics.statics import holding_torques
 from app.kinematics.velocity import JogFrame
 from app.programs.bench import Rig
 from app.robot.model import RobotModel
+from app.robot.weight import loads_of
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.link import FrontEnd
@@ -43,6 +47,10 @@ class Motion:
         self._board = link.board
         self._navigator = navigator
         self._let_go = let_go
+        self._loads = loads_of(model)
+        self._measured: (
+            tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
+        ) = None
 
     @property
     def snapshot(self) -> Snapshot:
@@ -73,6 +81,27 @@ class Motion:
     def lateness(self) -> Lateness:
         """How well the control loop keeps its period."""
         return self._board.lateness
+
+    @property
+    def holding(self) -> FloatArray | None:
+        """(n,) torques that hold it still [N m]; None where nobody knows what it weighs."""
+        return self._posture()[1]
+
+    @property
+    def margins(self) -> Margins:
+        """How near it is to what it cannot pass."""
+        return self._posture()[0]
+
+    def _posture(self) -> tuple[Margins, FloatArray | None]:
+        """Worked out once for everybody who asks, and anew when something has changed."""
+        state = self.state
+        world, x = self._session.world_at(state), np.append(state.q, state.gripper)
+        key = (state.tool, world, x.tobytes())
+        if self._measured is None or self._measured[0] != key:
+            chain = self.model.arm.chain_to(state.tool)
+            holding = holding_torques(chain, state.q, self._loads) if self._loads else None
+            self._measured = (key, (margins(chain, world, x), holding))
+        return self._measured[1]
 
     def choices(self) -> tuple[Choice, ...]:
         """The branches there are to choose from."""

@@ -23,6 +23,7 @@ from app.gateway.door import NOT_YOU, Door
 from app.gateway.firewall import Firewall, Ruling, Verdict
 from app.gateway.flow import Flow
 from app.gateway.hub import Hub, key_of
+from app.view.frames import VALVE_HEADER, Valve
 from app.view.guard import Guard
 from app.view.server import KEY_HEADER
 
@@ -34,8 +35,12 @@ BUFFER = 4_096
 """Bytes that may wait in the machine between viser and us: what waits there is not replaced by
 what is newer."""
 
-CROWDED = 0.1
-"""[s] While a browser is this far behind, it is worth while to read how old a frame is."""
+PICTURES = 1000.0
+"""A second, that go to all browsers together: what a core can send them. A crowd shares them; who
+drives is not asked to."""
+
+UNASKED = 1.0 / 60.0
+"""[s] Pictures come no faster anyway."""
 
 LOOK_AGAIN = 0.1
 """[s] How soon a browser that is behind is looked at again, should it say nothing."""
@@ -72,12 +77,13 @@ class Proxy:
         # Without our page around it viser can be looked at, and no more.
         key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
         self._open += 1
+        valve = Valve()
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
                 sock=await _narrow_socket(self._port),
                 subprotocols=[SUBPROTOCOL],
-                additional_headers={KEY_HEADER: self._key},
+                additional_headers={KEY_HEADER: self._key, VALVE_HEADER: valve.name},
                 user_agent_header=None,
                 compression=None,
                 max_size=None,
@@ -85,7 +91,7 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                line = _Line(self._hub, self._guard, browser, upstream, key)
+                line = _Line(self._hub, self._guard, browser, upstream, valve, key)
                 if not await self._door.while_welcome(
                     lambda: self._door.visitor(browser.cookies), line.run()
                 ):
@@ -101,9 +107,16 @@ class _Line:
     """Between one browser and viser."""
 
     def __init__(
-        self, hub: Hub, guard: Guard, browser: WebSocket, upstream: ClientConnection, key: str
+        self,
+        hub: Hub,
+        guard: Guard,
+        browser: WebSocket,
+        upstream: ClientConnection,
+        valve: Valve,
+        key: str,
     ) -> None:
         self._hub = hub
+        self._valve = valve
         self._browser = browser
         self._upstream = upstream
         self._key = key
@@ -135,15 +148,33 @@ class _Line:
 
     async def _down(self) -> None:
         """Pictures, as fast as the browser sees them."""
+        age = 0.0
         async for frame in self._upstream:
-            while not self._flow.has_room(self._hub.clock()):
-                self._room.clear()
-                with suppress(TimeoutError):
-                    async with asyncio.timeout(LOOK_AGAIN):
-                        await self._room.wait()
             assert isinstance(frame, bytes)
-            waited = self._flow.age(self._hub.clock()) > CROWDED
-            await self._send(frame, _age(frame) if waited else 0.0)
+            await self._send(frame, age)
+            sent_at = self._hub.clock()
+            pause = self._pause()
+            if pause > 0.0 or not self._flow.has_room(sent_at):
+                self._valve.let(False)
+                await asyncio.sleep(pause)
+                await self._wait_for_room()
+                self._valve.let(True)
+            # The next one may have passed the valve just before it was shut.
+            age = self._hub.clock() - sent_at
+
+    async def _wait_for_room(self) -> None:
+        while not self._flow.has_room(self._hub.clock()):
+            self._room.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LOOK_AGAIN):
+                    await self._room.wait()
+
+    def _pause(self) -> float:
+        """[s] Before the next picture, so that a crowd leaves time for whoever drives."""
+        holder = self._hub.lease.holder
+        share = self._hub.watching / PICTURES
+        drives = holder is not None and holder.key == self._key
+        return 0.0 if drives or share <= UNASKED else share
 
     async def _up(self) -> None:
         """What the firewall lets pass."""
@@ -198,17 +229,6 @@ async def _narrow_socket(port: int) -> socket.socket:
     line.setblocking(False)
     await asyncio.get_running_loop().sock_connect(line, ("127.0.0.1", port))
     return line
-
-
-def _age(frame: bytes) -> float:
-    """How long ago viser made it [s]; viser's clock is this process's."""
-    packed = int.from_bytes(frame[8:16], "little")
-    body = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed])
-    return time.perf_counter() - msgspec.msgpack.decode(body, type=_Stamp).timestampSec
-
-
-class _Stamp(msgspec.Struct):
-    timestampSec: float  # noqa: N815  (viser's name)
 
 
 def _frame(messages: tuple[Any, ...]) -> bytes:

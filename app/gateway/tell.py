@@ -7,12 +7,15 @@ import numpy as np
 from app.api import answers
 from app.control import state as control
 from app.control.choices import Choice
+from app.control.grip import touching
+from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.solid import Colour
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
 from app.kinematics.tool import ToolTarget
+from app.kinematics.velocity import tool_speed
 from app.robot.model import RobotModel
 from app.runtime.lateness import Lateness
 from app.view.texts import sentence, told
@@ -42,8 +45,10 @@ def state(hub: Hub) -> answers.State:
     five = ToolTarget.at(chain, now.q)
     return answers.State(
         t=now.t,
+        told=hub.clock(),
         ticket=snapshot.ticket,
         q=now.q.tolist(),
+        setpoint=now.setpoint.tolist(),
         qd=now.motion.qd.tolist(),
         goal=now.goal.tolist(),
         gripper=now.gripper,
@@ -52,6 +57,11 @@ def state(hub: Hub) -> answers.State:
         T=forward(chain, now.q).tolist(),
         pitch=five.pitch,
         roll=five.roll,
+        tool_speed=tool_speed(chain, now.setpoint, now.motion.qd),
+        margins=margins(arm.margins),
+        holding=None if arm.holding is None else arm.holding.tolist(),
+        touching=list(touching(arm.surroundings.hand, now)),
+        held=next((thing.name for thing in now.things if thing.held), None),
         branch=(now.branch.shoulder, now.branch.elbow),
         reading=now.reading.value,
         status=now.status.value,
@@ -64,6 +74,18 @@ def state(hub: Hub) -> answers.State:
         windows=len(hub.windows),
         water=water(arm.pouring, now),
         program=hub.performer.told(),
+    )
+
+
+def margins(found: Margins) -> answers.Margins:
+    """How near the arm is to what it cannot pass."""
+    nearest = found.nearest
+    return answers.Margins(
+        limit=found.limit,
+        axis=found.axis + 1,
+        smallest_singular_value=found.smallest_singular_value,
+        clearance=None if nearest is None else nearest.distance,
+        parts=None if nearest is None else nearest.parts,
     )
 
 

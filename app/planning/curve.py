@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -23,7 +23,14 @@ from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.tool import ToolTarget
 from app.planning.jet import Jet, atan2, sin_cos
+from app.planning.polyline import Polyline
 from app.planning.posture import facing
+
+LEVER = 0.25
+"""[m] A turn by 1 rad counts for as long a way, where the legs of a way are told in lengths."""
+
+SAME = 1e-9
+"""[m] Vias nearer to each other are one."""
 
 Profile = Callable[[Jet], Jet]
 """An angle along a curve [rad], as a function of sigma."""
@@ -41,6 +48,11 @@ class Tool(NamedTuple):
 
 class Curve(Protocol):
     """Where the tool is along a path."""
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """Where between 0 and 1 one formula ends and another begins, growing."""
+        ...
 
     def at(self, sigma: Jet) -> Tool:
         """The tool at `sigma`, one place or many."""
@@ -98,6 +110,11 @@ class ToolLine:
             numbers = np.append(target.position, (target.pitch, target.roll))
             finite_array(numbers, (5,), f"The {name} of a line")
 
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """None: it is one formula."""
+        return ()
+
     def at(self, sigma: Jet) -> Tool:
         x, y, z = (
             a + (b - a) * sigma
@@ -105,6 +122,39 @@ class ToolLine:
         )
         pitch = Linear(self.start.pitch, self.end.pitch)(sigma)
         return Tool(x, y, z, pitch, Linear(self.start.roll, self.end.roll)(sigma))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLines:
+    """From target to target on straight lines, pitch and roll turning evenly, its corners rounded.
+
+    vias: two or more, the first and last are start and end. blend: (m - 2,) how much of half of its
+    shorter leg each corner cuts off, above 0 up to 1. Corners are those of `Polyline`.
+    """
+
+    vias: tuple[ToolTarget, ...]
+    blend: FloatArray
+    _line: Polyline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        rows = [(*via.position.tolist(), via.pitch, via.roll) for via in self.vias]
+        numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
+        legs = np.diff(numbers, axis=0)
+        ways = np.linalg.norm(legs[:, :3], axis=1)
+        lengths = np.maximum(ways, LEVER * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
+        if len(rows) < 2 or (lengths <= SAME).any():
+            raise InputError("Lines need two vias at least, each of them elsewhere.")
+        line = Polyline(frozen(numbers), lengths, self.blend)
+        object.__setattr__(self, "blend", line.blend)
+        object.__setattr__(self, "_line", line)
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """Where legs and corners meet."""
+        return self._line.joins
+
+    def at(self, sigma: Jet) -> Tool:
+        return Tool(*self._line.at(sigma))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +182,11 @@ class ToolArc:
         if length == 0.0:
             raise InputError("The axis of an arc is zero; give it a direction.")
         object.__setattr__(self, "axis", frozen(self.axis / length))
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """None: it is one formula."""
+        return ()
 
     def at(self, sigma: Jet) -> Tool:
         s, c = sin_cos(self.angle * sigma)
@@ -174,6 +229,11 @@ class ToolScrew:
                 f"{1e3 * arm_of(self.chain).off_axis:.3g} mm beside it. Give pitch and roll "
                 "along an arc instead."
             )
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """None: it is one formula."""
+        return ()
 
     def at(self, sigma: Jet) -> Tool:
         arm = arm_of(self.chain)

@@ -155,8 +155,15 @@ def plan(
             raise InputError(
                 f"Path {number + 1} begins {np.degrees(gap):.3g} deg from where path {number} ends."
             )
-    clearances = [None if world is None else _clearance(p, world, fingers, margin) for p in paths]
-    segments = tuple(Segment(path, fastest(path, bounds)) for path in paths)
+    # A path that is gone along again is looked at and timed once.
+    once = {id(path): path for path in paths}
+    looked = {
+        key: None if world is None else _clearance(path, world, fingers, margin)
+        for key, path in once.items()
+    }
+    timed = {key: Segment(path, fastest(path, bounds)) for key, path in once.items()}
+    clearances = [looked[id(path)] for path in paths]
+    segments = tuple(timed[id(path)] for path in paths)
     found = Plan(segments, None if world is None else world.likeness, fingers)
     each = [
         Nearest(clearance.contact, begin + segment.scaling.tau(clearance.sigma))

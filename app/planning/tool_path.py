@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +24,12 @@ from app.planning.posture import FiveJets, ThreeJets, posture
 
 KNOTS = 400
 """Places at which a path is looked at when it is built."""
+
+LEAST = 16
+"""The same on each piece of its curve."""
+
+APART = 1e-9
+"""[1] No two of them are nearer."""
 
 KINK = 1e-4
 """[rad] Between two of them no axis is farther from the cubic through both, unless the path meets
@@ -51,7 +58,7 @@ class ToolPath:
     def __post_init__(self) -> None:
         near = frozen(self.chain.check_q(self.near))
         object.__setattr__(self, "near", near)
-        sigma = frozen(np.linspace(0.0, 1.0, KNOTS + 1))
+        sigma = frozen(self._looks())
         q, qd = self._loose(sigma)
         bad = np.flatnonzero(~np.isfinite(qd).all(axis=1))
         if bad.size:
@@ -59,14 +66,15 @@ class ToolPath:
         q[0] += np.round((near - q[0]) / (2.0 * np.pi)) * (2.0 * np.pi)
         q = np.unwrap(q, axis=0)
         object.__setattr__(self, "_sigma", sigma)
-        object.__setattr__(self, "_turns", frozen(q))
+        even = np.searchsorted(sigma, np.linspace(0.0, 1.0, KNOTS + 1) - 0.5 * APART)
+        object.__setattr__(self, "_turns", frozen(q[even]))
         self._refuse_kinks(q, qd)
         self._refuse_limits(q, qd)
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """None: a curve is one formula."""
-        return ()
+        """Those of the curve."""
+        return self.curve.joins
 
     def joints(self, sigma: Jet) -> FiveJets:
         """The joint angles [rad] at `sigma`, one place or many (N,)."""
@@ -104,6 +112,17 @@ class ToolPath:
         place = np.clip(np.rint(sigma * KNOTS), 0, KNOTS).astype(np.int64)
         return np.rint((knots[place] - angle) / math.tau)
 
+    def _looks(self) -> FloatArray:
+        """Where it is looked at: evenly, and often enough on each piece of the curve."""
+        even = np.linspace(0.0, 1.0, KNOTS + 1)
+        ends = (0.0, *self.joins, 1.0)
+        if len(ends) == 2:
+            return even
+        pieces = [np.linspace(low, high, LEAST + 1) for low, high in pairwise(ends)]
+        inner = np.unique(np.concatenate(pieces))
+        near = even[np.clip(np.rint(inner * KNOTS), 0, KNOTS).astype(np.int64)]
+        return np.unique(np.concatenate((even, inner[np.abs(inner - near) > APART])))
+
     def _loose(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Angles and their rates (N, 5) whatever turn they are in; not finite out of reach."""
         arm = arm_of(self.chain)
@@ -139,8 +158,8 @@ class ToolPath:
 
     def _refuse_kinks(self, q: FloatArray, qd: FloatArray) -> None:
         """Where a branch ends the angles leap or turn back at once, maybe between two places."""
-        h = 1.0 / KNOTS
-        middle, _ = self._loose(self._sigma[:-1] + 0.5 * h)
+        h = np.diff(self._sigma)[:, None]
+        middle, _ = self._loose(self._sigma[:-1] + 0.5 * h[:, 0])
         smooth = 0.5 * (q[:-1] + q[1:]) + 0.125 * h * (qd[:-1] - qd[1:])
         gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
         kinked = ~(gap <= KINK)
@@ -157,7 +176,7 @@ class ToolPath:
         """Extremes between two places are those of the cubic through their angles and rates."""
         slack, lower, upper = tolerances.LIMIT_SLACK, self.chain.lower, self.chain.upper
         beyond = np.maximum(lower - q, q - upper)
-        peaks = _peaks(q, qd, 1.0 / KNOTS)
+        peaks = _peaks(q, qd, np.diff(self._sigma)[:, None])
         over = np.maximum(beyond[:-1], np.maximum(lower - peaks, peaks - upper))
         over[-1] = np.maximum(over[-1], beyond[-1])
         if over.max() <= slack:
@@ -169,7 +188,7 @@ class ToolPath:
         sigma = float(self._sigma[place])
         if place > 0 and beyond[place, axis] > slack:
             passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
-            sigma -= float(passed) / KNOTS
+            sigma -= float(passed) * (sigma - float(self._sigma[place - 1]))
         raise InputError(
             f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
             f"{_at(sigma, self._target(sigma))}, by up to {np.degrees(worst):.2g} deg later on. "
@@ -182,8 +201,8 @@ def _at(sigma: float, target: ToolTarget) -> str:
     return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
-def _peaks(q: FloatArray, qd: FloatArray, h: float) -> FloatArray:
-    """(N, n) the extreme inside each piece of length `h`, or its start where it has none."""
+def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
+    """(N, n) the extreme inside each piece of length `h` (N, 1), or its start where it has none."""
     a, b = q[:-1], q[1:]
     da, db = h * qd[:-1], h * qd[1:]
     turns = da * db < 0.0

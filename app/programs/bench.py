@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from app.collision.world import World
 from app.control.arm import Arm
-from app.control.plans import path_to, plan_along, plan_to
+from app.control.commands import Command
+from app.control.plans import path_to, plan_along
 from app.control.session import Session
 from app.control.state import State
+from app.control.things import Thing
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
@@ -21,12 +24,26 @@ from app.kinematics.reading import Reading
 from app.kinematics.tool import ToolTarget
 from app.kinematics.tracker import leap
 from app.motion.limiter import Motion
+from app.planning.curve import Curve
 from app.planning.path import Path
-from app.planning.plan import JOINED
+from app.planning.plan import JOINED, check_clear
+from app.planning.tool_path import ToolPath
 from app.programs.order import Go, Order
+
+W = TypeVar("W")
+L = TypeVar("L")
 
 EXACT = 1e-9
 """[m or rad] A pose that is missed by no more is reached."""
+
+CARRY = 1.0
+"""[m/s^2] The most of the tool while it carries something."""
+
+CLOSING = 500
+"""Ticks that fingers may take."""
+
+TICK = 0.01
+"""[s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +85,33 @@ class Place:
     in_base: bool = False
 
 
+@dataclass(frozen=True)
+class Taken:
+    """Where the tool took what it holds; at what pitch [rad], where it was free to choose."""
+
+    at: ToolTarget
+    chosen: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """Paths that are known to be clear and not yet timed, which takes longest.
+
+    world: what they are clear of. state: the arm where they begin.
+    """
+
+    arm: Arm
+    world: World | None
+    state: State
+    paths: tuple[Path, ...]
+
+    def timed(self) -> Go:
+        """The plan along them; a gentle one when something is held."""
+        gentle = None if self.state.grip is None else CARRY
+        paths = list(self.paths)
+        return Go(plan_along(self.arm, self.world, self.state, paths, tool_acceleration=gentle))
+
+
 class Bench:
     """Takes the arm from step to step as it will go, and notes the orders."""
 
@@ -75,9 +119,13 @@ class Bench:
         """``state``: where the arm stands at first, at rest."""
         self.rig = rig
         self.state = state
-        self.orders: list[tuple[str, Order]] = []
-        self.taken: ToolTarget | None = None
+        self.orders: list[tuple[str, Order | Draft]] = []
+        self.taken: Taken | None = None
         """Where the tool took what it holds."""
+        self.given_up: tuple[float, ...] = ()
+        """[rad] Pitches to take a thing with that led nowhere."""
+        self.ahead: Sequence[object] = ()
+        """The steps that come after this one."""
 
     @property
     def world(self) -> World | None:
@@ -108,7 +156,7 @@ class Bench:
         """The direction ``v`` (3,) in {S}."""
         return frozen(self.rig.T_base_shoulder[:3, :3].T @ v if in_base else v)
 
-    def note(self, name: str, order: Order, state: State) -> None:
+    def note(self, name: str, order: Order | Draft, state: State) -> None:
         """Have ``order`` done, which leads to ``state``."""
         self.orders.append((name, order))
         self.state = state
@@ -117,18 +165,67 @@ class Bench:
         """Go to ``q`` (5,) [rad], round what is in the way; nothing where the arm is there."""
         if float(np.abs(self.q - q).max()) <= JOINED:
             return
-        rig = self.rig
-        plan = plan_to(rig.arm, self.world, self.state, q, rig.seed)
-        self.note(name, Go(plan), self.standing(plan.end))
+        self.follow([path_to(self.rig.arm, self.world, self.state, q, self.rig.seed)], name)
+
+    def lead(self, curves: Sequence[Curve], name: str) -> None:
+        """Lead the tool along ``curves`` one after another, from where it is, on its branch."""
+        paths: list[Path] = []
+        made: dict[int, Path] = {}
+        q = self.q
+        for curve in curves:
+            path = made.get(id(curve))
+            if path is None or float(np.abs(path.start - q).max()) > JOINED:
+                path = ToolPath(self.chain, curve, branch_of(self.chain, q), q)
+                made[id(curve)] = path
+            paths.append(path)
+            q = path.end
+        self.follow(paths, name)
 
     def follow(self, paths: Sequence[Path], name: str) -> None:
-        """Go along ``paths``, the first of which begins here."""
-        plan = plan_along(self.rig.arm, self.world, self.state, list(paths))
-        self.note(name, Go(plan), self.standing(plan.end))
+        """Go along ``paths``, the first of which begins here. Raises BlockedError."""
+        world, fingers = self.world, self.state.gripper_setpoint
+        if world is not None:
+            for path in {id(path): path for path in paths}.values():
+                check_clear(path, world, fingers)
+        self.note(
+            name, Draft(self.rig.arm, world, self.state, tuple(paths)), self.standing(paths[-1].end)
+        )
 
-    def way_to(self, q: FloatArray) -> Path:
-        """The way round to ``q`` (5,) [rad], not yet taken."""
-        return path_to(self.rig.arm, self.world, self.state, q, self.rig.seed)
+    def first(self, ways: Iterable[W], lay: Callable[[W], L]) -> L:
+        """What ``lay`` makes of the first of ``ways`` that can be, as if no other had been tried.
+
+        Raises InputError with the reason of the first of all, which is the one a person expects.
+        """
+        refused = InputError("no way is left.")
+        state, orders = self.state, tuple(self.orders)
+        for number, way in enumerate(ways):
+            try:
+                return lay(way)
+            except InputError as error:
+                self.state, self.orders = state, list(orders)
+                if number == 0:
+                    refused = error
+        raise refused
+
+    def after(self, command: Command, ticks: int = CLOSING) -> State:
+        """The arm at rest after ``command``, as it will be: by the rules themselves."""
+        session, state = self.rig.session, self.state
+        given: tuple[Command, ...] = (command,)
+        for _ in range(ticks):
+            state = session.step(state, given, state.t + TICK)
+            state = session.observe(state, state.setpoint, state.gripper_setpoint)
+            given = ()
+            if not state.moving:
+                break
+        return state
+
+    def thing(self, name: str) -> Thing:
+        """The thing of that name. Raises InputError with those there are."""
+        found = next((each for each in self.state.things if each.name == name), None)
+        if found is None:
+            known = ", ".join(each.name for each in self.state.things) or "nothing"
+            raise InputError(f"There is no {name!r} here; there is {known}.")
+        return found
 
     def standing(self, q: FloatArray) -> State:
         """The arm at rest at ``q`` (5,) [rad]."""
@@ -143,9 +240,9 @@ class Bench:
             return self.rig.arm.chain.check_q(place.joints)
         return self.joints_of(self.target_at(place), place.branch)
 
-    def target_at(self, place: Place) -> ToolTarget:
-        """The tool at ``place``, which is not given by joints."""
-        now = self.at
+    def target_at(self, place: Place, now: ToolTarget | None = None) -> ToolTarget:
+        """The tool at ``place``, which is not given by joints; the rest as it is ``now``."""
+        now = self.at if now is None else now
         p = now.position
         if place.position is not None:
             p = self.point(place.position, in_base=place.in_base)

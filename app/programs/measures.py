@@ -15,6 +15,8 @@ MEASURES: Final = {
     "margin_to_limits_deg": "the least of any joint, on the whole run",
     "nearest_clearance_mm": "between any two parts, on all plans",
     "greatest_speed_share": "of any joint, of its most",
+    "greatest_acceleration_share": "of any joint, over two ticks, of its most",
+    "greatest_jerk_share": "of any joint, over three ticks, of its most",
     "greatest_tool_speed_mm_s": "of the tool point",
     "duration_s": "of the run",
     "emptied_percent": "of the water, what is in the basin at the end",

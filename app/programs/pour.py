@@ -41,4 +41,6 @@ expect:
   spilled_ml: {{at_most: 0}}
   carried_margin_to_rim_mm: {{at_least: 1}}
   greatest_speed_share: {{at_most: 1.000001}}
+  greatest_acceleration_share: {{at_most: 1.000001}}
+  greatest_jerk_share: {{at_most: 1.000001}}
 """

@@ -9,9 +9,9 @@ from app.control.state import State
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.programs.bench import Bench, Rig
-from app.programs.order import Go, Order, Pace, Task
+from app.programs.layout import Layout
+from app.programs.order import Go, Pace, Task
 from app.programs.script import Script
-from app.programs.source import Problem, ScriptError
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,24 +52,9 @@ def compiled(
         )
     bench = Bench(rig, state)
     bench.state = bench.standing(state.setpoint)
-    whole = script.speed * speed
+    laid = Layout(script, bench, check).all()
     tasks = [Task(0, 1, "speed", Pace(1.0))]
-    # A repetition from where it began is planned already.
-    known: dict[tuple[int, bytes, float, str], tuple[list[tuple[str, Order]], State]] = {}
-    for number, placed in enumerate(script.steps):
-        now = bench.state
-        key = id(placed.step), now.setpoint.tobytes(), now.gripper_setpoint, now.tool
-        bench.orders = []
-        if key in known:
-            bench.orders, bench.state = known[key]
-        else:
-            try:
-                if check is not None:
-                    check()
-                placed.step.lay(bench)
-            except InputError as error:
-                problem = Problem(placed.line, placed.column, str(error))
-                raise ScriptError((problem,)) from error
-            known[key] = bench.orders, bench.state
-        tasks += [Task(number, placed.line, name, order) for name, order in bench.orders]
+    for number, (placed, orders) in enumerate(zip(script.steps, laid, strict=True)):
+        tasks += [Task(number, placed.line, name, order) for name, order in orders]
+    whole = script.speed * speed
     return Program(script.name, whole, state.setpoint, tuple(tasks), len(script.steps))

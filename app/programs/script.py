@@ -10,14 +10,19 @@ from app.control.commands import LEAST_SPEED
 from app.programs import fields as read
 from app.programs.bench import Place
 from app.programs.fields import Fields
+from app.programs.manner import Tool
 from app.programs.measures import MEASURES
+from app.programs.places import place
 from app.programs.setting import Setting
 from app.programs.source import Problem, ScriptError, Value
 from app.programs.source import read as read_text
-from app.programs.steps import MOST_TIMES, STEPS, Step, Tool, place
+from app.programs.step import Step
+from app.programs.steps import STEPS
 
 MOST_STEPS = 1000
 """All repetitions counted."""
+
+MOST_TIMES = 1000
 
 LONGEST_NAME = 40
 

@@ -21,8 +21,8 @@ from app.planning.curve import Tool
 from app.planning.jet import Jet
 from app.planning.path import joint_derivatives
 from app.planning.tool_path import ToolPath
-from app.programs.handling import POURING
 from app.programs.order import Go
+from app.programs.pouring import POURING
 from app.programs.program import Program
 from app.programs.script import Script
 from app.report.trace import Trace
@@ -115,6 +115,8 @@ def measured(program: Program, arm: Arm, trace: Trace) -> dict[str, float | None
         "margin_to_limits_deg": float(np.degrees(room.min())),
         "nearest_clearance_mm": 1e3 * min(nearest) if nearest else None,
         "greatest_speed_share": float((np.abs(trace.qd) / limits.speed).max()),
+        "greatest_acceleration_share": _share(trace, arm.limits.acceleration, 2),
+        "greatest_jerk_share": _share(trace, arm.limits.jerk, 3),
         "greatest_tool_speed_mm_s": 1e3 * max(speeds),
         "duration_s": float(trace.t[-1]),
         **_of_water(program, trace),
@@ -188,6 +190,12 @@ def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
     )
     length = float(np.linalg.norm(rate))
     return p, rate / length if length > 0.0 else rate
+
+
+def _share(trace: Trace, most: FloatArray, order: int) -> float:
+    """The greatest derivative of the setpoints of that order, of the most a joint has."""
+    period = float(trace.t[-1]) / (len(trace.t) - 1)
+    return float((np.abs(np.diff(trace.q, order, axis=0)) / period**order / most).max(initial=0.0))
 
 
 def _length(points: FloatArray) -> float:

@@ -7,6 +7,7 @@ import csv
 import html
 import io
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -24,6 +25,8 @@ from app.programs.script import Script
 from app.report import figures
 from app.report.measures import Bound, alongs, bounds, measured
 from app.report.trace import Trace
+
+NONE: Mapping[str, bytes] = {}
 
 UNITS = {"_mm_s": "mm/s", "_mm": "mm", "_deg": "deg", "_s": "s"}
 
@@ -123,14 +126,21 @@ class Report:
             )
         return file.getvalue()
 
-    def write(self, directory: Path, written: datetime) -> tuple[Path, ...]:
-        """All its files into ``directory``, made if need be. Raises InputError where it cannot."""
+    def write(
+        self, directory: Path, written: datetime, pictures: Mapping[str, bytes] = NONE
+    ) -> tuple[Path, ...]:
+        """All its files into ``directory``, made if need be. Raises InputError where it cannot.
+
+        ``pictures``: PNG files by their names, of those in CAPTIONS, shown before the figures.
+        """
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{directory} cannot be made: {error.strerror or error}.") from error
         paths = alongs(self.program)
-        images = {"path.png": figures.path_figure(paths)} if paths else {}
+        images = dict(pictures)
+        if paths:
+            images["path.png"] = figures.path_figure(paths)
         images["joints.png"] = figures.joints_figure(self.arm, self.trace)
         images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
         contents = {
@@ -183,6 +193,14 @@ class Report:
 
 
 CAPTIONS = {
+    "initial.png": ("The arm before it moves", "Initial configuration."),
+    "grasping.png": ("The fingers closed on the cup", "Grasping the cup."),
+    "approaching.png": ("The full cup over the basin", "Approaching the basin."),
+    "emptying.png": ("Water running from the cup into the basin", "Emptying the cup."),
+    "tracing.png": (
+        "The arm on its path",
+        "On the path; grey: what is wished for, in colour: what the tool has traced of it.",
+    ),
     "path.png": (
         "Desired and traced path in 3D, and the error along it",
         (

@@ -84,9 +84,14 @@ class Rehearsal:
             yield min((self.run.number + share) / count, 1.0)
 
     @property
+    def states(self) -> tuple[State, ...]:
+        """Of every tick so far."""
+        return tuple(state for state, _ in self._seen)
+
+    @property
     def trace(self) -> Trace:
         """What happened so far."""
-        states = [state for state, _ in self._seen]
+        states = self.states
         tasks = [number for _, number in self._seen]
         places = [self._place(state, number) for state, number in self._seen]
         return Trace(

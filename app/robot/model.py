@@ -53,6 +53,7 @@ class Body:
         visuals: its shapes.
         collisions: the shapes that stand for it where contacts are looked for.
         moves: whether it hangs, directly or not, on a movable joint.
+        mass: [kg], 0 where the file tells none. centre: (3,) of it, in the body's own frame [m].
     """
 
     name: str
@@ -63,6 +64,8 @@ class Body:
     visuals: tuple[Visual, ...]
     collisions: tuple[Visual, ...]
     moves: bool
+    mass: float
+    centre: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,6 +292,14 @@ def _hinge(bodies: Sequence[Body], chain: Chain, start: str, end: str) -> Hinge:
     return Hinge(joint, axis, lower, upper, before, after)
 
 
+def _weight(inertial: Any) -> tuple[float, FloatArray]:
+    """Mass [kg] of a link and its centre (3,) [m], as its file tells them."""
+    if inertial is None or inertial.mass is None:
+        return 0.0, frozen(np.zeros(3))
+    origin = np.eye(4) if inertial.origin is None else np.asarray(inertial.origin)
+    return max(float(inertial.mass), 0.0), frozen(origin[:3, 3])
+
+
 def _bodies(
     urdf: yourdfpy.URDF, path: Path, frames: Mapping[str, FloatArray]
 ) -> tuple[tuple[Body, ...], list[Path]]:
@@ -318,7 +329,10 @@ def _bodies(
             ends = [j.origin for j in urdf.joint_map.values() if j.parent == link]
             visuals = rods([origin[:3, 3] for origin in ends if origin is not None])
         moves = name is not None or (parent is not None and bodies[parent].moves)
-        bodies[link] = Body(link, parent, frozen(T), name, frozen(axis), visuals, collisions, moves)
+        mass, centre = _weight(shapes.inertial)
+        bodies[link] = Body(
+            link, parent, frozen(T), name, frozen(axis), visuals, collisions, moves, mass, centre
+        )
 
     for link in urdf.link_map:
         add(link)

@@ -64,28 +64,32 @@ class Cameras:
             self._riding.pop(client.client_id, None)
             if preset is Preset.TOOL:
                 self._riding[client.client_id] = client
-        _turn(client, LOOKS.get(preset) or self._on_tool(state))
+        _turn(client, look_from(preset, self._model, state))
 
     def follow(self, state: State) -> None:
         """Take the cameras that ride on the tool along."""
         with self._lock:
             riding = list(self._riding.values())
         for client in riding:
-            _turn(client, self._on_tool(state))
+            _turn(client, look_from(Preset.TOOL, self._model, state))
 
     def _forget(self, client: viser.ClientHandle) -> None:
         with self._lock:
             self._riding.pop(client.client_id, None)
 
-    def _on_tool(self, state: State) -> Look:
-        chain = self._model.arm.chain_to(state.tool)
-        T = self._model.T_base_shoulder @ forward(chain, state.q)
-        p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
-        # Above in the arm's plane, however the tool is rolled.
-        up = z - (z @ x) * x
-        size = float(np.linalg.norm(up))
-        up = up / size if size > LEAST_UP else -T[:3, 2]
-        return Look(_triple(p - BEHIND * x + ABOVE * up), _triple(p + AHEAD * x))
+
+def look_from(preset: Preset, model: RobotModel, state: State) -> Look:
+    """The view that ``preset`` is of an arm in ``state``."""
+    if preset is not Preset.TOOL:
+        return LOOKS[preset]
+    chain = model.arm.chain_to(state.tool)
+    T = model.T_base_shoulder @ forward(chain, state.q)
+    p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
+    # Above in the arm's plane, however the tool is rolled.
+    up = z - (z @ x) * x
+    size = float(np.linalg.norm(up))
+    up = up / size if size > LEAST_UP else -T[:3, 2]
+    return Look(_triple(p - BEHIND * x + ABOVE * up), _triple(p + AHEAD * x))
 
 
 LEAST_UP = 0.05

@@ -109,6 +109,8 @@ class Panel:
             add_shows(self._gui, shows)
         with self._gui.add_folder("Why", expand_by_default=False):
             self._why = LedgerList(self._gui)
+        # At the end, where nobody sees that it takes a line.
+        self._gui.add_html(readout.style())
 
     def follow(
         self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from html import escape
 from typing import Any, Protocol
 
-import numpy as np
 import viser
 
 from app.api.answers import Progress as Told
@@ -15,18 +15,19 @@ from app.control.state import State
 from app.errors import InputError, KatanaError
 from app.exchange.scripts import Scripts
 from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
-from app.programs.order import Go, Use
 from app.programs.program import Program
 from app.programs.taught import taught
 from app.robot.model import RobotModel
+from app.view.preview import Preview
 
-STEERING = ("Script", "Program", "Teach", "Name")
+STEERING = ("Script", "Program", "Look at", "Teach", "Name")
 """Labels of the controls that steer a program: who may, the gateway decides."""
 
-PREVIEW = (64, 156, 255)
-PLACES = 60
-"""Pieces that each plan of a preview is drawn with."""
+RUNS = ("running", "paused", "blocked")
+"""How a program stands that has the arm."""
+
+STEP = 0.1
+"""[s] Between two times to look at."""
 
 MOST_TAUGHT = 200
 
@@ -72,24 +73,20 @@ class ProgramsPanel:
         state: Callable[[], State],
     ) -> None:
         """``state``: the newest."""
-        self._model = model
         self._steering = steering
         self._scripts = scripts
         self._state = state
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
-        self._way = server.scene.add_line_segments(
-            "/path/preview",
-            np.zeros((1, 2, 3), dtype=np.float32),
-            PREVIEW,
-            thickness=0.002,
-            visible=False,
-        )
+        # Whether a person asked to see it before it runs.
+        self._wanted = False
+        self._preview = Preview(server, model)
         gui = server.gui
         with gui.add_folder("Programs", expand_by_default=False):
             self._choice = gui.add_dropdown(
                 "Script", tuple(scripts.paths), hint="Those that come along, and of --programs DIR"
             )
+            self._choice.on_update(lambda _: self._draw(None))
             self._orders = gui.add_button_group(
                 "Program",
                 ("Preview", *ORDERS),
@@ -97,6 +94,16 @@ class ProgramsPanel:
                 "Wait: rest on the way, until Run or Step",
             )
             self._orders.on_click(self._guarded(self._order))
+            self._look = gui.add_slider(
+                "Look at",
+                min=0.0,
+                max=1.0,
+                step=STEP,
+                initial_value=0.0,
+                disabled=True,
+                hint="Seconds of what is previewed, at full speed: the arm as it will stand then",
+            )
+            self._look.on_update(lambda _: self._preview.look(self._look.value))
             self._status = gui.add_html("")
             self._teach = gui.add_button_group(
                 "Teach",
@@ -108,20 +115,34 @@ class ProgramsPanel:
 
     def follow(self) -> None:
         """Show how the program stands."""
-        page = _page(self._steering.told, len(self._taught))
+        told = self._steering.told
+        page = _page(told, len(self._taught))
         if page != self._status.content:
             self._status.content = page
         program = self._steering.program
         if program is not self._drawn:
             self._drawn = program
-            self._preview(program)
+            self._draw(program)
+            self._wanted = self._wanted and program is None
+        if not self._look.disabled and told is not None and told.status in RUNS:
+            self._preview.begin()
+            self._look.disabled = True
+
+    def _draw(self, program: Program | None) -> None:
+        """Show what ``program`` would do."""
+        span = self._preview.show(program, self._state().tool, ghosts=self._wanted)
+        self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
+        self._look.disabled = span <= 0.0
+        if span > 0.0:
+            self._look.max = math.ceil(span / STEP) * STEP
 
     def _order(self) -> None:
         said = self._orders.value
         told = self._steering.told
-        running = told is not None and told.status in ("running", "paused", "blocked")
+        running = told is not None and told.status in RUNS
         if said == "Preview" or (said in ("Run", "Step") and not running):
             text = self._scripts.text(self._choice.value)
+            self._wanted = said == "Preview"
             self._steering.plan(text, ORDERS.get(said))
         else:
             self._steering.steer(ORDERS[said])
@@ -157,32 +178,13 @@ class ProgramsPanel:
 
         return acted
 
-    def _preview(self, program: Program | None) -> None:
-        """The way of the tool through all plans, as a line."""
-        tool = self._state().tool
-        ways: list[FloatArray] = []
-        T_base_shoulder = self._model.T_base_shoulder
-        for task in program.tasks if program is not None else ():
-            if isinstance(task.order, Use):
-                tool = task.order.name
-            elif isinstance(task.order, Go):
-                chain = self._model.arm.chain_to(tool)
-                points = [
-                    (T_base_shoulder @ forward(chain, q))[:3, 3]
-                    for q in task.order.plan.postures(PLACES + 1)
-                ]
-                ways.append(np.stack((points[:-1], points[1:]), axis=1))
-        if ways:
-            self._way.points = np.concatenate(ways).astype(np.float32)
-        self._way.visible = bool(ways)
-
 
 def _page(told: Told | None, poses: int) -> str:
     lines = []
     if told is not None:
         head = f"<b>{escape(told.name)}</b> " if told.name else ""
         lines.append(f"{head}{escape(told.status)}")
-        if told.status in ("running", "paused", "blocked"):
+        if told.status in RUNS:
             lines.append(
                 f"Step {told.step} of {told.steps}, line {told.line}: {escape(told.task)}, "
                 f"{told.share:.0%}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from html import escape
 from pathlib import Path
 
@@ -34,7 +33,7 @@ def page(model: RobotModel, state: State) -> str:
     mood = "moving" if state.moving and state.status is Status.OK else state.status.value
     why = sentence(state)
     return (
-        f"<style>{_style()}</style><div class='k450'>"
+        f"<div class='k450'>"
         f"<p class='status {mood}'><b>{escape(headline(state))}</b>"
         f"<span>{escape(why) or '&nbsp;'}</span></p>"
         f"<table><thead><tr><th>{escape(state.tool)} in {{S}}</th><th>now</th><th>goal</th>"
@@ -65,6 +64,6 @@ def _numbers(T: FloatArray) -> list[str]:
     return position + [signed(math.degrees(angle), 1) for angle in so3.to_rpy(T[:3, :3])]
 
 
-@cache
-def _style() -> str:
-    return (STATIC / "panel.css").read_text(encoding="utf-8")
+def style() -> str:
+    """How all HTML of the panel looks, apart: the read-out goes out ten times a second."""
+    return f"<style>{(STATIC / 'panel.css').read_text(encoding='utf-8')}</style>"

@@ -42,16 +42,14 @@ def furnish(server: viser.ViserServer) -> None:
     scene.add_light_directional(
         "/light/key", intensity=1.7, cast_shadow=True, color=(255, 250, 242), position=KEY
     )
-    scene.add_light_directional(
-        "/light/rim", intensity=0.9, color=(226, 238, 255), position=(-1.0, 1.4, 0.9)
-    )
-    scene.add_light_directional("/light/fill", intensity=0.35, position=(1.2, 1.0, 0.6))
+    scene.add_light_directional("/light/rim", intensity=0.9, color=(226, 238, 255), position=RIM)
+    scene.add_light_directional("/light/fill", intensity=0.35, position=FILL)
     scene.configure_environment_map("studio", environment_intensity=0.45)
     _paint(scene, LIGHT)
 
 
-KEY = (0.7, -0.9, 1.9)
-"""[m] Where the key light shines from, towards the base."""
+KEY, RIM, FILL = (0.7, -0.9, 1.9), (-1.0, 1.4, 0.9), (1.2, 1.0, 0.6)
+"""[m] Where each light shines from, towards the base."""
 
 
 def give(client: viser.ClientHandle, theme: Theme) -> None:

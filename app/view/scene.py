@@ -107,6 +107,11 @@ COAT = 1e-3
 instead of flickering in it."""
 
 
+DETAIL = 3e-3
+"""[m] Smaller things cannot be told in what is translucent and of one colour; without them it takes
+half the bytes."""
+
+
 class GhostNodes(FrameTree):
     """Where the arm is going, or could go: the same links, translucent, in one colour."""
 
@@ -168,8 +173,26 @@ class Gap:
 
 
 def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Vertices (n, 3) [m] and faces (m, 3) of a shape, its materials forgotten."""
+    """Vertices (n, 3) [m] and faces (m, 3) of a shape without its materials and small details."""
     mesh = visual.mesh.copy()
     # One vertex a corner: half of what goes over the wire.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    return mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces)
+    return coarse(mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces), DETAIL)
+
+
+def coarse(
+    vertices: FloatArray, faces: npt.NDArray[Any], cell: float
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Vertices (n, 3) and faces (m, 3) with all vertices of a cubic ``cell`` [m] made one.
+
+    Vertex clustering (Rossignac and Borrel 1993): a vertex moves by less than the cell's diagonal,
+    and faces that have come down to an edge or lie on another are gone.
+    """
+    _, into = np.unique(np.round(vertices / cell), axis=0, return_inverse=True)
+    into = into.ravel()
+    share = np.bincount(into)
+    merged = np.stack([np.bincount(into, weights=x) / share for x in vertices.T], axis=1)
+    left = into[faces]
+    left = left[(left != np.roll(left, 1, axis=1)).all(axis=1)]
+    _, first = np.unique(np.sort(left, axis=1), axis=0, return_index=True)
+    return merged, left[np.sort(first)]

@@ -10,6 +10,7 @@ from typing import Any
 
 import viser
 
+from app.view import frames
 from app.view.brand import dress
 from app.view.cameras import FOV, LOOKS, Preset
 
@@ -26,6 +27,7 @@ def open_server(key: str) -> viser.ViserServer:
     viser asks nobody who they are, and any program and any web page on this machine can reach a
     port of it; so whoever connects without ``key`` is sent away before anything is said.
     """
+    frames.share()
     # What viser prints of itself here would stand between a person and our own line.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, label="Katana450", verbose=False)

@@ -259,8 +259,15 @@ def _hull(solid: Solid) -> Any:
     return trimesh.Trimesh(solid.corners).convex_hull
 
 
+def form(thing: Thing) -> Any:
+    """A trimesh of it as large as it is, on z = 0 of its own frame [m]; of a mesh, its hull."""
+    made = _hull(thing.solid) if thing.solid is not None else _plain(thing)
+    made.apply_scale(thing.scale)
+    return made
+
+
 def _plain(thing: Thing) -> Any:
-    """A mesh of its form, at scale 1."""
+    """A trimesh of its form, at scale 1."""
     match thing.form:
         case Form.BOX:
             made, height = trimesh.creation.box(thing.size), thing.size[2]

@@ -26,7 +26,6 @@ from app.robot.props import load_props
 from app.runtime.board import Board, Snapshot
 from app.runtime.mailbox import CommandSink
 from app.view.cameras import Cameras, Preset
-from app.view.conduit import Conduits
 from app.view.ellipsoid import Ellipsoid
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
@@ -34,14 +33,10 @@ from app.view.objects import ObjectsPanel
 from app.view.panel import READOUT_INTERVAL, Panel
 from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
-from app.view.room import furnish
-from app.view.scene import ArmNodes, Colour, Gap, GhostNodes
-from app.view.things import ThingNodes
+from app.view.scene import Colour, Gap, GhostNodes
+from app.view.scenery import Scenery
 from app.view.tint import Tint
 from app.view.traces import Traces
-from app.view.water import WaterNodes
-from app.view.workcell import Workcell
-from app.water.around import Around
 
 log = logging.getLogger(__name__)
 
@@ -94,7 +89,6 @@ class View:
         """
         besides = Besides() if besides is None else besides
         self._server = server
-        self._session = session
         self._model = model
         self._board = board
         self._mailbox = mailbox
@@ -103,20 +97,10 @@ class View:
         self.failed = threading.Event()
         """Set when it shows nothing any more."""
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
-        furnish(server)
         props = load_props()
-        Workcell(server, props)
-        self._things = ThingNodes(
-            server,
-            props,
-            session.surroundings,
-            self._put_from_gizmo,
-            besides.meshes,
-        )
+        self._scenery = Scenery(server, model, session, props, self._put_from_gizmo, besides.meshes)
         state = board.snapshot.state
-        self._arm = ArmNodes(server, model)
-        self._conduits = Conduits(server, model, self._arm)
-        self._tint = Tint(server, model, self._arm.path, props)
+        self._tint = Tint(server, model, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._traces = Traces(server, model)
@@ -128,10 +112,9 @@ class View:
             else ReachabilityCloud(server, model, besides.workspace)
         )
         self._cameras = Cameras(server, model)
-        shows = Shows(self._show_ellipsoid, self._things.show_handles, self._look_from, cloud)
-        # Made when there is water.
-        self._water: WaterNodes | None = None
-        self._around: Around | None = None
+        shows = Shows(
+            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, cloud
+        )
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
@@ -161,7 +144,7 @@ class View:
     def let_go(self) -> None:
         """Take the handle out of every hand: what is dragged on with it moves nothing."""
         self._gizmo.let_go()
-        self._things.let_go()
+        self._scenery.things.let_go()
 
     def _put_from_gizmo(self, command: Command) -> None:
         try:
@@ -200,11 +183,7 @@ class View:
         """Send every browser what has changed."""
         state = snapshot.state
         with self._server.atomic():
-            angles = self._model.joint_angles(state.q, state.gripper)
-            self._arm.move(angles)
-            self._conduits.move(angles)
-            self._things.follow(state)
-            self._show_water(state)
+            self._scenery.show(state)
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)
@@ -216,20 +195,6 @@ class View:
             if self._programs is not None:
                 self._programs.follow()
         self._server.flush()
-
-    def _show_water(self, state: State) -> None:
-        pouring = self._session.pouring
-        if pouring is None or state.poured is None:
-            if self._water is not None:
-                self._water.hide()
-            return
-        around = pouring.around(state.things)
-        if self._water is None:
-            self._water = WaterNodes(self._server, around)
-        elif around is not self._around:
-            self._water.stand(around)
-        self._around = around
-        self._water.show(state.poured.water)
 
     def _show_goal(self, state: State) -> None:
         away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM

@@ -44,6 +44,9 @@ INSET = (0.99, 0.99, 1.0)
 FLAT = 5e-3
 """[m] A puddle of a smaller radius is a drop, and as much lower."""
 
+TWIST = 2.4
+"""[rad] From puddle to puddle: the same shape, but nobody need see that."""
+
 
 class WaterNodes:
     """Sends what changed enough to be seen, and nothing of water at rest."""
@@ -119,8 +122,7 @@ class WaterNodes:
     def _show_puddles(self, water: Water) -> None:
         for number in range(len(self._puddles), len(water.puddles)):
             puddle = self._add_glossy(f"puddle{number}", *blob(), ON_TABLE)
-            # The same shape, but nobody need see that.
-            puddle.wxyz = so3.to_quaternion(so3.exp((0.0, 0.0, 2.4 * number)))
+            puddle.wxyz = so3.to_quaternion(so3.exp((0.0, 0.0, TWIST * number)))
             self._puddles.append(puddle)
         for number, node in enumerate(self._puddles):
             shown = number < len(water.puddles)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -368,6 +369,11 @@ class ViserPage:
     def picture(self) -> NDArray[np.uint8]:
         """Colours of the window (height, width, 3), indexed by pixels as `project` gives them."""
         return np.asarray(imageio.imread(self._png(), extension=".png")[..., :3])
+
+    def keep(self, path: Path) -> None:
+        """Write a PNG for people to look at, if KATANA450_PICTURES is set: each takes seconds."""
+        if "KATANA450_PICTURES" in os.environ:
+            self.screenshot(path)
 
     def screenshot(self, path: Path) -> Path:
         """Write a PNG of the window, or of the scene alone if the window cannot be had."""

@@ -130,7 +130,7 @@ def test_the_arm_follows_the_arrow_it_is_dragged_by(robot: Robot, artefacts: Pat
     assert end[:3, 3] - start[:3, 3] == pytest.approx([0.0, 0.0, 0.06], abs=PIXEL)
     assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
     assert "On target" in robot.said()
-    robot.page.screenshot(artefacts / "app-arrow.png")
+    robot.page.keep(artefacts / "app-arrow.png")
 
 
 def test_dragged_sideways_the_tool_turns_with_the_arm_and_nothing_is_lost(robot: Robot) -> None:
@@ -151,7 +151,7 @@ def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: 
     end = robot.drawn()
     assert end[:3, 3] == pytest.approx(start[:3, 3], abs=1e-6)
     assert pitch_of(end) - pitch_of(start) == pytest.approx(0.25, abs=0.01)
-    robot.page.screenshot(artefacts / "app-pitch.png")
+    robot.page.keep(artefacts / "app-pitch.png")
 
 
 def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
@@ -172,7 +172,7 @@ def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artef
     robot.settle()
     assert robot.q[0] == pytest.approx(math.radians(shown), abs=1e-9)
     assert robot.q[1:] == pytest.approx(READY[1:], abs=1e-6)
-    robot.page.screenshot(artefacts / "app-slider.png")
+    robot.page.keep(artefacts / "app-slider.png")
 
 
 def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot, model: RobotModel) -> None:
@@ -227,7 +227,7 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
             return f"{1e3 * gap:.0f} mm out of reach" in robot.said()
 
         page.wait_until(told, "how far the arm ends from the handle")
-        page.screenshot(artefacts / "app-out-of-reach.png")
+        page.keep(artefacts / "app-out-of-reach.png")
     # Let go, the handle comes back to the tool, and the reason stays to be read.
     page.wait_until(
         lambda: np.allclose(robot.gizmo(), robot.drawn()[:3, 3], atol=1e-5), "the handle to return"
@@ -262,7 +262,7 @@ def test_before_the_table_the_arm_stops_says_why_and_is_tinted(
     coat = f"{robot.path[f'finger_{finger}_link']}/contact0"
     robot.page.node_pose(coat)
     robot.page.wait_drawn()
-    robot.page.screenshot(artefacts / "app-contact.png")
+    robot.page.keep(artefacts / "app-contact.png")
     go_home(robot)
     robot.page.wait_until(lambda: "On target" in robot.said(), "the reason to go")
     (last,) = robot.page.messages("SetSceneNodeVisibilityMessage", node=coat, last=1)
@@ -317,27 +317,18 @@ def come_back(robot: Robot, server: AppServer) -> None:
     robot.settle()
 
 
-def test_killed_and_restarted_the_app_comes_back_whole(
+def test_killed_in_mid_drag_the_app_comes_back_whole_and_at_rest(
     open_page: OpenPage, model: RobotModel
 ) -> None:
     with AppServer() as server:
         robot = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
         robot.page.drag_slider("Axis 1", 70.0)
         robot.settle()
-        server.kill()
-        come_back(robot, server)
-        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 2
-        robot.page.drag_arrow(MOVE, "z", 0.05)
-        robot.settle()
-
-
-def test_killed_in_mid_drag_the_app_comes_back_at_rest(
-    open_page: OpenPage, model: RobotModel
-) -> None:
-    with AppServer() as server:
-        robot = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
         with robot.page.grip_arrow(MOVE, "z") as grip:
             grip.sweep(0.05, 4)
             server.kill()
             robot.page.wait_lost()
         come_back(robot, server)
+        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 2
+        robot.page.drag_arrow(MOVE, "z", 0.05)
+        robot.settle()

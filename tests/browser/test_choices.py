@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from app.robot.model import RobotModel
 from app.settings import Settings
 from app.view.reachability import Cut
 from app.view.texts import READINGS, room
-from tests.browser.conftest import OpenPage
+from tests.browser.conftest import OpenPage, Windows
+from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer, ServerError
 
 READY = np.array(Settings().ready)
@@ -24,65 +26,74 @@ MOVE = "/target/move"
 ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
 
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        yield page
+
+
 def test_a_person_looks_at_the_branches_and_takes_one(
-    open_page: OpenPage, model: RobotModel, artefacts: Path
+    page: ViserPage, model: RobotModel, artefacts: Path
 ) -> None:
     chain = model.arm.chain
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm", MOVE))
 
-        def now(key: str) -> str:
-            return page.text_of(f".k450 [data-now={key}]")
+    def now(key: str) -> str:
+        return page.text_of(f".k450 [data-now={key}]")
 
-        # At rest: the read-out says how near the next singularity and limit are.
-        distances = limit_distances(chain, READY)
-        axis = int(distances.argmin())
-        assert now("limit") == room(axis, distances[axis])
-        assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
+    # At rest: the read-out says how near the next singularity and limit are.
+    distances = limit_distances(chain, READY)
+    axis = int(distances.argmin())
+    assert now("limit") == room(axis, distances[axis])
+    assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
 
-        for folder in ("Branches", "Show"):
-            page.frame.get_by_text(folder, exact=True).click()
-        page.frame.get_by_text("Velocity ellipsoid", exact=True).click()
-        page.wait_until(
-            lambda: any(
-                message.body["visible"]
-                for message in page.messages("SetSceneNodeVisibilityMessage", node="/velocity")
-            ),
-            "the ellipsoid",
-        )
-        assert np.allclose(
-            page.node_pose("/velocity")[:3, 3],
-            (model.T_base_shoulder @ forward(chain, READY))[:3, 3],
-            atol=1e-5,
-        )
-        # Looking moved nothing.
-        assert [page.slider_value(f"Axis {i}") for i in range(1, 6)] == [
-            round(math.degrees(angle), 6) for angle in READY
-        ]
-        assert "nothing" in page.text_of("[data-branch=front-up]")
+    for folder in ("Branches", "Show"):
+        page.frame.get_by_text(folder, exact=True).click()
+    page.frame.get_by_text("Velocity ellipsoid", exact=True).click()
+    page.wait_until(
+        lambda: any(
+            message.body["visible"]
+            for message in page.messages("SetSceneNodeVisibilityMessage", node="/velocity")
+        ),
+        "the ellipsoid",
+    )
+    assert np.allclose(
+        page.node_pose("/velocity")[:3, 3],
+        (model.T_base_shoulder @ forward(chain, READY))[:3, 3],
+        atol=1e-5,
+    )
+    # Looking moved nothing.
+    assert [page.slider_value(f"Axis {i}") for i in range(1, 6)] == [
+        round(math.degrees(angle), 6) for angle in READY
+    ]
+    assert "nothing" in page.text_of("[data-branch=front-up]")
 
-        page.frame.get_by_role(
-            "button", name="Take front-down", exact=True
-        ).scroll_into_view_if_needed()
-        page.screenshot(artefacts / "app-branches.png")
-        page.click_button("Take front-down")
-        page.wait_until(lambda: page.slider_value("Axis 3") < 0.0, "the other elbow")
-        assert page.errors == []
+    page.frame.get_by_role(
+        "button", name="Take front-down", exact=True
+    ).scroll_into_view_if_needed()
+    page.keep(artefacts / "app-branches.png")
+    page.click_button("Take front-down")
+    page.wait_until(lambda: page.slider_value("Axis 3") < 0.0, "the other elbow")
+    assert page.errors == []
 
 
-def test_a_person_clicks_the_ghost_of_a_branch(open_page: OpenPage, artefacts: Path) -> None:
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        page.frame.get_by_text("Branches", exact=True).click()
-        page.frame.get_by_text("Ghosts of the others", exact=True).click()
-        elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
-        page.wait_ready((elbow,))
-        page.screenshot(artefacts / "app-ghosts.png")
-        before = page.slider_value("Axis 3")
-        page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
-        page.wait_until(lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow")
-        page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
-        assert page.errors == []
+def test_a_person_clicks_the_ghost_of_a_branch(page: ViserPage, artefacts: Path) -> None:
+    page.click_button("Home")
+    page.wait_until(lambda: "On target" in page.panel_text(), "the arm at home", seconds=20.0)
+    page.frame.get_by_text("Ghosts of the others", exact=True).click()
+    elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
+    page.wait_ready((elbow,))
+    page.keep(artefacts / "app-ghosts.png")
+    before = page.slider_value("Axis 3")
+    page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
+    page.wait_until(lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow")
+    page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+    assert page.errors == []
 
 
 def test_a_map_of_the_workspace_is_looked_into(
@@ -98,7 +109,7 @@ def test_a_map_of_the_workspace_is_looked_into(
         def drawn(cut: Cut) -> int:
             page.choose("Reachability", cut.value)
             page.wait_ready(("/reachability",))
-            page.screenshot(artefacts / f"app-reachability-{cut.name.lower()}.png")
+            page.keep(artefacts / f"app-reachability-{cut.name.lower()}.png")
             (message,) = page.messages("PointCloudMessage", node="/reachability", last=1)
             count: int = message.body["props"]["points"]["length"]
             return count // 3
@@ -123,11 +134,12 @@ def test_the_map_of_another_arm_is_refused(tmp_path: Path) -> None:
         AppServer((*APP, "--workspace", str(path))).start()
 
 
-def test_a_reading_is_chosen_for_everyone(open_page: OpenPage) -> None:
-    with AppServer() as server:
-        first, second = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
-        old, new = list(READINGS.values())[:2]
-        assert first.chosen("Reading") == old
-        first.choose("Reading", new)
-        second.wait_until(lambda: second.chosen("Reading") == new, "the reading in both windows")
-        assert first.chosen("Reading") == new
+def test_a_reading_is_chosen_for_everyone(
+    page: ViserPage, server: AppServer, open_page: OpenPage
+) -> None:
+    first, second = page, open_page(server.url, nodes=("/arm", MOVE))
+    old, new = list(READINGS.values())[:2]
+    assert first.chosen("Reading") == old
+    first.choose("Reading", new)
+    second.wait_until(lambda: second.chosen("Reading") == new, "the reading in both windows")
+    assert first.chosen("Reading") == new

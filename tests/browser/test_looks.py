@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
@@ -12,7 +14,7 @@ from app.robot.model import RobotModel
 from app.settings import Settings
 from app.view.cameras import AHEAD, LOOKS, Preset
 from app.view.room import DARK, LIGHT
-from tests.browser.conftest import OpenPage
+from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 
@@ -33,54 +35,63 @@ def wait_for_look(page: ViserPage, position: FloatArray, target: FloatArray) -> 
     )
 
 
+@pytest.fixture(scope="module")
+def pair(windows: Windows) -> Iterator[tuple[ViserPage, ViserPage]]:
+    """Two windows of one server."""
+    with (
+        AppServer() as server,
+        windows.open(server.url, nodes=("/arm", MOVE)) as page,
+        windows.open(server.url, nodes=("/arm", MOVE)) as other,
+    ):
+        yield page, other
+
+
 def test_each_window_looks_from_where_its_person_asks(
-    open_page: OpenPage, model: RobotModel, artefacts: Path
+    pair: tuple[ViserPage, ViserPage], model: RobotModel, artefacts: Path
 ) -> None:
     chain = model.arm.chain
-    with AppServer() as server:
-        page, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
-        others = seen_from(other)
-        for preset, look in LOOKS.items():
-            page.click_button(preset.value)
-            wait_for_look(page, np.array(look.position), np.array(look.target))
-            page.screenshot(artefacts / f"look-{preset.value.lower()}.png")
+    page, other = pair
+    others = seen_from(other)
+    for preset, look in LOOKS.items():
+        page.click_button(preset.value)
+        wait_for_look(page, np.array(look.position), np.array(look.target))
+        page.keep(artefacts / f"look-{preset.value.lower()}.png")
 
-        page.click_button(Preset.TOOL.value)
+    page.click_button(Preset.TOOL.value)
 
-        def on_tool(q: FloatArray) -> FloatArray:
-            T = model.T_base_shoulder @ forward(chain, q)
-            ahead: FloatArray = T[:3, 3] + AHEAD * T[:3, 0]
-            return ahead
+    def on_tool(q: FloatArray) -> FloatArray:
+        T = model.T_base_shoulder @ forward(chain, q)
+        ahead: FloatArray = T[:3, 3] + AHEAD * T[:3, 0]
+        return ahead
 
-        page.wait_until(lambda: np.allclose(seen_from(page)[1], on_tool(READY), atol=1e-3), "it")
-        page.screenshot(artefacts / "look-tool.png")
-        page.click_button("Stretch")
-        page.wait_until(
-            lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
-            "the camera to ride along",
-        )
-        page.click_button(Preset.SIDE.value)
-        page.click_button("Home")
-        page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
-        side = LOOKS[Preset.SIDE]
-        wait_for_look(page, np.array(side.position), np.array(side.target))
-        assert np.allclose(np.stack(seen_from(other)), np.stack(others), atol=1e-3)
-        assert page.errors == other.errors == []
+    page.wait_until(lambda: np.allclose(seen_from(page)[1], on_tool(READY), atol=1e-3), "it")
+    page.keep(artefacts / "look-tool.png")
+    page.click_button("Stretch")
+    page.wait_until(
+        lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
+        "the camera to ride along",
+    )
+    page.click_button(Preset.SIDE.value)
+    page.click_button("Home")
+    page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
+    side = LOOKS[Preset.SIDE]
+    wait_for_look(page, np.array(side.position), np.array(side.target))
+    assert np.allclose(np.stack(seen_from(other)), np.stack(others), atol=1e-3)
+    assert page.errors == other.errors == []
 
 
-def test_a_theme_is_of_one_window(open_page: OpenPage, artefacts: Path) -> None:
-    with AppServer() as server:
-        page, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
+def test_a_theme_is_of_one_window(pair: tuple[ViserPage, ViserPage], artefacts: Path) -> None:
+    page, other = pair
 
-        def sky(window: ViserPage) -> FloatArray:
-            patch = window.picture()[90:110, 500:540].reshape(-1, 3)
-            return np.asarray(np.median(patch, axis=0), dtype=float)
+    def sky(window: ViserPage) -> FloatArray:
+        patch = window.picture()[90:110, 500:540].reshape(-1, 3)
+        return np.asarray(np.median(patch, axis=0), dtype=float)
 
-        page.frame.get_by_text("Show", exact=True).click()
-        page.click_button("Dark")
-        page.wait_until(lambda: sky(page).max() < max(DARK.floor) + 30, "the night")
-        page.screenshot(artefacts / "look-dark.png")
-        assert sky(other).min() > min(LIGHT.floor) - 40
-        page.click_button("Light")
-        page.wait_until(lambda: sky(page).min() > min(LIGHT.floor) - 40, "the day")
-        assert page.errors == other.errors == []
+    page.frame.get_by_text("Show", exact=True).click()
+    page.click_button("Dark")
+    page.wait_until(lambda: sky(page).max() < max(DARK.floor) + 30, "the night", seconds=20.0)
+    page.keep(artefacts / "look-dark.png")
+    assert sky(other).min() > min(LIGHT.floor) - 40
+    page.click_button("Light")
+    page.wait_until(lambda: sky(page).min() > min(LIGHT.floor) - 40, "the day")
+    assert page.errors == other.errors == []

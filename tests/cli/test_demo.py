@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import math
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from app.kinematics.forward import forward
 from app.programs.circle import CircleDemo
@@ -19,13 +22,13 @@ from app.robot.model import load
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def katana450(*options: str) -> subprocess.CompletedProcess[str]:
+def katana450(*options: str, seconds: float = 60.0) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "app", *options],
         capture_output=True,
         text=True,
         cwd=ROOT,
-        timeout=60,
+        timeout=seconds,
         check=False,
     )
 
@@ -74,10 +77,10 @@ def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
 
 
 def test_figures_and_page_are_there(out: Path) -> None:
-    for name in ("path.png", "joints.png", "speeds.png"):
+    for name in ("tracing.png", "path.png", "joints.png", "speeds.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == 3
+    assert page.count("data:image/png;base64,") == 4
     assert "Every bound is held." in page
     assert "viewport" in page
     assert "http" not in page.replace("http-equiv", "")
@@ -92,8 +95,25 @@ def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
         return [line for line in text.splitlines() if '"written"' not in line]
 
     assert lines(tmp_path) == lines(out)
-    for name in ("trace.csv", "path.png", "joints.png", "speeds.png"):
+    for name in ("trace.csv", "tracing.png", "path.png", "joints.png", "speeds.png"):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
+    """Initial configuration, grasping, approaching, emptying: its figures 9 to 12."""
+    done = katana450("demo", "pour", "--headless", "--report", str(tmp_path), seconds=150.0)
+    assert done.returncode == 0, done.stderr
+    shown = []
+    for name in ("initial", "grasping", "approaching", "emptying"):
+        with Image.open(tmp_path / f"{name}.png") as picture:
+            shown.append(np.asarray(picture).astype(int))
+    for one, other in itertools.combinations(shown, 2):
+        # At least the hand is elsewhere.
+        assert (np.abs(one - other).sum(axis=2) > 60).mean() > 0.005
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    captions = ("Initial configuration", "Grasping the cup", "Approaching the", "Emptying the cup")
+    places = [page.index(caption) for caption in captions]
+    assert places == sorted(places)
 
 
 def test_a_bound_that_is_missed_is_told(tmp_path: Path) -> None:

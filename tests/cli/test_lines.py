@@ -1,7 +1,9 @@
-"""``katana450 fk`` and ``ik`` as another program uses them: a process, lines in, lines out."""
+"""``katana450 fk`` and ``ik`` as another program uses them: lines in, lines out."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import subprocess
 import sys
@@ -12,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.cli.main import main
 from app.robot.model import RobotModel
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -21,17 +24,16 @@ GOLDEN = json.loads((ROOT / "tests" / "golden" / "fk_reference.json").read_text(
 def ask(command: str, lines: Sequence[object], *options: str) -> list[dict[str, Any]]:
     """The answers to ``lines``: strings as they are, anything else as JSON."""
     text = "".join((x if isinstance(x, str) else json.dumps(x)) + "\n" for x in lines)
-    done = subprocess.run(
-        [sys.executable, "-m", "app", command, *options],
-        input=text,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=60,
-        check=True,
-    )
-    assert done.stderr == ""
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        patch.setattr(sys, "stdin", io.StringIO(text))
+        assert main([command, *options]) == 0
+    assert err.getvalue() == ""
+    return [json.loads(line) for line in out.getvalue().splitlines()]
 
 
 def test_fk_agrees_with_the_manufacturer() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,7 +33,9 @@ TICK = 0.01
 A_TRIP = 25
 """Moves of the hand one after the other that go the same way, so that they get somewhere."""
 
-DRAGS = {Reading.POSE: 10_000, Reading.PITCH: 2_000, Reading.POSITION: 1_500}
+LONG = "KATANA450_LONG" in os.environ
+DRAGS = {Reading.POSE: 10_000 if LONG else 2_500, Reading.PITCH: 1_000, Reading.POSITION: 1_000}
+"""All of them with `make test-long`."""
 OTHERS = 500
 """Drags of each other arm, the readings by turns."""
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.control import commands as cmd
+from app.control.grip import touching
 from app.control.plans import plan_along, plan_to
 from app.control.session import Session
 from app.control.state import Reason, State
@@ -160,6 +161,9 @@ def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
 ) -> None:
     tight = run(session, holding, cmd.SetGripper(-0.44))
     assert tight.gripper == holding.grip
+    hand = session.surroundings.hand
+    assert hand is not None
+    assert touching(hand, tight) == hand.fingers
     stopped = run(session, session.step(tight, [cmd.SetJoint(0, 0.3)], tight.t + 0.01), cmd.Stop())
     cup, _ = cup_of(session, stopped)
     assert cup.held
@@ -199,8 +203,12 @@ def test_one_finger_that_touches_holds_nothing_and_says_which_does_not(
     assert lopsided.parts is not None
     assert lopsided.parts[1] == "cup"
     assert lopsided.amount > 0.003
+    hand = session.surroundings.hand
+    assert hand is not None
+    assert {*touching(hand, closed), lopsided.parts[0]} == set(hand.fingers)
     opened = run(session, closed, cmd.SetGripper(OPEN))
     assert not any(f.reason is Reason.LOPSIDED for f in opened.findings)
+    assert touching(hand, opened) == ()
 
 
 def thing(name: str = "box", **changed: Any) -> Thing:

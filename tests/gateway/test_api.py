@@ -24,7 +24,10 @@ from app.client import AsyncClient, Client, RefusedError, aconnect, connect
 from app.client.files import LostError
 from app.kinematics.forward import forward
 from app.kinematics.reading import Reading
+from app.kinematics.statics import holding_torques
+from app.kinematics.velocity import limit_distances
 from app.robot.model import RobotModel
+from app.robot.weight import loads_of
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask, websocket
 
@@ -167,6 +170,26 @@ def test_everything_there_is_to_ask_for_has_an_answer(arm: Client) -> None:
     for request in refusals:
         with pytest.raises(RefusedError):
             arm.ask(request)
+
+
+def test_a_state_tells_what_follows_from_the_posture(arm: Client, model: RobotModel) -> None:
+    q = THERE + np.array((0.3, 0.0, 0.0, 0.0, 0.0))
+    arm.joints(q)
+    time.sleep(0.3)
+    state = arm.look(answers.State)
+    assert state.told > state.t + 0.2
+    assert (state.setpoint, state.tool_speed) == (state.q, 0.0)
+    assert (state.touching, state.held) == ([], None)
+    assert state.holding == pytest.approx(holding_torques(model.arm.chain, q, loads_of(model)))
+    distances = limit_distances(model.arm.chain, q)
+    assert state.margins.limit == pytest.approx(distances.min())
+    assert state.margins.axis == distances.argmin() + 1
+    assert state.margins.clearance is not None
+    assert state.margins.clearance > 0.005
+    arm.tell(requests.Joints(q=THERE.tolist()))
+    deadline = time.monotonic() + 5.0
+    while arm.look(answers.State).tool_speed < 0.05:
+        assert time.monotonic() < deadline
 
 
 def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(arm: Client) -> None:

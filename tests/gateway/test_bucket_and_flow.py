@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -79,26 +81,46 @@ def test_a_frame_larger_than_the_line_goes_alone() -> None:
 def test_on_any_line_what_is_seen_is_not_old_and_the_line_is_used(
     rate: float, trip: float, size: int
 ) -> None:
-    """A line of that rate [bytes/s] and round trip [s], and viser with a frame every 16 ms."""
+    ages = ages_after(20.0, lambda _: rate, trip, size)
+    assert max(ages) < 1.2 + trip
+    assert len(ages) > 0.5 * 40.0 * min(rate / size, 1.0 / FRAME)
+
+
+@pytest.mark.parametrize("trip", [0.0, 0.05])
+@pytest.mark.parametrize("size", [300, 2000])
+def test_when_a_line_grows_thin_little_is_on_the_way(size: int, trip: float) -> None:
+    ages = ages_after(20.0, lambda t: 5e6 if t < 30.0 else 1.5e4, trip, size)
+    assert max(ages) < 1.5
+    assert np.median(ages[len(ages) // 2 :]) < 0.6
+
+
+FRAME = 0.016
+"""[s]"""
+
+
+def ages_after(warm: float, rate: Callable[[float], float], trip: float, size: int) -> list[float]:
+    """Of the frames of ``size`` that are seen from ``warm`` [s] on to the end of a minute.
+
+    On a line of ``rate`` [bytes/s] and round trip ``trip`` [s], and viser with a frame every FRAME.
+    """
     flow, t, free_at, count = Flow(), 0.0, 0.0, 1
     flow.sent(100, 0.0)
     assert flow.seen(1, 0.0)
     on_the_line: deque[tuple[float, float]] = deque()
     ages = []
     while t < 60.0:
-        t += 0.016
+        t += FRAME
         while on_the_line and on_the_line[0][0] + trip <= t:
             arrived, sent_at = on_the_line.popleft()
             count += 1
             assert flow.seen(count, t)
-            if t > 20.0:
+            if t > warm:
                 ages.append(arrived - sent_at)
         if flow.has_room(t):
             flow.sent(size, t)
-            free_at = max(free_at, t) + size / rate
+            free_at = max(free_at, t) + size / rate(t)
             on_the_line.append((free_at, t))
-    assert max(ages) < 1.2 + trip
-    assert len(ages) > 0.5 * 40.0 * min(rate / size, 1.0 / 0.016)
+    return ages
 
 
 @pytest.mark.parametrize("count", [-1, 1, 4, 10**30])

@@ -255,6 +255,34 @@ def test_each_may_do_what_their_role_says(guarded: tuple[AppServer, Path]) -> No
     asyncio.run(act())
 
 
+def test_a_press_of_stop_that_is_told_both_ways_counts_once() -> None:
+    async def act() -> None:
+        with AppServer() as server:
+            cookie = enter(server.url)
+
+            def post(query: str = "") -> None:
+                answer = ask(f"{server.url}/stop{query}", data=b"", Cookie=cookie)
+                assert answer[0] == 204
+
+            async with controlling(server.url, cookie) as control:
+                await control.wait(mood="ok")
+                await control.say("stop", press="one")
+                await control.wait(mood="stopped")
+                await control.say("reset")
+                await control.wait(stopped=None)
+                post("?press=one")
+                await asyncio.sleep(0.3)
+                assert control.status["stopped"] is None
+                # One that is like no other is a new one, whatever it is called.
+                for query in ("?press=two", "?press=" + 100 * "x", "?press=", ""):
+                    post(query)
+                    await control.wait(mood="stopped")
+                    await control.say("reset")
+                    await control.wait(stopped=None)
+
+    asyncio.run(act())
+
+
 def test_who_is_not_welcome_any_more_is_sent_out(guarded: tuple[AppServer, Path]) -> None:
     server, path = guarded
 

@@ -13,6 +13,7 @@ from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.lease import LOST_AFTER, Lease, Role
 from app.control.ledger import Entry
+from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.session import Session
 from app.control.state import Finding, Halt, Reason, State
@@ -43,6 +44,8 @@ class FakeArm:
     surroundings: Surroundings
     pouring: Pouring | None
     rig: Rig
+    margins: Margins
+    holding: FloatArray | None
 
     def __init__(self, state: State) -> None:
         self.rest = state
@@ -225,6 +228,23 @@ def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
     assert not stands_still(table)
     assert not moves(table)
     table.hub.drive(driver.person.key)
+
+
+def test_a_press_of_stop_counts_once_however_late_it_is_told_again(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.stop("Window 1", "a press")
+    table.hub.stop("Window 1", "a press")
+    table.hub.reset(driver)
+    table.hub.stop("Window 1", "a press")
+    assert not stands_still(table)
+    table.hub.stop("Window 1", "another")
+    assert stands_still(table)
+    table.hub.reset(driver)
+    # Without a name every one counts.
+    for _ in range(2):
+        table.hub.stop("Window 1")
+        assert stands_still(table)
+        table.hub.reset(driver)
 
 
 def test_an_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:

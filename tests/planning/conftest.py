@@ -11,7 +11,7 @@ from app.control.arm import Arm
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch, branch_of
 from app.kinematics.tool import ToolTarget
-from app.planning.curve import Linear, ToolArc, ToolLine
+from app.planning.curve import Linear, ToolArc, ToolLine, ToolLines
 from app.planning.joint_path import JointPath
 from app.planning.path import Path
 from app.planning.tool_path import ToolPath
@@ -33,6 +33,15 @@ def circle() -> ToolArc:
     return ToolArc(top, centre, axis, math.tau, pitch, roll)
 
 
+def lines(at: ToolTarget) -> ToolLines:
+    """Round three sides of a frame beside `at`, and a turn on the spot."""
+    steps = ((0.0, 0.0, 0.0), (0.0, -0.15, 0.0), (-0.05, -0.15, -0.1), (-0.05, 0.05, -0.1))
+    vias = [ToolTarget(at.position + step, at.pitch, at.roll) for step in steps]
+    last = vias[-1]
+    vias += [ToolTarget(last.position, last.pitch + 0.2, last.roll + 1.0)]
+    return ToolLines(tuple(vias), np.array([0.8, 0.3, 0.5]))
+
+
 @pytest.fixture(scope="session")
 def paths(arm: Arm, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
     """One of each kind, by name."""
@@ -48,6 +57,7 @@ def paths(arm: Arm, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
         "circle": ToolPath(arm.chain_to("flange"), circle, FRONT_UP, np.zeros(5)),
         "line": ToolPath(chain, line, branch_of(chain, ready), ready),
         "pour": ToolPath(chain, pour, branch_of(chain, ready), ready),
+        "lines": ToolPath(chain, lines(at), branch_of(chain, ready), ready),
         "joints": JointPath(chain, vias[:2]),
         "via": JointPath(chain, vias, np.array([0.8])),
     }

@@ -13,12 +13,14 @@ from ruckig import InputParameter, Ruckig, Trajectory
 
 from app.control.arm import Arm
 from app.errors import InputError
+from app.planning.curve import ToolLines
 from app.planning.pacing import fastest
 from app.planning.path import Path, joint_derivatives, point_derivatives
 from app.planning.scaling import Bounds, Scaling, rest_to_rest
+from app.planning.tool_path import ToolPath
 from tests.planning.time_optimal import least_time
 
-NAMES = ("circle", "line", "pour", "joints", "via")
+NAMES = ("circle", "line", "pour", "lines", "joints", "via")
 
 
 @pytest.fixture(scope="module")
@@ -67,12 +69,23 @@ def test_no_limit_is_passed_however_tau_runs(
     assert found.max() > 0.98
 
 
+def test_nor_where_a_corner_is_small(bounds: Bounds, paths: dict[str, Path]) -> None:
+    lines = paths["lines"]
+    assert isinstance(lines, ToolPath)
+    assert isinstance(lines.curve, ToolLines)
+    sharp = replace(lines.curve, blend=np.array([0.02, 0.05, 1.0]))
+    path = ToolPath(lines.chain, sharp, lines.branch, lines.near)
+    assert loads(path, fastest(path, bounds), bounds).max() <= 1.0
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_it_takes_at_most_half_as_long_again_as_it_has_to(
+def test_it_takes_not_much_longer_than_it_has_to(
     paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
 ) -> None:
     least = least_time(paths[name], bounds)
-    assert least < scalings[name].duration < 1.5 * least
+    # The one slowness of a path cannot dwell in several small corners as the optimum does.
+    most = 1.75 if name == "lines" else 1.5
+    assert least < scalings[name].duration < most * least
 
 
 def test_a_straight_line_alone_is_at_its_limits(arm: Arm, paths: dict[str, Path]) -> None:

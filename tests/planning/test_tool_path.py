@@ -21,7 +21,7 @@ from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.projection import project
 from app.kinematics.tool import ToolTarget
-from app.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolScrew
+from app.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolLines, ToolScrew
 from app.planning.jet import Jet
 from app.planning.path import Path, joint_derivatives, point_derivatives
 from app.planning.pitch import roomiest
@@ -100,11 +100,12 @@ def test_lines_of_any_member_are_straight_and_keep_their_branch(seed: int) -> No
         assert chain.within_limits(found)
 
 
-@pytest.mark.parametrize("name", ["circle", "line", "pour", "joints", "via"])
+@pytest.mark.parametrize("name", ["circle", "line", "pour", "lines", "joints", "via"])
 def test_derivatives_are_those_of_differences(paths: dict[str, Path], name: str) -> None:
-    path, h = paths[name], 1e-4
+    path = paths[name]
     joins = (0.0, *path.joins, 1.0)
     for low, high in pairwise(joins):
+        h = min(1e-4, 1e-3 * (high - low))
         at = np.linspace(low + 2 * h, high - 2 * h, 9)
         for derivatives in (joint_derivatives, point_derivatives):
             before, here, after = (derivatives(path, at + step) for step in (-h, 0.0, h))
@@ -114,12 +115,78 @@ def test_derivatives_are_those_of_differences(paths: dict[str, Path], name: str)
                 assert measured == pytest.approx(here[order + 1], abs=3e-5 * scale)
 
 
-@pytest.mark.parametrize("name", ["circle", "line", "pour", "joints", "via"])
+@pytest.mark.parametrize("name", ["circle", "line", "pour", "lines", "joints", "via"])
 def test_one_place_and_many_agree(paths: dict[str, Path], name: str) -> None:
     at = np.linspace(0.0, 1.0, 23)
     many = joint_derivatives(paths[name], at)[0]
     for sigma, q in zip(at.tolist(), many, strict=True):
         assert q_at(paths[name], sigma) == pytest.approx(q, abs=1e-14)
+
+
+def test_lines_are_straight_between_their_corners_and_pass_them_near(
+    arm: Arm, paths: dict[str, Path]
+) -> None:
+    path, chain = paths["lines"], arm.chain
+    assert isinstance(path, ToolPath)
+    curve = path.curve
+    assert isinstance(curve, ToolLines)
+    points = np.array([via.position for via in curve.vias])
+    legs, on = list(pairwise(points)), 0
+    for sigma in np.linspace(0.0, 1.0, 301).tolist():
+        T = forward(chain, q_at(path, sigma))
+        wished = np.array([each.c0 for each in curve.at(Jet.variable(sigma))])
+        assert T[:3, 3] == pytest.approx(wished[:3], abs=1e-14)
+        target = ToolTarget.at(chain, q_at(path, sigma))
+        assert (target.pitch, target.roll) == pytest.approx(tuple(wished[3:]), abs=1e-13)
+        away = min(off_leg(T[:3, 3], *leg) for leg in legs)
+        # The farthest from its legs that half of the shorter one with such a blend can be.
+        assert away < 0.8 * 0.5 * 0.12
+        on += away < 1e-12
+    assert on > 100
+    for via, near in zip(points[1:3], (0.03, 0.01), strict=True):
+        traced = [curve.at(Jet.variable(s)) for s in np.linspace(0.0, 1.0, 4001).tolist()]
+        passed = min(math.dist([each.c0 for each in tool[:3]], via) for tool in traced)
+        assert 1e-5 < passed < near
+    start = ToolTarget.at(chain, path.start)
+    assert start.position == pytest.approx(points[0], abs=1e-14)
+    assert forward(chain, path.end)[:3, 3] == pytest.approx(points[-1], abs=1e-14)
+
+
+def off_leg(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """[m] How far `p` is from the segment from `a` to `b`."""
+    way = b - a
+    share = np.clip((p - a) @ way / max(float(way @ way), 1e-30), 0.0, 1.0)
+    return math.dist(p, a + share * way)
+
+
+def test_lines_that_are_none_are_refused(arm: Arm, ready: FloatArray) -> None:
+    at = ToolTarget.at(arm.chain, ready)
+    there = ToolTarget(at.position + np.array([0.0, 0.05, 0.0]), at.pitch, at.roll)
+    beyond = ToolTarget(at.position + np.array([0.6, 0.0, 0.0]), at.pitch, at.roll)
+    none, half = np.empty(0), np.array([0.5])
+    for vias, blend in (
+        ((at,), none),
+        ((at, at), none),
+        ((at, there, there), half),
+        ((at, there, at), none),
+        ((at, there, at), np.array([0.0])),
+        ((at, there, at), np.array([1.1])),
+        ((at, there, at), np.array([math.nan])),
+        ((at, ToolTarget(at.position, math.nan, 0.0)), none),
+    ):
+        with pytest.raises(InputError):
+            ToolLines(vias, blend)
+    with pytest.raises(InputError, match="leaves what the arm reaches"):
+        ToolPath(arm.chain, ToolLines((at, there, beyond), half), FRONT_UP, ready)
+
+
+@pytest.mark.parametrize("blend", [0.01, 0.1, 1.0])
+def test_a_corner_however_small_is_no_kink(arm: Arm, ready: FloatArray, blend: float) -> None:
+    at = ToolTarget.at(arm.chain, ready)
+    steps = ((0.0, 0.0, 0.0), (0.0, 0.08, 0.0), (0.0, 0.0, -0.06), (0.0, -0.05, 0.0))
+    vias = tuple(ToolTarget(at.position + step, at.pitch, at.roll) for step in steps)
+    path = ToolPath(arm.chain, ToolLines(vias, np.full(2, blend)), FRONT_UP, ready)
+    assert path.start == pytest.approx(ready, abs=1e-12)
 
 
 def straight(chain: Chain, q: FloatArray, step: tuple[float, float, float]) -> ToolPath:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.cli.assembly import described
 from app.control.state import State
+from app.geometry.arrays import FloatArray
 from app.programs import runner
 from app.programs.bench import Rig
 from app.programs.program import Program
@@ -21,8 +25,9 @@ TICK = 0.01
 class Stage:
     """A session on a clock of its own, and programs run on it."""
 
-    def __init__(self, model: RobotModel) -> None:
-        self.session = described(Settings(), URDF_PATH, None).session
+    def __init__(self, model: RobotModel, *, bare: bool = False) -> None:
+        """``bare``: without its gripper."""
+        self.session = described(replace(Settings(), bare=bare), URDF_PATH, None).session
         self.rig = Rig(self.session, model.T_base_shoulder)
 
     def begin(self) -> State:
@@ -32,6 +37,20 @@ class Stage:
         run, commands = runner.step(program, run, state)
         state = self.session.step(state, commands, state.t + TICK)
         return run, self.session.observe(state, state.setpoint, state.gripper_setpoint)
+
+    def loads(self, states: Sequence[State]) -> FloatArray:
+        """(3,) the greatest speed, acceleration and jerk of any joint, to its limit.
+
+        From differences of the setpoints alone, which are means of the derivatives.
+        """
+        limits = self.rig.arm.limits
+        q = np.array([state.setpoint for state in states])
+        bounds = (limits.speed, limits.acceleration, limits.jerk)
+        found = [
+            (np.abs(np.diff(q, order, axis=0)) / TICK**order / most).max()
+            for order, most in enumerate(bounds, start=1)
+        ]
+        return np.array(found)
 
     def play(self, program: Program, state: State, most: int = 5000) -> tuple[Run, list[State]]:
         """To its end, and every state on the way."""

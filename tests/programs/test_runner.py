@@ -13,12 +13,14 @@ import app.programs
 from app.control import commands as cmd
 from app.control.state import State
 from app.kinematics.forward import forward
+from app.kinematics.tool import ToolTarget
 from app.programs import runner
 from app.programs.order import Go
 from app.programs.program import Program, compiled
 from app.programs.runner import Phase, Run
 from app.programs.script import parse
 from app.programs.source import ScriptError
+from app.programs.timeline import Timeline
 from tests.programs.conftest import Stage
 
 LIBRARY = sorted((Path(app.programs.__file__).parent / "library").glob("*.yaml"))
@@ -67,6 +69,42 @@ def test_it_does_what_the_script_says(stage: Stage, program: Program) -> None:
     assert np.allclose(rests[4], centre + R @ (rests[3] - centre) + [0, 0, 20], atol=1e-6)
     assert np.allclose(point(stage, states[-1]), [320, -40, 150], atol=1e-6)
     assert states[-1].gripper == stage.rig.arm.gripper.upper
+
+
+def test_lines_round_their_corners_and_rest_at_their_end(stage: Stage) -> None:
+    text = (
+        "tool: tcp\nframe: base\nsteps:\n  - move: {x: 320, y: -40, z: 150, pitch: 50, roll: 0}\n"
+        "  - lines: {through: [{x: 320, y: 40, z: 150}, {x: 360, y: 40, z: 150, pitch: 60}, "
+        "{x: 360, y: 40, z: 190}], blend: 0.4}"
+    )
+    run, states = stage.play(compiled(parse(text), stage.rig, stage.begin()), stage.begin())
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    rests = [
+        point(stage, a) for a, b in pairwise(states) if a.motion.at_rest and not b.motion.at_rest
+    ]
+    assert len(rests) == 2
+    assert np.allclose(point(stage, states[-1]), [360, 40, 190], atol=1e-6)
+    way = [point(stage, state) for state in states]
+    for corner, near in (([320, 40, 150], 8.0), ([360, 40, 150], 8.0)):
+        assert 0.5 < min(np.linalg.norm(p - corner) for p in way) < near
+    target = ToolTarget.at(stage.rig.arm.chain_to("tcp"), states[-1].q)
+    assert np.degrees(target.pitch) == pytest.approx(60.0, abs=1e-9)
+    assert stage.loads(states).max() <= 1.0 + 1e-6
+
+
+def test_a_timeline_has_the_arm_where_the_run_has_it(stage: Stage, program: Program) -> None:
+    timeline = Timeline.of(program)
+    (first, _), *_, (last, fingers) = timeline.postures(5)
+    assert np.array_equal(first, program.start)
+    _, states = stage.play(program, stage.begin())
+    assert last == pytest.approx(states[-1].q, abs=1e-12)
+    assert fingers == stage.rig.arm.gripper.upper
+    assert timeline.at(-1.0)[0] == pytest.approx(first)
+    assert timeline.at(timeline.span + 1.0)[0] == pytest.approx(last, abs=1e-12)
+    run_by = np.array([state.q for state in states])
+    for t in np.linspace(0.0, timeline.span, 23).tolist():
+        q, _ = timeline.at(t)
+        assert np.abs(run_by - q).max(axis=1).min() < 0.02
 
 
 def test_every_plan_is_clear_and_meets_the_next(program: Program) -> None:

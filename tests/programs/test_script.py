@@ -11,9 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from app.errors import InputError
+from app.programs.moves import Move
 from app.programs.script import MOST_STEPS, parse
 from app.programs.source import DEEPEST, LARGEST, Problem, ScriptError
-from app.programs.steps import STEPS, Circle, Line, Move
+from app.programs.steps import STEPS
+from app.programs.tool_moves import Circle, Line
 
 GOOD = """\
 name: Try
@@ -50,7 +52,7 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
     assert line.by is not None
     assert line.by.tolist() == [0.0, 0.0, -0.05]
     assert isinstance(circle, Circle)
-    assert circle.normal.tolist() == [-1.0, 0.0, 0.0]
+    assert circle.turn.axis.tolist() == [-1.0, 0.0, 0.0]
     assert [placed.line for placed in script.steps[1:4]] == [10, 11, 15]
 
 
@@ -71,6 +73,12 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps:\n  - joints: [1, 2, 3, 4, x]", 2, "'x'"),
         ("steps:\n  - line: {to: {x: 1, y: 2}}", 2, "needs 'z'"),
         ("steps:\n  - line: {to: [1, 2, 3], by: [1, 2, 3]}", 2, "`to` a point or `by`"),
+        ("steps:\n  - lines: {through: [[1, 2, 3]]}", 2, "list of 2 to 50"),
+        (
+            "steps:\n  - lines: {through: [{x: 1, y: 2, z: 3}, {joints: [1, 2, 3, 4, 5]}]}",
+            2,
+            "`via`",
+        ),
         ("steps:\n  - arc:\n      axis: x\n      angle: 20", 3, "needs 'centre'"),
         ("steps:\n  - arc: {centre: [1, 2, 3], axis: [0, 0, 0], angle: 3}", 2, "not zero"),
         ("steps:\n  - move: nowhere", 2, "no pose 'nowhere'"),

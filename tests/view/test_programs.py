@@ -13,10 +13,13 @@ from app.api.answers import Progress as Told
 from app.api.requests import Order
 from app.control.session import Session
 from app.exchange.scripts import Scripts
+from app.kinematics.forward import forward
 from app.programs.bench import Rig
 from app.programs.program import Program, compiled
 from app.programs.script import parse
+from app.programs.timeline import Timeline
 from app.robot.model import RobotModel
+from app.view.preview import GHOSTS, _poses
 from app.view.programs import ProgramsPanel, _page
 from tests.browser.server import free_port
 
@@ -60,12 +63,13 @@ def test_it_previews_steers_and_teaches(
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
     panel.follow()
-    assert not panel._way.visible
+    way = panel._preview._way
+    assert not way.visible
     rig = Rig(session, model.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"
     performer.program = compiled(parse(text), rig, state)
     panel.follow()
-    points = np.asarray(panel._way.points).reshape(-1, 3)
+    points = np.asarray(way.points).reshape(-1, 3)
     assert np.abs(points[-1] - points[0] - (0.0, 0.0, 0.04)).max() < 1e-6
     assert np.abs(points[:, :2] - points[0, :2]).max() < 1e-6
 
@@ -85,3 +89,56 @@ def test_it_previews_steers_and_teaches(
         panel._on_teach()
     assert len(parse((tmp_path / "My script.yaml").read_text(encoding="utf-8")).steps) == 2
     assert panel._choice.value == "My script"
+
+
+def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
+    server: viser.ViserServer, model: RobotModel, session: Session, tmp_path: Path
+) -> None:
+    performer = Performer()
+    state = session.begin(session.ready, 0.0, 0.0)
+    panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
+    rig = Rig(session, model.T_base_shoulder)
+    text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
+    program = compiled(parse(text), rig, state)
+    preview = panel._preview
+
+    def ghosts() -> bool:
+        return preview._sweep is not None and preview._sweep._root.visible
+
+    def looked_at() -> bool:
+        return preview._ghost is not None and preview._ghost.root.visible
+
+    performer.program = program
+    panel.follow()
+    # Nobody asked to see it.
+    assert not ghosts()
+    panel._orders.value = "Preview"  # type: ignore[misc]  # viser declares it read-only
+    panel._order()
+    performer.program = compiled(parse(text), rig, state)
+    performer.told = Told(name="x", by="me", status="ready")
+    panel.follow()
+    assert ghosts()
+    assert preview._sweep is not None
+    timeline = Timeline.of(program)
+    for name, node in preview._sweep._nodes:
+        for number, (q, fingers) in enumerate(timeline.postures(GHOSTS)):
+            linkage = _poses(model, q, fingers)[name]
+            assert node.batched_positions[number] == pytest.approx(linkage[:3, 3], abs=1e-6)
+    q, fingers = timeline.at(timeline.span)
+    tool = model.T_base_shoulder @ forward(model.arm.chain_to("tcp"), q)
+    assert _poses(model, q, fingers)["tcp"] == pytest.approx(tool, abs=1e-9)
+
+    assert timeline.span <= panel._look.max < timeline.span + 0.11
+    panel._look.value = 1.0  # type: ignore[misc]  # likewise
+    preview.look(1.0)
+    assert looked_at()
+    preview.look(0.0)
+    assert not looked_at()
+    preview.look(1.0)
+    performer.told = Told(name="x", by="me", status="running")
+    panel.follow()
+    assert not ghosts()
+    assert not looked_at()
+    assert panel._look.disabled
+    preview.look(1.0)
+    assert not looked_at()

@@ -1,0 +1,32 @@
+"""``katana450 export html``: a run as a page that plays by itself, without a server."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from app.cli.performance import chosen
+from app.cli.progress import progress
+from app.errors import InputError
+from app.exchange.atomic import check_writable, write_files
+from app.view.recording import recorded
+
+FPS = 25.0
+"""States a second that the page holds; what is in between it leaves out."""
+
+
+def write_page(options: argparse.Namespace) -> int:
+    """Write the one file; tell its name and size."""
+    path: Path = options.out
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path} must end in .html.")
+    check_writable(path)
+    shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
+    count = int(shown.duration * FPS) + 1
+    states = [shown.at(number / FPS) for number in range(count)]
+    page = recorded(
+        shown.model, shown.session, progress(states, count, path.name), 1.0 / FPS, path.stem
+    ).encode()
+    write_files({path: lambda file: file.write(page)})
+    print(f"{path}: {len(page)} bytes")
+    return 0

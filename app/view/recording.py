@@ -1,0 +1,47 @@
+"""A run as a page of its own: viser's client and all it has to show, in one file."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import secrets
+from collections.abc import Iterable
+
+from app.control.commands import Command
+from app.control.session import Session
+from app.control.state import State
+from app.exchange.meshes import Meshes
+from app.robot.model import RobotModel
+from app.robot.props import load_props
+from app.view.scenery import Scenery
+from app.view.server import open_server
+from app.view.traces import Traces
+
+TITLE = "<title>Viser</title>"
+"""Of viser's page."""
+
+
+def recorded(
+    model: RobotModel, session: Session, states: Iterable[State], interval: float, title: str
+) -> str:
+    """HTML that shows ``states``, ``interval`` [s] apart, with a slider of the time."""
+    # Nobody is let in: the server is there for what it would send.
+    server = open_server(secrets.token_hex())
+    try:
+        scenery = Scenery(server, model, session, load_props(), _ignore, Meshes())
+        traces = Traces(server, model)
+        recording = server.get_scene_serializer()
+        for number, state in enumerate(states):
+            if number:
+                recording.insert_sleep(interval)
+            scenery.show(state)
+            traces.follow(state)
+        return recording.as_html().replace(TITLE, f"<title>{html.escape(title)}</title>", 1)
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+def _ignore(command: Command) -> None:
+    """Nobody drives a recording."""

@@ -1,0 +1,46 @@
+// The frame of an instrument: its name, and while cards are arranged, handles to do so.
+import { html, set } from "./shape.js";
+
+const KEYS = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 };
+const SIZES = { small: "Small", wide: "Wide", large: "Large", broad: "Full width" };
+
+export class Card {
+  // on: {lift(card, event), nudge(id, by), grow(id), hide(id)}, what a person may do with it.
+  constructor(instrument, on) {
+    const { id, title, sizes } = instrument;
+    this.instrument = instrument;
+    this.seen = true;
+    this.grip = tool(`Move ${title}`, "⠿", "Drag, or arrow keys");
+    this.#size = tool(`Size of ${title}`, "", "Another size");
+    this.#size.hidden = sizes.length < 2;
+    const hide = tool(`Hide ${title}`, "×", "Hide");
+    const action = instrument.plot ? [instrument.plot.action] : [];
+    const header = html("header", {}, this.grip, html("h2", {}, title), ...action, this.#size, hide);
+    this.element = html("article", { class: "card", "data-id": id, "aria-label": title }, header, instrument.element);
+    this.grip.addEventListener("keydown", (event) => {
+      if (!(event.key in KEYS)) return;
+      event.preventDefault();
+      on.nudge(id, KEYS[event.key]);
+    });
+    header.addEventListener("pointerdown", (event) => {
+      if (!event.button && !event.target.closest("button:not(.grip)")) on.lift(this, event);
+    });
+    this.grip.classList.add("grip");
+    this.#size.addEventListener("click", () => on.grow(id));
+    hide.addEventListener("click", () => on.hide(id));
+  }
+
+  #size;
+
+  place({ size, shown }) {
+    this.element.hidden = !shown;
+    set(this.element, "data-size", size);
+    set(this.#size, "aria-description", SIZES[size]);
+    this.#size.textContent = { small: "S", wide: "W", large: "L", broad: "F" }[size];
+    this.instrument.plot?.refresh();
+  }
+}
+
+function tool(name, sign, title) {
+  return html("button", { type: "button", class: "tool", "aria-label": name, title }, sign);
+}

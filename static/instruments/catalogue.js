@@ -1,0 +1,144 @@
+// Every instrument there is for an arm: what it is called, how it is made, what it shows of a state.
+import { Command } from "./command.js";
+import { Bars, Gauge } from "./gauge.js";
+import { Knob } from "./knob.js";
+import { Plot } from "./plot.js";
+import { signed } from "./shape.js";
+
+const DEGREES = 180 / Math.PI;
+const MM = 1000;
+const MS = 1000;
+const AXES = ["base turn", "shoulder", "elbow", "wrist bend", "wrist roll"];
+const ONE = ["small", "large"];
+const ROW = ["wide", "large", "broad"];
+const BIG = ["broad", "large", "wide"];
+
+// [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}]
+export function instruments(arm, gripper, { say, history, groups, view }) {
+  return [...knobs(arm, gripper, say), ...gauges(arm), ...plots(gripper, history, groups, view)];
+}
+
+function knobs(arm, gripper, say) {
+  const made = (id, title, options, request, of) => {
+    const knob = new Knob({ title, ...options, command: new Command(id, request, say) });
+    const draw = (state) => knob.take(state, ...of(state));
+    return { id, title, sizes: ONE, shown: true, element: knob.element, draw, knob };
+  };
+  const angle = (value) => `${signed(value, 1)}°`;
+  const percent = (value) => `${signed(value, 0)} %`;
+  const joints = arm.joints.map((_, i) =>
+    made(
+      `axis-${i + 1}`,
+      `${i + 1} ${AXES[i] ?? ""}`.trim(),
+      { low: arm.lower[i] * DEGREES, high: arm.upper[i] * DEGREES, step: 1, full: 1, text: angle },
+      (value) => ({ do: "joint", axis: i + 1, value: value / DEGREES }),
+      ({ goal, q }) => [goal[i] * DEGREES, q[i] * DEGREES],
+    ),
+  );
+  const fingers = gripper && made(
+    "gripper",
+    "Gripper",
+    { low: 0, high: 100, step: 2, text: percent },
+    (value) => ({ do: "gripper", angle: gripper.angle(value) }),
+    (state) => [gripper.percent(state.gripper_goal), gripper.percent(state.gripper)],
+  );
+  const speed = made(
+    "speed",
+    "Speed",
+    { low: 5, high: 100, step: 5, text: percent },
+    (value) => ({ do: "speed", value: value / 100 }),
+    (state) => [state.speed * 100, state.speed * 100],
+  );
+  return [...joints, ...(fingers ? [fingers] : []), speed];
+}
+
+function gauges(arm) {
+  const gauge = (id, title, options, of) => {
+    const made = new Gauge({ title, ...options });
+    const draw = (state, loop) => made.show(...of(state, loop));
+    return { id, title, sizes: ONE, shown: true, element: made.element, draw };
+  };
+  const one = (value) => signed(value, 1);
+  const rows = arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, limit: arm.speed[i] * DEGREES }));
+  const bars = new Bars({ title: "Joint speeds", rows, text: one, unit: "°/s" });
+  return [
+    gauge(
+      "clearance",
+      "Clearance",
+      {
+        low: 0, high: 100, unit: "mm", text: one,
+        zones: [{ below: 6, tone: "bad" }, { below: 20, tone: "warn" }],
+      },
+      ({ margins: { clearance, parts } }) =>
+        parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not looked at"],
+    ),
+    {
+      id: "rates", title: "Joint speeds", sizes: ROW, shown: true, element: bars.element,
+      draw: ({ qd }) => bars.show(qd.map((rate) => rate * DEGREES)),
+    },
+    gauge(
+      "tool-speed",
+      "Tool speed",
+      { low: 0, high: 500, unit: "mm/s", text: (value) => signed(value, 0), zones: [{ above: 450, tone: "warn" }] },
+      ({ tool_speed: speed }) => [speed * MM],
+    ),
+    gauge(
+      "limit",
+      "To a limit",
+      {
+        low: 0, high: 90, unit: "°", text: one,
+        zones: [{ below: 2, tone: "bad" }, { below: 8, tone: "warn" }],
+      },
+      ({ margins: { limit, axis } }) => [limit * DEGREES, `axis ${axis}`],
+    ),
+    gauge(
+      "singular",
+      "Singular value",
+      {
+        low: 0, high: 0.5, unit: "smallest", text: (value) => signed(value, 3),
+        zones: [{ below: 0.02, tone: "bad" }, { below: 0.05, tone: "warn" }],
+      },
+      ({ margins }) => [margins.smallest_singular_value],
+    ),
+    gauge(
+      "pitch",
+      "Tool pitch",
+      { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one },
+      ({ pitch }) => [pitch * DEGREES],
+    ),
+    gauge(
+      "touch",
+      "Touch",
+      { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },
+      ({ touching, held }) => [touching.length, held === null ? "empty hand" : `holds ${spoken(held)}`],
+    ),
+    gauge(
+      "late",
+      "Loop lateness",
+      {
+        low: 0, high: 5, unit: "ms, 99 %", text: (value) => signed(value, 2),
+        zones: [{ above: 4, tone: "bad" }, { above: 2, tone: "warn" }],
+      },
+      (_, loop) => (loop ? [loop.late_p99 * MS, `${loop.lost} lost`] : [null]),
+    ),
+  ];
+}
+
+function plots(gripper, history, groups, view) {
+  const plot = (id, title, group, least, decimals, shown) => {
+    const made = new Plot({ id, title, history, channels: groups[group], view, least, decimals });
+    return { id, title, sizes: BIG, shown, element: made.element, draw: () => made.draw(), plot: made };
+  };
+  return [
+    plot("joint-angles", "Joint angles [°]", "angles", 2, 1, true),
+    plot("joint-speeds", "Joint speeds [°/s]", "speeds", 2, 1, true),
+    plot("tool-point", "Tool point in {S} [mm]", "tool", 2, 1, true),
+    plot("joint-loads", "Weight on the joints [N m]", "loads", 1, 2, true),
+    plot("tracking", "Tracking error [°]", "errors", 0.01, 3, true),
+    ...(gripper ? [plot("gripper-opening", "Gripper [%]", "gripper", 2, 1, false)] : []),
+    plot("clearances", "Clearance [mm]", "clearance", 2, 1, false),
+    plot("tool-speeds", "Tool speed [mm/s]", "speed", 2, 1, false),
+  ];
+}
+
+const spoken = (part) => part.replace(/_link$/, "").replaceAll("_", " ");

@@ -1,0 +1,102 @@
+// Gauges: a number on an arc with its zones, and a row of bars for several of one kind.
+import { arc, clamp, html, set, svg, write } from "./shape.js";
+
+const RING = 44;
+const [FROM, TO] = [-120, 120]; // degrees of the dial
+const HIGH = 0.9; // share of a limit from which a bar warns
+
+export class Gauge {
+  #options;
+  #parts;
+
+  // text: of the value. zones: [{below | above, tone}], the first that fits counts. origin: where
+  // the arc begins, low unless told.
+  constructor(options) {
+    this.#options = options;
+    const { title, low, high, zones = [], unit } = options;
+    this.#parts = {
+      way: svg("path", { class: "way" }),
+      value: html("output", { class: "value" }, "–"),
+      note: html("span", { class: "note" }, " "),
+    };
+    const marks = zones.map(({ below, above, tone }) => {
+      const ends = below === undefined ? [above, high] : [low, below];
+      return svg("path", { class: `zone ${tone}`, d: arc(53, ...ends.map((each) => this.#turn(each))) });
+    });
+    this.element = html(
+      "div",
+      { class: "gauge", role: "meter", "aria-label": title, "aria-valuemin": low, "aria-valuemax": high },
+      html(
+        "div",
+        { class: "dial" },
+        svg(
+          "svg",
+          { viewBox: "-58 -58 116 92", "aria-hidden": "true" },
+          svg("path", { class: "range", d: arc(RING, FROM, TO) }),
+          this.#parts.way,
+          ...marks.reverse(),
+        ),
+        this.#parts.value,
+        html("span", { class: "unit" }, unit),
+      ),
+      this.#parts.note,
+    );
+  }
+
+  // value: null when there is none.
+  show(value, note = " ") {
+    const { text, low, origin = low, zones = [] } = this.#options;
+    const { way, value: shown, note: said } = this.#parts;
+    const words = value === null ? "–" : text(value);
+    write(shown, words);
+    write(said, note);
+    const fits = ({ below = -Infinity, above = Infinity }) => value !== null && (value < below || value > above);
+    set(this.element, "data-tone", zones.find(fits)?.tone ?? "ok");
+    const ends = [origin, value ?? origin].map((each) => this.#turn(each));
+    set(way, "d", Math.abs(ends[1] - ends[0]) < 0.5 ? "" : arc(RING, ...ends));
+    set(this.element, "aria-valuenow", value === null ? low : value.toFixed(3));
+    set(this.element, "aria-valuetext", value === null ? "none" : `${words} ${this.#options.unit} ${note}`.trim());
+  }
+
+  #turn(value) {
+    const { low, high } = this.#options;
+    return FROM + ((TO - FROM) * clamp(value - low, 0, high - low)) / (high - low);
+  }
+}
+
+export class Bars {
+  #rows;
+  #text;
+
+  // rows: [{label, limit}]; each bar goes either way from the middle, to its limit.
+  constructor({ title, rows, text, unit }) {
+    this.#text = text;
+    this.#rows = rows.map(({ label, limit }) => {
+      const bar = html("i");
+      const value = html("output", {}, "–");
+      const row = html(
+        "div",
+        {
+          role: "meter", "aria-label": `${title}, ${label}`,
+          "aria-valuemin": (-limit).toFixed(1), "aria-valuemax": limit.toFixed(1),
+        },
+        html("span", {}, label.replace("Axis ", "")),
+        html("div", { class: "track" }, bar),
+        value,
+      );
+      return { row, bar, value, limit };
+    });
+    const limits = html("p", { class: "note" }, `${unit}, full scale is the limit`);
+    this.element = html("div", { class: "bars" }, ...this.#rows.map(({ row }) => row), limits);
+  }
+
+  show(values) {
+    this.#rows.forEach(({ row, bar, value, limit }, i) => {
+      const share = clamp(values[i] / limit, -1, 1);
+      bar.style.transform = `scaleX(${share.toFixed(4)})`;
+      set(row, "data-tone", Math.abs(share) > HIGH ? "warn" : "ok");
+      write(value, this.#text(values[i]));
+      set(row, "aria-valuenow", values[i].toFixed(1));
+    });
+  }
+}

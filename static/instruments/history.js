@@ -1,0 +1,75 @@
+// What was measured of late: a ring of samples, each a time and a number a channel.
+const CAPACITY = 18_000; // ten minutes at 30 Hz
+const AT_REST = 0.1; // s after which a state is no late one, but that of an arm that rests
+const ANEW = 1.0; // s that no clock goes back unless its server was started anew
+export const GAP = 0.5; // s without a sample that a line does not bridge
+
+export class History {
+  #times = new Float64Array(CAPACITY);
+  #columns;
+  #count = 0; // samples ever taken in; the last CAPACITY of them are there
+
+  // channels: [{label, unit, of(state)}]; a number that is missing is NaN.
+  constructor(channels) {
+    this.channels = channels;
+    this.#columns = channels.map(() => new Float64Array(CAPACITY));
+  }
+
+  take(state) {
+    const t = state.told - state.t > AT_REST ? state.told : state.t;
+    if (t < this.newest - ANEW) this.#count = 0;
+    if (t <= this.newest) return;
+    const slot = this.#count % CAPACITY;
+    this.#times[slot] = t;
+    this.channels.forEach((channel, i) => (this.#columns[i][slot] = channel.of(state) ?? NaN));
+    this.#count += 1;
+  }
+
+  get newest() {
+    return this.#count ? this.time(this.#count - 1) : -Infinity;
+  }
+
+  get first() {
+    return Math.max(0, this.#count - CAPACITY);
+  }
+
+  get end() {
+    return this.#count;
+  }
+
+  time(n) {
+    return this.#times[n % CAPACITY];
+  }
+
+  value(channel, n) {
+    return this.#columns[channel][n % CAPACITY];
+  }
+
+  // The first sample that is not before t.
+  at(t) {
+    let [low, high] = [this.first, this.end];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.time(middle) < t) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  // The sample nearest to t; -1 when there is none.
+  nearest(t) {
+    const n = this.at(t);
+    if (n > this.first && (n === this.end || t - this.time(n - 1) < this.time(n) - t)) return n - 1;
+    return n < this.end ? n : -1;
+  }
+
+  csv(channels, from, to) {
+    const name = (i) => `"${this.channels[i].label} [${this.channels[i].unit}]"`;
+    const lines = [['"t [s]"', ...channels.map(name)].join(",")];
+    for (let n = this.at(from); n < this.end && this.time(n) <= to; n += 1) {
+      const values = channels.map((i) => this.value(i, n));
+      lines.push([this.time(n), ...values.map((value) => (Number.isNaN(value) ? "" : value))].join(","));
+    }
+    return `${lines.join("\r\n")}\r\n`;
+  }
+}

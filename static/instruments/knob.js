@@ -1,0 +1,158 @@
+// A knob: an arc for what can be had, a pointer for the goal, a mark for where the arm is.
+import { arc, clamp, html, onDial, set, svg, write } from "./shape.js";
+
+const RING = 47;
+const MOST = 330; // degrees that a dial may go round
+const DEAF = 10; // px round the middle where a direction means nothing
+const FINE = 0.1; // share of a step with Shift
+const PAGE = 10; // steps
+const SHAKEN = 600; // ms
+
+export class Knob {
+  #range;
+  #text;
+  #step;
+  #command;
+  #turn; // of a value: degrees on the dial
+  #held = null; // {pointer, angle, value} while a hand is on it
+  #goal = null;
+  #now = null;
+  #parts = {};
+
+  // low, high, step: of the value. full: degrees on the dial that a unit of it takes, none for as
+  // many as fit. text: of a value. command: what it is sent by.
+  constructor({ title, low, high, step, full, text, command }) {
+    this.#range = [low, high];
+    this.#step = step;
+    this.#text = text;
+    this.#command = command;
+    const scale = Math.min(full ?? Infinity, (full ? MOST : 270) / (high - low));
+    const middle = full ? 0 : (low + high) / 2;
+    this.#turn = { of: (value) => (value - middle) * scale, back: (degrees) => degrees / scale };
+    const limits = [low, high].map((limit) => onDial(RING, this.#turn.of(limit)));
+    this.#parts = {
+      way: svg("path", { class: "way" }),
+      pointer: svg("line", { class: "pointer", y1: -29, y2: -35 }),
+      mark: svg("circle", { class: "mark", cy: -RING, r: 5 }),
+      goal: html("output", { class: "goal" }, "–"),
+      now: html("span", { class: "now" }),
+    };
+    this.dial = html(
+      "div",
+      {
+        class: "dial", role: "slider", tabindex: 0, "aria-label": title, "aria-valuemin": low,
+        "aria-valuemax": high, "aria-orientation": "horizontal",
+      },
+      svg(
+        "svg",
+        { viewBox: "-53 -53 106 106", "aria-hidden": "true" },
+        svg("path", { class: "range", d: arc(RING, this.#turn.of(low), this.#turn.of(high)) }),
+        ...limits.map(([x, y]) => svg("circle", { class: "limit", cx: x.toFixed(2), cy: y.toFixed(2), r: 4 })),
+        this.#parts.way,
+        svg("circle", { class: "cap", r: 40 }),
+        this.#parts.pointer,
+        this.#parts.mark,
+      ),
+      html("div", { class: "read" }, this.#parts.goal, this.#parts.now),
+    );
+    this.element = html("div", { class: "knob" }, this.dial);
+    this.#listen();
+  }
+
+  // Where the goal and the arm are in `state`.
+  take(state, goal, now) {
+    this.#now = now;
+    if (this.#held === null && this.#command.heededIn(state)) this.#goal = goal;
+    this.#draw();
+  }
+
+  answered(message) {
+    if (message.is !== "refused") return this.#command.done(message);
+    this.spring();
+    this.element.classList.add("refused");
+    setTimeout(() => this.element.classList.remove("refused"), SHAKEN);
+  }
+
+  // Back to what is: the hand is off, and nothing is asked any more.
+  spring() {
+    this.#held = null;
+    this.#command.forget();
+    this.dial.classList.remove("held");
+  }
+
+  #wish(value) {
+    const [low, high] = this.#range;
+    const wanted = clamp(value, low, high);
+    if (wanted === this.#goal) return;
+    this.#goal = wanted;
+    this.#command.send(wanted);
+    this.#draw();
+  }
+
+  #notch(count, fine) {
+    const by = this.#step * (fine ? FINE : 1);
+    if (this.#goal !== null) this.#wish(Math.round((this.#goal + count * by) / by) * by);
+  }
+
+  #listen() {
+    const { dial } = this;
+    const angle = ({ clientX, clientY }) => {
+      const { left, top, width, height } = dial.getBoundingClientRect();
+      const [x, y] = [clientX - left - width / 2, clientY - top - height / 2];
+      return Math.hypot(x, y) < DEAF ? null : (Math.atan2(x, -y) * 180) / Math.PI;
+    };
+    dial.addEventListener("pointerdown", (event) => {
+      if (event.button || this.#goal === null || this.#held) return;
+      dial.setPointerCapture(event.pointerId);
+      dial.classList.add("held");
+      this.#held = { pointer: event.pointerId, angle: angle(event) };
+    });
+    // It turns by as much as the hand goes round, so a mere touch moves nothing.
+    dial.addEventListener("pointermove", (event) => {
+      if (event.pointerId !== this.#held?.pointer) return;
+      const [before, now] = [this.#held.angle, angle(event)];
+      this.#held.angle = now ?? before;
+      if (before === null || now === null) return;
+      const by = ((now - before + 540) % 360) - 180;
+      this.#wish(this.#goal + this.#turn.back(by) * (event.shiftKey ? FINE : 1));
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
+      dial.addEventListener(end, () => {
+        this.#held = null;
+        dial.classList.remove("held");
+      });
+    // Only with the focus: who scrolls past must not move the arm.
+    dial.addEventListener(
+      "wheel",
+      (event) => {
+        if (document.activeElement !== dial || event.deltaY === 0) return;
+        event.preventDefault();
+        this.#notch(-Math.sign(event.deltaY), event.shiftKey);
+      },
+      { passive: false },
+    );
+    // Home and End would send the arm to a limit at a single key.
+    const keys = {
+      ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: PAGE, PageDown: -PAGE,
+    };
+    dial.addEventListener("keydown", (event) => {
+      if (!(event.key in keys) || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      this.#notch(keys[event.key], event.shiftKey);
+    });
+  }
+
+  #draw() {
+    const { way, pointer, mark, goal, now } = this.#parts;
+    if (this.#goal === null) return;
+    const [to, from] = [this.#goal, this.#now].map(this.#turn.of);
+    const [wished, is] = [this.#goal, this.#now].map(this.#text);
+    set(pointer, "transform", `rotate(${to.toFixed(2)})`);
+    set(mark, "transform", `rotate(${from.toFixed(2)})`);
+    set(way, "d", Math.abs(to - from) < 0.2 ? "" : arc(RING, from, to));
+    write(goal, wished);
+    write(now, wished === is ? "" : is);
+    set(this.dial, "aria-valuenow", this.#goal.toFixed(2));
+    set(this.dial, "aria-valuetext", wished === is ? wished : `${wished}, now ${is}`);
+  }
+}

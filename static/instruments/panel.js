@@ -1,0 +1,128 @@
+// The front panel: it asks for states while it is open, keeps them for a while and shows them.
+import { Board } from "./board.js";
+import { instruments } from "./catalogue.js";
+import { channelsOf } from "./channels.js";
+import { History } from "./history.js";
+import { html, set, write } from "./shape.js";
+
+const HZ = 30;
+const LOOK_EVERY = 1000; // ms; the control loop says no more often how late it is
+const SPANS = { 10: "10 s", 30: "30 s", 120: "2 min" };
+const OLD = 1.0; // s after which what is shown must not pass for the present
+const STYLE = "static/instruments/instruments.css";
+
+export class Panel {
+  #root;
+  #line;
+  #view = { span: 30, end: null };
+  #history = null;
+  #board = null;
+  #state = null;
+  #loop = null;
+  #fresh = false;
+  #heard = -Infinity;
+  #took = 0;
+  #timer = null;
+  #frame = null;
+  #age = html("span", { class: "age", title: "How old what you see is, at most" });
+  #body = html("div", { class: "body" }, html("p", { class: "note" }, "Waiting for the arm."));
+
+  // line: {say, watch, kept, quietly}, the page's own way to the server and what it can keep.
+  constructor(root, line) {
+    this.#root = root;
+    this.#line = line;
+    document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
+    root.append(this.#toolbar(), this.#body);
+  }
+
+  show(shown) {
+    this.#root.hidden = !shown;
+    this.#line.watch(shown ? HZ : 0);
+    clearInterval(this.#timer);
+    cancelAnimationFrame(this.#frame);
+    if (!shown) return this.#spring();
+    this.#ask();
+    this.#timer = setInterval(() => this.#ask(), LOOK_EVERY);
+    this.#draw();
+  }
+
+  // Whatever comes over the page's line.
+  hear({ heard, took, link }) {
+    if (link === "down") this.#spring();
+    if (heard?.is === "arm" && !this.#board) this.#build(heard);
+    else if (heard?.is === "loop") this.#loop = heard;
+    else if (heard?.is === "state") {
+      [this.#state, this.#took, this.#heard, this.#fresh] = [heard, took, performance.now(), true];
+      this.#history?.take(heard);
+    } else if (heard?.is === "done" || heard?.is === "refused")
+      this.#board?.instruments.find(({ id }) => id === heard.id)?.knob?.answered(heard);
+  }
+
+  #ask() {
+    const { say, quietly } = this.#line;
+    if (!this.#board) say({ do: "look", at: "arm", id: quietly });
+    say({ do: "look", at: "loop", id: quietly });
+  }
+
+  #build(arm) {
+    const [closed, open] = arm.gripper ?? [];
+    const gripper = arm.gripper && {
+      percent: (angle) => (100 * (angle - closed)) / (open - closed),
+      angle: (percent) => closed + (percent / 100) * (open - closed),
+    };
+    const { channels, groups } = channelsOf(arm, gripper);
+    this.#history = new History(channels);
+    const parts = { say: this.#line.say, history: this.#history, groups, view: this.#view };
+    this.#board = new Board(instruments(arm, gripper, parts), this.#line.kept);
+    this.#body.replaceChildren(this.#board.list, this.#board.grid);
+  }
+
+  #spring() {
+    for (const { knob } of this.#board?.instruments ?? []) knob?.spring();
+  }
+
+  #draw() {
+    this.#frame = requestAnimationFrame(() => this.#draw());
+    const age = (this.#took + performance.now() - this.#heard) / 1000;
+    write(this.#age, age === Infinity ? "" : age < OLD ? "Live" : `${age.toFixed(1)} s old`);
+    this.#root.classList.toggle("old", age >= OLD);
+    if (!this.#board || !this.#state) return;
+    for (const { plot, draw } of this.#board.visible)
+      if (plot || this.#fresh) draw(this.#state, this.#loop);
+    this.#fresh = false;
+  }
+
+  #toolbar() {
+    const spans = Object.entries(SPANS).map(([span, label]) => {
+      const choice = html("input", { type: "radio", name: "span", value: span });
+      choice.checked = Number(span) === this.#view.span;
+      choice.addEventListener("change", () => this.#look({ span: Number(span) }));
+      return html("label", {}, choice, html("span", {}, label));
+    });
+    const pause = toggle("Pause", "Hold the plots still; what comes meanwhile is kept", (on) =>
+      this.#look({ end: on ? (this.#history?.newest ?? null) : null }),
+    );
+    const arrange = toggle("Arrange", "Move, resize, show and hide instruments", (on) => this.#board?.arrange(on));
+    return html(
+      "div",
+      { class: "toolbar", role: "group", "aria-label": "Of all plots and cards" },
+      html("fieldset", { class: "choice", "aria-label": "Time that plots show" }, ...spans),
+      pause, this.#age, arrange,
+    );
+  }
+
+  #look(news) {
+    Object.assign(this.#view, news);
+    for (const { plot } of this.#board?.instruments ?? []) plot?.refresh();
+  }
+}
+
+function toggle(label, title, change) {
+  const button = html("button", { type: "button", title, "aria-pressed": "false" }, label);
+  button.addEventListener("click", () => {
+    const on = button.getAttribute("aria-pressed") !== "true";
+    set(button, "aria-pressed", on);
+    change(on);
+  });
+  return button;
+}

@@ -1,0 +1,194 @@
+"""The two demos as a person runs them: chosen in the panel, looked at, run, stopped, taken over."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.api import answers
+from app.client import Client, connect
+from app.geometry.arrays import FloatArray
+from app.robot.model import RobotModel
+from tests.browser.conftest import OpenPage, Windows
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+
+MOVE = "/target/move"
+CIRCLE, POUR = "Circle with gripper", "Pour"
+WATER = 200.0
+"""[ml] In the cup at first."""
+
+LINE = """(name) => {
+    let starts = null;
+    window.__viserMutable.nodeRefFromName[name].traverse((each) => {
+        starts = each.geometry?.attributes?.instanceStart ?? starts;
+    });
+    return Array.from({length: starts?.count ?? 0}, (_, i) =>
+        [starts.getX(i), starts.getY(i), starts.getZ(i)]);
+}"""
+
+
+class Stage:
+    """A page with the panel of programs open, and what the server itself says."""
+
+    def __init__(self, page: ViserPage, arm: Client) -> None:
+        self.page = page
+        self.arm = arm
+        page.frame.get_by_text("Programs", exact=True).click()
+
+    def run(self, script: str) -> None:
+        self.page.choose("Script", script)
+        self.page.click_button("Run")
+
+    def wait(self, until: Callable[[answers.State], bool], seconds: float = 60.0) -> answers.State:
+        due = time.monotonic() + seconds
+        while not until(state := self.arm.look(answers.State)):
+            assert time.monotonic() < due, (state.program, state.water, state.stopped)
+            time.sleep(0.01)
+        return state
+
+    def wait_for(self, status: str) -> answers.State:
+        """Until the program is so."""
+        return self.wait(lambda state: program(state).status == status)
+
+    def shown(self, node: str) -> bool:
+        """Whether the server has the page show it."""
+        said = self.page.messages("SetSceneNodeVisibilityMessage", node=node, last=1)
+        return bool(said) and bool(said[0].body["visible"])
+
+    def line(self, node: str) -> FloatArray:
+        """(N, 3) [m] where the pieces of a line begin, as they are drawn."""
+        self.page.wait_drawn()
+        return np.array(self.page.frame.evaluate(LINE, node)).reshape(-1, 3)
+
+
+def program(state: answers.State) -> answers.Progress:
+    return state.program or answers.Progress(name="", by="", status="")
+
+
+def at_rest(stage: Stage) -> FloatArray:
+    """The joints of an arm that stands, looked at for a while."""
+    before = stage.wait(lambda state: not state.moving and max(map(abs, state.qd)) == 0.0)
+    time.sleep(0.3)
+    after = stage.arm.look(answers.State)
+    assert after.q == before.q
+    return np.array(after.q)
+
+
+@pytest.fixture(scope="module")
+def stage(windows: Windows) -> Iterator[Stage]:
+    with (
+        AppServer() as server,
+        windows.open(server.url, nodes=("/arm", MOVE)) as page,
+        connect(server.url, "Test") as arm,
+    ):
+        yield Stage(page, arm)
+        assert page.errors == []
+
+
+def test_a_circle_is_looked_at_run_and_traced(
+    stage: Stage, model: RobotModel, artefacts: Path
+) -> None:
+    page = stage.page
+    page.choose("Script", CIRCLE)
+    page.click_button("Preview")
+    stage.wait_for("ready")
+    page.wait_until(lambda: stage.shown("/path/sweep"), "the ghosts")
+    q = stage.arm.look(answers.State).q
+    page.drag_slider("Look at", 2.0)
+    page.wait_until(lambda: stage.shown("/path/ghost"), "the one to be looked at")
+    page.screenshot(artefacts / "demo-preview.png")
+    assert stage.arm.look(answers.State).q == q
+
+    stage.run(CIRCLE)
+    stage.wait_for("running")
+    page.wait_until(lambda: stage.shown("/path/traced"), "the traced path", seconds=30.0)
+    assert not stage.shown("/path/sweep")
+    assert not stage.shown("/path/ghost")
+    assert program(stage.wait_for("done")).why == ""
+    page.wait_until(lambda: "done" in page.text_of(".k450.program"), "the panel to say so")
+    page.screenshot(artefacts / "demo-circle.png")
+    centre = model.T_base_shoulder @ (0.15, 0.0, -0.11, 1.0)
+    away = stage.line("/path/traced") - centre[:3]
+    assert np.abs(np.linalg.norm(away, axis=1) - 0.1).max() < 1e-5
+    assert np.abs(away[:, 0]).max() < 1e-5
+    # All round, however few pictures a busy machine draws.
+    quarters = np.floor(2.0 / np.pi * np.arctan2(away[:, 2], away[:, 1]))
+    assert len(np.unique(quarters)) == 4
+
+
+def test_the_arm_is_taken_from_a_program(stage: Stage) -> None:
+    stage.run(CIRCLE)
+    stage.wait(lambda state: program(state).task == "circle" and program(state).share > 0.1)
+    stage.page.press_in_bar("Take over")
+    state = stage.wait_for("stopped")
+    assert "taken" in program(state).why
+    at_rest(stage)
+    assert stage.arm.look(answers.State).holder != program(state).name
+
+
+def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -> None:
+    def water() -> answers.Water:
+        found = stage.arm.look(answers.State).water
+        assert found is not None
+        parts = found.cup_ml + found.basin_ml + found.air_ml + found.spilled_ml
+        assert parts == pytest.approx(WATER, abs=1e-9)
+        return found
+
+    page = stage.page
+    stage.run(POUR)
+    stage.wait_for("running")
+    stage.wait(
+        lambda state: (
+            program(state).task == "pour"
+            and state.water is not None
+            and state.water.basin_ml > 20.0
+        )
+    )
+    flowing = water()
+    page.press_in_bar("STOP")
+    state = stage.wait_for("stopped")
+    assert "STOP" in program(state).why
+    assert state.stopped is not None
+    stopped = at_rest(stage)
+    # What the tilt cannot hold still runs out, and lands.
+    stage.wait(lambda state: state.water is not None and state.water.air_ml == 0.0)
+    time.sleep(0.3)
+    after = water()
+    assert 20.0 < flowing.basin_ml <= after.basin_ml
+    assert 0.0 < after.cup_ml < flowing.cup_ml + 1e-9
+    assert after.spilled_ml == 0.0
+    page.screenshot(artefacts / "demo-stopped.png")
+
+    page.press_in_bar("Reset")
+    stage.wait(lambda state: state.stopped is None)
+    assert np.array_equal(at_rest(stage), stopped)
+    assert water().cup_ml == pytest.approx(after.cup_ml, abs=0.5)
+    assert program(stage.arm.look(answers.State)).status == "stopped"
+
+
+@pytest.mark.skipif("KATANA450_LONG" not in os.environ, reason="it takes half a minute")
+def test_the_whole_pour(open_page: OpenPage, artefacts: Path) -> None:
+    with AppServer() as server, connect(server.url, "Test") as arm:
+        stage = Stage(open_page(server.url, nodes=("/arm", MOVE)), arm)
+        stage.run(POUR)
+        stage.wait_for("running")
+        least = np.inf
+        while program(state := arm.look(answers.State)).status == "running":
+            if state.water is not None and state.water.basin_ml + state.water.air_ml == 0.0:
+                least = min(least, state.water.margin_to_rim)
+            time.sleep(0.02)
+        assert (program(state).status, program(state).why) == ("done", "")
+        assert state.water is not None
+        assert state.water.basin_ml >= 0.99 * WATER
+        assert state.water.spilled_ml == 0.0
+        # Until it is poured on purpose the surface comes to the lip from below.
+        assert least >= 0.0
+        assert state.holder is None
+        stage.page.screenshot(artefacts / "demo-poured.png")
+        assert stage.page.errors == []

@@ -1,0 +1,72 @@
+"""A run as a page from a file, without any network: its slider moves the arm."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page
+
+from app.cli.main import main
+from tests.browser.page import SCRIPTS
+
+PAN = "/arm/base_link/arm_base_link/pan_link"
+
+SECONDS, TURN = 4.0, 1.2
+"""Of the motion, and [rad] by which axis 1 turns in it."""
+
+TRACK = ".mantine-Slider-trackContainer"
+
+NOW = "() => Number(document.querySelector('[role=slider]').getAttribute('aria-valuenow'))"
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    table = tmp_path / "m.csv"
+    table.write_text(
+        f"t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n{SECONDS},{TURN},-1.19,1.48,0.14\n"
+    )
+    path = tmp_path / "turn.html"
+    assert main(["export", "html", "--out", str(path), "--trajectory", str(table)]) == 0
+    return path
+
+
+def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording: Path) -> None:
+    context = browser.new_context(viewport={"width": 640, "height": 420}, offline=True)
+    scripts = "\n".join(script.read_text(encoding="utf-8") for script in SCRIPTS)
+    options = json.dumps({"draws": False, "fullQuality": False})
+    context.add_init_script(f"window.harness = {options};\n{scripts}")
+    page = context.new_page()
+    asked: list[str] = []
+    errors: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    try:
+        page.goto(f"{recording.as_uri()}?fixedDpr=0.5")
+        page.locator("[role=slider]").wait_for(state="attached", timeout=60_000)
+        page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
+        page.locator("button").first.click()
+        for share in (0.2, 0.9, 0.5):
+            box = page.locator(TRACK).bounding_box()
+            assert box is not None
+            page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+            # It may still take a step; then it rests.
+            page.wait_for_timeout(500)
+            t = float(page.evaluate(NOW))
+            assert t == pytest.approx(share * SECONDS, abs=0.15)
+            assert pan(page) == pytest.approx(TURN * t / SECONDS, abs=0.02)
+        assert not errors
+        assert all(url.startswith(("file:", "blob:", "data:")) for url in asked)
+    finally:
+        context.close()
+
+
+def pan(page: Page) -> float:
+    """[rad] by which axis 1 is turned on the page."""
+    found = page.evaluate("name => harness.poses(name)", PAN)
+    node, root = (np.reshape(found[key], (4, 4)).T for key in ("node", "root"))
+    R = (np.linalg.inv(root) @ node)[:3, :3]
+    return math.atan2(R[1, 0], R[0, 0])

@@ -1,0 +1,91 @@
+"""Films and pages of runs as a person makes them, and Ctrl-C in the middle of one."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from imageio_ffmpeg import get_ffmpeg_exe
+from PIL import Image
+
+from app.cli.main import main
+
+ROOT = Path(__file__).resolve().parents[2]
+
+TABLE = "t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n0.5,1,-1.19,1.48,0.14\n"
+
+PAGE_AT_MOST = 6e6
+"""[bytes]"""
+
+
+def command(*words: str) -> list[str]:
+    return [sys.executable, "-m", "app", *words]
+
+
+def test_a_film_of_a_motion(tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_text(TABLE)
+    path = tmp_path / "m.mp4"
+    words = ("--trajectory", str(tmp_path / "m.csv"), "--size", "160x100", "--fps", "10")
+    subprocess.run(command("render", "--out", str(path), *words), cwd=ROOT, check=True, timeout=120)
+    told = subprocess.run(
+        [get_ffmpeg_exe(), "-i", str(path)], capture_output=True, text=True, check=False
+    ).stderr
+    assert "160x100" in told
+    assert "10 fps" in told
+    # From 0 to 0.5 s, both ends shown.
+    assert re.search(r"Duration: 00:00:00.60", told)
+
+
+def test_ctrl_c_leaves_no_half_of_a_film(tmp_path: Path) -> None:
+    (tmp_path / "m.csv").write_text(TABLE.replace("0.5,1", "60,1"))
+    path = tmp_path / "film" / "m.mp4"
+    path.parent.mkdir()
+    words = ("--trajectory", str(tmp_path / "m.csv"), "--size", "160x100")
+    with subprocess.Popen(
+        command("render", "--out", str(path), *words),
+        cwd=ROOT,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        # Not before a picture is in it.
+        deadline = time.monotonic() + 90.0
+        while not list(path.parent.iterdir()):
+            assert time.monotonic() < deadline
+            assert process.poll() is None
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in told
+    assert list(path.parent.iterdir()) == []
+
+
+def test_the_pages_of_both_demos_are_small_and_ask_nobody(tmp_path: Path) -> None:
+    for run in ("circle", "pour"):
+        path = tmp_path / f"{run}.html"
+        assert main(["export", "html", "--out", str(path), "--run", run]) == 0
+        assert path.stat().st_size < PAGE_AT_MOST
+        text = path.read_text(encoding="utf-8")
+        assert f"<title>{run}</title>" in text
+        assert "__VISER_EMBED_DATA__" in text
+
+
+def test_a_moment_of_a_motion(tmp_path: Path) -> None:
+    table = tmp_path / "m.csv"
+    table.write_text("t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n1,1.5,-1.19,1.48,0.14\n")
+    pictures = []
+    words = ["--trajectory", str(table), "--theme", "dark", "--size", "160x100"]
+    for name, more in (("start", ["--at", "0"]), ("end", []), ("late", ["--at", "99"])):
+        path = tmp_path / f"{name}.png"
+        assert main(["render", "--out", str(path), *words, *more]) == 0
+        with Image.open(path) as picture:
+            pictures.append(np.asarray(picture).astype(int))
+    start, end, late = pictures
+    assert (end == late).all()
+    assert (np.abs(end - start).sum(axis=2) > 60).sum() > 200

@@ -1,0 +1,55 @@
+"""``katana450 render``: a picture as a person asks for it, and what is said where none can be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from app.cli.main import main
+
+SMALL = ("--size", "160x100")
+
+
+def test_a_picture_as_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "one.png"
+    words = ["--pose=0.4,-1.187,1.484,0.14,0.5,0.2", "--camera", "tool", *SMALL]
+    assert main(["render", "--out", str(path), *words]) == 0
+    assert f"{path}: {path.stat().st_size} bytes\n" in capsys.readouterr().out
+    with Image.open(path) as picture:
+        assert picture.size == (160, 100)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("a.gif",), "must end in .png for a picture or in .mp4"),
+        (("a.mp4",), "A film wants a motion"),
+        (("a.mp4", "--run", "pour", "--size", "101x80"), "even number"),
+        (("a.mp4", "--run", "pour", "--fps", "0"), "pictures a second"),
+        (("a.mp4", "--run", "nowhere.yaml"), "nowhere.yaml cannot be read"),
+        (("a.png", "--at", "1"), "--at chooses a moment of a motion"),
+        (("a.png", "--run", "circle", "--at", "nan"), "0 or more seconds"),
+        (("a.png", "--pose", "9,0"), "axis_1 cannot be at 9 rad"),
+        (("a.png", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
+        (("nowhere/a.png",), "There is no directory"),
+        (("a.png", "--urdf", "nowhere.urdf"), "no robot description"),
+    ],
+)
+def test_what_cannot_be_done_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+) -> None:
+    out, *more = words
+    assert main(["render", "--out", str(tmp_path / out), *more]) == 1
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("--size", "9x9"), ("--size", "big"), ("--camera", "moon"), ("--run", "pour", "--pose", "0")],
+)
+def test_words_that_mean_nothing_are_not_understood(tmp_path: Path, words: tuple[str, ...]) -> None:
+    with pytest.raises(SystemExit):
+        main(["render", "--out", str(tmp_path / "a.png"), *words])

@@ -1,0 +1,61 @@
+"""How near the arm is to what it cannot pass, counted out one by one."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from app.control.margins import margins
+from app.control.session import Session
+from app.kinematics.forward import jacobian_body
+from app.kinematics.velocity import characteristic_length
+from app.robot.collision import hand_of, table, things_of, world_of
+from app.robot.model import RobotModel
+from app.robot.props import load_props
+
+
+@pytest.fixture(scope="module")
+def session(model: RobotModel) -> Session:
+    world, _ = world_of(model)
+    assert world is not None
+    things = things_of(load_props())
+    ready = model.ready((0.0, -1.2, 1.5, 0.1, 0.0))
+    world_and_table = world.with_obstacles((table(),))
+    return Session(model.arm, ready, world_and_table, hand=hand_of(model, world), things=things)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_each_margin_is_the_least_there_is(session: Session, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    chain = session.arm.chain
+    q = rng.uniform(chain.lower, chain.upper)
+    x = np.append(q, rng.uniform(session.arm.gripper.lower, session.arm.gripper.upper))
+    world = session.world_at(session.begin(session.ready, 0.0, 0.0))
+    assert world is not None
+    found = margins(chain, world, x)
+
+    rooms = [min(a - low, up - a) for a, low, up in zip(q, chain.lower, chain.upper, strict=True)]
+    assert found.limit == min(rooms) == rooms[found.axis]
+
+    # Its square is the least eigenvalue of J^T J, lengths counted in the arm's own.
+    J = jacobian_body(chain, q)
+    scaled = np.vstack((J[:3], J[3:] / characteristic_length(chain)))
+    least = float(np.linalg.eigvalsh(scaled.T @ scaled)[0])
+    assert found.smallest_singular_value**2 == pytest.approx(least, abs=1e-12)
+
+    assert found.nearest is not None
+    names = [part.name for part in world.parts]
+    gaps = {pair: world.gap(x, *pair) for pair in combinations(names, 2)}
+    assert found.nearest.distance == pytest.approx(min(gaps.values()), abs=1e-9)
+    assert gaps[found.nearest.parts] == pytest.approx(found.nearest.distance, abs=1e-9)
+
+
+def test_beyond_a_limit_the_margin_is_negative(session: Session) -> None:
+    chain = session.arm.chain
+    q = np.array(session.ready)
+    q[3] = chain.upper[3] + 0.01
+    found = margins(chain, None, np.append(q, 0.0))
+    assert (found.axis, found.nearest) == (3, None)
+    assert found.limit == pytest.approx(-0.01)

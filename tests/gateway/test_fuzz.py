@@ -1,0 +1,290 @@
+"""Thousands of broken messages at every socket: nothing falls or moves, and who drives goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import os
+import random
+from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack, suppress
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from app.api import answers, requests
+from app.client import connect as connect_program
+from tests.browser.server import APP, AppServer
+from tests.gateway.client import (
+    SUBPROTOCOL,
+    UPRIGHT,
+    Peer,
+    controlling,
+    enter,
+    page_name,
+    websocket,
+)
+
+MESSAGES = 10_000 if "KATANA450_LONG" in os.environ else 1_000
+"""At all sockets together."""
+
+PAUSE = 0.003
+"""[s] In which a line of JSON is read."""
+
+HERE = "127.0.0.1"
+
+NASTY: tuple[Any, ...] = (
+    None, True, -1, 2**63, -(2**31), 1e308, -0.0, "", "x" * 300, "\x00", "NaN", "../..", [], {},
+    [[]], [0.0] * 5, [1e9] * 4, {"value": 1}, [None] * 3, "Axis 1", "/target/move",
+)  # fmt: skip
+NOT_JSON: tuple[Any, ...] = (math.nan, math.inf, -math.inf, b"\xff\xfe", b"")
+
+JSON: list[dict[str, Any]] = [
+    {"do": "joint", "axis": 1, "value": 0.5},
+    {"do": "joints", "q": [0.1, -1.0, 1.2, 0.1, 0.0]},
+    {"do": "servo", "q": [0.1, -1.0, 1.2, 0.1, 0.0], "qd": [0.0] * 5},
+    {"do": "pose", "T": np.eye(4).tolist(), "frame": "base"},
+    {"do": "jog", "rates": [0.1, 0.0, 0.0, 0.0, 0.0], "frame": "tool"},
+    {"do": "place", "name": "cup", "T": np.eye(4).tolist()},
+    {"do": "program", "text": "- home\n"},
+    {"do": "reset"},
+    {"do": "release"},
+    {"do": "give", "to": 1},
+    {"do": "speed", "value": 0.5},
+    {"do": "look", "at": "arm"},
+    {"do": "watch", "hz": 10},
+]
+"""What the mutants come from. No STOP: that is everybody's."""
+
+VISER: list[dict[str, Any]] = [
+    {"type": "TransformControlsDragStartMessage", "name": "/target/move", "owner": ""},
+    {
+        "type": "TransformControlsUpdateMessage",
+        "name": "/target/move",
+        "owner": "",
+        "wxyz": UPRIGHT,
+        "position": [0.3, 0.0, 0.2],
+    },
+    {"type": "GuiUpdateMessage", "uuid": "UUID", "updates": {"value": 12.0}},
+    {"type": "Seen", "count": 3},
+    {"type": "RunJavascriptMessage", "source": "alert(1)"},
+]
+
+Send = Callable[[bytes], Awaitable[None]]
+
+
+def changed(message: Any, rng: random.Random, nasty: tuple[Any, ...]) -> Any:
+    """``message`` with one of its parts replaced, taken away, doubled or added."""
+    if isinstance(message, dict) and message and rng.random() < 0.8:
+        copy: dict[Any, Any] = {**message}
+        key = rng.choice(list(copy))
+        match rng.randrange(4):
+            case 0:
+                del copy[key]
+            case 1:
+                copy[f"{key}{rng.randrange(9)}"] = copy[key]
+            case _:
+                copy[key] = changed(copy[key], rng, nasty)
+        return copy
+    if isinstance(message, list) and message and rng.random() < 0.6:
+        copied = list(message)
+        at = rng.randrange(len(copied))
+        copied[at : at + 1] = [changed(copied[at], rng, nasty)] * rng.randrange(3)
+        return copied
+    return rng.choice(nasty)
+
+
+def broken(data: bytes, rng: random.Random) -> bytes:
+    """``data`` cut, with bits turned, or with something else in its middle."""
+    if not data:
+        return data
+    at = rng.randrange(len(data))
+    match rng.randrange(4):
+        case 0:
+            return data[:at]
+        case 1:
+            flipped = bytearray(data)
+            for _ in range(rng.randint(1, 6)):
+                flipped[rng.randrange(len(flipped))] ^= 1 << rng.randrange(8)
+            return bytes(flipped)
+        case 2:
+            return data[:at] + rng.randbytes(rng.randint(1, 40)) + data[at:]
+    return rng.randbytes(rng.randint(0, 200))
+
+
+def json_mutant(rng: random.Random) -> bytes:
+    """Never a whole STOP, nor two lines."""
+    message = rng.choice(JSON)
+    for _ in range(rng.randint(1, 3)):
+        message = changed(message, rng, NASTY)
+    data = json.dumps(message).encode()
+    data = broken(data, rng) if rng.random() < 0.5 else data
+    return data.replace(b"\n", b" ").replace(b"stop", b"pots")
+
+
+def viser_mutant(rng: random.Random, uuids: list[str]) -> bytes:
+    message: Any = dict(rng.choice(VISER))
+    if message["type"] == "GuiUpdateMessage":
+        message["uuid"] = rng.choice(uuids)
+    for _ in range(rng.randint(0, 3)):
+        message = changed(message, rng, NASTY + NOT_JSON)
+    with suppress(OverflowError):
+        data = msgspec.msgpack.encode(message)
+        return broken(data, rng) if rng.random() < 0.5 else data
+    return b""
+
+
+async def pour_in(count: int, mutant: Callable[[], bytes], line: Callable[[], Any]) -> int:
+    """Send so many mutants, on a new ``line`` whenever one is closed; how many lines it took."""
+    sent = lines = 0
+    while sent < count:
+        lines += 1
+        with suppress(ConnectionClosed, ConnectionError, InvalidStatus):
+            async with line() as send:
+                while sent < count:
+                    sent += 1
+                    await send(mutant())
+    return lines
+
+
+class WebLine:
+    """A websocket whose answers are thrown away, and the sockets it needs beside it."""
+
+    def __init__(self, url: str, path: str, **options: Any) -> None:
+        self._url, self._path, self._options = url, path, options
+        self._stack = AsyncExitStack()
+
+    async def __aenter__(self) -> Send:
+        page = page_name()
+        cookie = enter(self._url)
+        if "{page}" in self._path and "viser" in self._path:
+            await self._stack.enter_async_context(controlling(self._url, cookie, page))
+        socket = await self._stack.enter_async_context(
+            websocket(self._url, self._path.format(page=page), cookie, **self._options)
+        )
+
+        async def ignore() -> None:
+            with suppress(ConnectionClosed):
+                async for _ in socket:
+                    pass
+
+        ignoring = asyncio.create_task(ignore())
+        self._stack.callback(ignoring.cancel)
+
+        async def send(data: bytes) -> None:
+            if self._options.get("subprotocols"):
+                await socket.send(data)
+            else:
+                await socket.send(data.decode(errors="replace"))
+            # Once it is answered, what went before was read.
+            await (await socket.ping())
+
+        return send
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._stack.aclose()
+
+
+class TcpLine:
+    """The port for JSON lines, after a good hello."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+
+    async def __aenter__(self) -> Send:
+        self._reader, self._writer = await asyncio.open_connection(HERE, self._port)
+        self._writer.write(b'{"do":"hello","name":"Fuzz"}\n')
+        self._ignoring = asyncio.create_task(self._ignore())
+
+        async def send(data: bytes) -> None:
+            if self._ignoring.done():
+                raise ConnectionError
+            self._writer.write(data + b"\n")
+            await self._writer.drain()
+            await asyncio.sleep(PAUSE)
+
+        return send
+
+    async def _ignore(self) -> None:
+        with suppress(ConnectionError):
+            while await self._reader.read(65_536):
+                pass
+
+    async def __aexit__(self, *_: object) -> None:
+        self._ignoring.cancel()
+        self._writer.close()
+        with suppress(ConnectionError):
+            await self._writer.wait_closed()
+
+
+async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[str, int]:
+    """All of it at once."""
+    url, share = server.url, MESSAGES // 4
+    rngs = [random.Random(seed) for seed in range(4)]
+    kinds: dict[str, tuple[Callable[[], bytes], Callable[[], Any]]] = {
+        "viser": (
+            lambda: viser_mutant(rngs[0], uuids),
+            lambda: WebLine(url, "/viser?page={page}", subprotocols=[SUBPROTOCOL]),
+        ),
+        "control": (lambda: json_mutant(rngs[1]), lambda: WebLine(url, "/control?page={page}")),
+        "socket": (
+            lambda: json_mutant(rngs[2]),
+            lambda: WebLine(url, "/api/v1/socket?name=Fuzz"),
+        ),
+        "lines": (lambda: json_mutant(rngs[3]), lambda: TcpLine(lines_port)),
+    }
+    taken = await asyncio.gather(*(pour_in(share, *kind) for kind in kinds.values()))
+    return dict(zip(kinds, taken, strict=True))
+
+
+async def learned(url: str) -> list[str]:
+    """The numbers of the panel's controls, as every browser is told them."""
+    async with websocket(
+        url, f"/viser?page={page_name()}", enter(url), subprotocols=[SUBPROTOCOL]
+    ) as socket:
+        peer = Peer(socket)
+        await peer.learn()
+        return [control["uuid"] for control in peer.controls.values()]
+
+
+def kept(state: answers.State) -> tuple[Any, ...]:
+    """What nobody but who holds the arm may change."""
+    return (
+        state.q,
+        state.goal,
+        state.gripper,
+        state.tool,
+        state.speed,
+        state.holder,
+        state.stopped,
+        state.moving,
+    )
+
+
+@pytest.fixture
+def server() -> Any:
+    with AppServer((*APP, "--lines", str(0))) as server:
+        yield server
+
+
+def test_nothing_falls_and_nothing_moves(server: AppServer) -> None:
+    lines_port = int(server.output.rpartition(f"JSON lines on {HERE}:")[2].split(".")[0])
+    with connect_program(server.url, "Driver") as arm:
+        arm.ask(requests.Acquire())
+        before = arm.look(answers.State)
+        things = arm.look(answers.Things).things
+        uuids = asyncio.run(learned(server.url))
+        taken = asyncio.run(storm(server, lines_port, uuids))
+        print(f"{MESSAGES} messages; lines it took: {taken}")
+        assert kept(arm.look(answers.State)) == kept(before)
+        assert arm.look(answers.Things).things == things
+        # Whoever drives, drives on.
+        q = np.add(before.q, (0.2, 0.0, 0.0, 0.0, 0.0))
+        assert np.allclose(arm.joints(q).q, q, atol=1e-9)
+    assert server.running
+    assert "Traceback" not in server.output
+    assert "met an error" not in server.output

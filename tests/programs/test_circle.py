@@ -1,0 +1,34 @@
+"""The paper's first experiment, run to its end on the arm as the script is for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.kinematics.forward import forward
+from app.programs.circle import CircleDemo
+from app.programs.program import compiled
+from app.programs.runner import Phase
+from app.programs.script import parse
+from app.robot.model import RobotModel
+from tests.programs.conftest import Stage
+
+
+@pytest.mark.parametrize("tool", ["flange", "tcp"])
+def test_the_circle_keeps_every_limit_at_every_tick(
+    model: RobotModel, stage: Stage, tool: str
+) -> None:
+    staged = Stage(model, bare=True) if tool == "flange" else stage
+    demo = CircleDemo(tool=tool)
+    run, states = staged.play(
+        compiled(parse(demo.text), staged.rig, staged.begin()), staged.begin()
+    )
+    assert (run.phase, run.why) == (Phase.DONE, "")
+    assert staged.loads(states).max() <= 1.0 + 1e-6
+    chain = staged.rig.arm.chain_to(tool)
+    on = [s.q for s in states if s.following is not None and s.following.plan.length > 0.6]
+    points = np.array([forward(chain, q)[:3, 3] for q in on])
+    assert len(points) > 100
+    away = np.hypot(points[:, 1], points[:, 2] + 0.11)
+    assert np.abs(away - 0.1).max() < 1e-12
+    assert np.abs(points[:, 0] - 0.15).max() < 1e-12

@@ -1,0 +1,113 @@
+"""What is planned together: what is put in a row, and the pitch of a grasp with its use."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.programs.bench import Bench, Draft
+from app.programs.layout import Layout
+from app.programs.order import Putting
+from app.programs.pour import PourDemo
+from app.programs.program import compiled
+from app.programs.script import parse
+from app.programs.source import ScriptError
+from tests.programs.conftest import Stage
+
+NEAR = (165.0, 286.0)
+"""[mm] So near the arm that the basin is reached at a steep pitch alone."""
+
+
+def puts(*spots: tuple[str, tuple[float, float]]) -> str:
+    steps = (f"  - put: {{thing: {name}, x: {x:g}, y: {y:g}}}" for name, (x, y) in spots)
+    return "steps:\n" + "\n".join(steps)
+
+
+def stood(stage: Stage, name: str) -> tuple[float, float]:
+    """[mm] Where it stands at first."""
+    (thing,) = (each for each in stage.begin().things if each.name == name)
+    x, y, _ = (1e3 * thing.T[:3, 3]).tolist()
+    return x, y
+
+
+def test_cup_and_basin_change_places(stage: Stage) -> None:
+    cup, basin = stood(stage, "cup"), stood(stage, "basin")
+    text = puts(("cup", basin), ("basin", cup))
+    program = compiled(parse(text), stage.rig, stage.begin())
+    ends = [task.order.thing for task in program.tasks if isinstance(task.order, Putting)]
+    assert [(each.name, *np.round(1e3 * each.T[:2, 3], 6)) for each in ends] == [
+        ("cup", *basin),
+        ("basin", *cup),
+    ]
+    _, states = stage.play(program, stage.begin())
+    at = {each.name: 1e3 * each.T[:2, 3] for each in states[-1].things}
+    assert at["cup"] == pytest.approx(basin)
+    assert at["basin"] == pytest.approx(cup)
+
+
+@pytest.mark.parametrize(
+    ("between", "last", "said"),
+    [
+        # What stands still meanwhile is in the way.
+        ("  - wait: 0.1\n", (-300.0, 300.0), "cup would stand in basin"),
+        # And so is what is put there last.
+        ("", None, "basin would stand in cup"),
+    ],
+)
+def test_an_arrangement_in_which_things_stand_in_each_other_is_refused(
+    stage: Stage, between: str, last: tuple[float, float] | None, said: str
+) -> None:
+    basin = stood(stage, "basin")
+    last = last or (basin[0] + 20.0, basin[1])
+    text = puts(("cup", basin)) + "\n" + between + puts(("basin", last))[7:]
+    with pytest.raises(ScriptError, match=said):
+        compiled(parse(text), stage.rig, stage.begin())
+
+
+def test_the_same_step_is_planned_anew_when_things_stand_elsewhere(stage: Stage) -> None:
+    """The second time the basin stands where the arm went the first time."""
+    once = (
+        "frame: base\ntool: tcp\nsteps:\n  - repeat:\n      times: 1\n      steps:\n"
+        "        - move: {x: 360, y: 0, z: 60, pitch: 60}\n        - home\n"
+        "        - put: {thing: cup, x: 0, y: -400}\n        - put: {thing: basin, x: 420, y: 0}\n"
+    )
+    assert compiled(parse(once), stage.rig, stage.begin()).steps == 5
+    with pytest.raises(ScriptError, match=r"line 7.* and basin are .* too near"):
+        compiled(parse(once.replace("times: 1", "times: 2")), stage.rig, stage.begin())
+
+
+@pytest.fixture
+def untimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How long ways take is not what is looked at here."""
+    monkeypatch.setattr(Draft, "timed", lambda self: self)
+
+
+def layout(stage: Stage, text: str) -> tuple[Bench, Layout]:
+    bench = Bench(stage.rig, stage.begin())
+    return bench, Layout(parse(text), bench)
+
+
+@pytest.mark.usefixtures("untimed")
+def test_another_pitch_is_taken_when_the_first_does_not_reach_the_basin(stage: Stage) -> None:
+    bench, found = layout(stage, PourDemo(basin=NEAR).text)
+    names = [name for orders in found.all() for name, _ in orders]
+    # What led nowhere has left nothing behind.
+    assert names.count("grasp cup: close") == 1
+    assert names.count("pour") == 1
+    assert bench.taken is None
+
+
+@pytest.mark.usefixtures("untimed")
+def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
+    text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {thing: cup, pitch: 30}")
+    with pytest.raises(InputError, match="cannot be emptied into basin") as told:
+        layout(stage, text)[1].all()
+    assert "another pitch" not in str(told.value)
+
+
+@pytest.mark.usefixtures("untimed")
+def test_those_that_were_tried_are_told(stage: Stage) -> None:
+    with pytest.raises(InputError, match=r"another pitch .* tried 30, .* and \d+ deg") as told:
+        layout(stage, PourDemo(basin=(900.0, 100.0)).text)[1].all()
+    assert "with a pitch of 30.0 deg" in str(told.value)

@@ -1,0 +1,46 @@
+"""Cup and basin at random places: all of it gets into the basin, or it is refused beforehand."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+
+import pytest
+
+from app.programs.pour import PourDemo, Spot
+from app.programs.program import compiled
+from app.programs.script import parse
+from app.programs.source import ScriptError
+from tests.programs.conftest import Stage
+from tests.programs.test_pour import check_poured
+
+CASES = range(50) if "KATANA450_LONG" in os.environ else (0, 1, 2)
+"""All of them with `make test-long`."""
+
+
+def spots(number: int) -> tuple[Spot, Spot]:
+    """[mm] Anywhere about the arm that it might reach, and somewhat beyond."""
+    rng = random.Random(number)
+
+    def spot() -> Spot:
+        radius, angle = rng.uniform(280.0, 560.0), rng.uniform(-2.6, 2.6)
+        return radius * math.cos(angle), radius * math.sin(angle)
+
+    return spot(), spot()
+
+
+@pytest.mark.parametrize("number", CASES)
+def test_every_place_does_or_is_refused(stage: Stage, number: int) -> None:
+    cup, basin = spots(number)
+    try:
+        program = compiled(parse(PourDemo(cup=cup, basin=basin).text), stage.rig, stage.begin())
+    except ScriptError as error:
+        (problem,) = error.problems
+        assert problem.line > 0
+        assert any(each in problem.said for each in REASONS), problem.said
+        return
+    check_poured(stage, program)
+
+
+REASONS = ("cannot be taken where it stands", "cannot be emptied into", "would stand in", "no room")

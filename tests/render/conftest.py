@@ -1,0 +1,41 @@
+"""The arm on its table, ready for pictures."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import pytest
+
+from app.cli.assembly import described
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.state import State
+from app.render.stage import Stage
+from app.robot.model import RobotModel
+from app.robot.props import load_props
+from app.settings import Settings
+from robot_description import URDF_PATH
+
+
+class Workshop(NamedTuple):
+    """An arm, its rules, and its shapes."""
+
+    model: RobotModel
+    session: Session
+    stage: Stage
+
+    @property
+    def ready(self) -> State:
+        """At home, the cup empty."""
+        return self.session.begin(self.session.ready, 0.0, 0.0)
+
+    @property
+    def filled(self) -> State:
+        """The same with 200 ml in the cup."""
+        return self.session.step(self.ready, [cmd.Fill(2e-4)], 0.01)
+
+
+@pytest.fixture(scope="session")
+def workshop() -> Workshop:
+    model, session, _ = described(Settings(), URDF_PATH, None)
+    return Workshop(model, session, Stage(model, session, load_props()))

@@ -1,0 +1,172 @@
+"""Frames that are packed once, held to viser's own."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.util
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import zstandard
+from viser import _messages as wire
+from viser.infra import _infra
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+
+from app.view import frames
+from app.view.server import open_server
+
+
+def visers_own(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The producer of a viser that the app has not touched."""
+    assert _infra.__file__ is not None
+    spec = importlib.util.spec_from_file_location("viser.infra._untouched", _infra.__file__)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Its dataclasses look for it there.
+    monkeypatch.setitem(sys.modules, spec.name, module)
+    spec.loader.exec_module(module)
+    return module._message_producer
+
+
+class Line:
+    """Takes in what is sent."""
+
+    def __init__(self, valve: frames.Valve | None = None) -> None:
+        self.heard: list[bytes] = []
+        self.request = SimpleNamespace(
+            headers={} if valve is None else {frames.VALVE_HEADER: valve.name}
+        )
+
+    async def send(self, frame: bytes) -> None:
+        self.heard.append(frame)
+
+
+def messages() -> list[Any]:
+    rings = np.arange(21.0, dtype=np.float32).reshape(3, 7)
+    return [
+        wire.SetOrientationMessage("/a", (1.0, 0.0, 0.0, 0.0)),
+        wire.SceneNodeUpdateMessage(
+            "/b", {"batched_wxyzs": rings[:, :4].copy(), "batched_positions": rings[:, 4:].copy()}
+        ),
+        wire.SetPositionMessage("/b", (0.1, 0.2, 0.3)),
+    ]
+
+
+async def heard_by(lines: dict[int, tuple[Any, Line]], pushed: list[list[Any]]) -> None:
+    """Let producers send each of the lists of messages to their lines."""
+    buffer = AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
+    tasks = [
+        asyncio.create_task(produce(line, buffer, number))
+        for number, (produce, line) in lines.items()
+    ]
+    for each in pushed:
+        buffer.atomic_start()
+        for message in each:
+            buffer.push(message)
+        buffer.atomic_end()
+        buffer.flush()
+        await asyncio.sleep(0.1)
+    buffer.set_done()
+    await asyncio.gather(*tasks)
+
+
+def opened(frame: bytes) -> tuple[dict[str, Any], bytes]:
+    """What is packed in it, without its time; and the arrays as they are."""
+    size, packed = (int.from_bytes(frame[at : at + 8], "little") for at in (0, 8))
+    body = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed])
+    assert len(body) == size
+    decoded = msgspec.msgpack.decode(body)
+    assert decoded.pop("timestampSec") > 0.0
+    arrays = 16 + packed
+    # They begin where the page can look at them without a copy.
+    return decoded, frame[arrays + -arrays % 8 :]
+
+
+def test_a_browser_is_sent_what_viser_sends(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, own = Line(), Line()
+    pushed = [messages(), messages()[:1], messages()[1:]]
+    asyncio.run(heard_by({1: (frames.produce, ours), 2: (visers_own(monkeypatch), own)}, pushed))
+    assert len(ours.heard) == len(own.heard) == 3
+    for mine, visers in zip(ours.heard, own.heard, strict=True):
+        assert opened(mine) == opened(visers)
+
+
+def test_a_crowd_is_sent_frames_that_were_packed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    packed: list[int] = []
+    pack = frames.Packer._pack
+
+    def counted(packer: frames.Packer, window: Any, now: float) -> bytes:
+        packed.append(len(window))
+        return pack(packer, window, now)
+
+    monkeypatch.setattr(frames.Packer, "_pack", counted)
+    lines = [Line() for _ in range(20)]
+    pushed = [messages() for _ in range(3)]
+    asyncio.run(heard_by({n: (frames.produce, line) for n, line in enumerate(lines)}, pushed))
+    assert packed == [3, 3, 3]
+    assert all(line.heard == lines[0].heard for line in lines)
+
+
+def test_behind_a_shut_valve_nothing_waits_but_the_newest() -> None:
+    valve = frames.Valve()
+    line, other = Line(valve), Line()
+
+    async def act() -> None:
+        buffer = AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
+        tasks = [
+            asyncio.create_task(frames.produce(each, buffer, number))
+            for number, each in enumerate((line, other))
+        ]
+
+        async def push(*xs: float) -> None:
+            for x in xs:
+                buffer.push(wire.SetPositionMessage("/a", (x, 0.0, 0.0)))
+                buffer.flush()
+                await asyncio.sleep(0.05)
+
+        await push(1.0)
+        valve.let(False)
+        # One may be on its way already.
+        await push(2.0, 3.0, 4.0)
+        assert len(line.heard) <= 2
+        assert len(other.heard) == 4
+        before = len(line.heard)
+        await asyncio.to_thread(valve.let, True)
+        await asyncio.sleep(0.1)
+        told = [opened(frame)[0]["messages"] for frame in line.heard[before:]]
+        assert [[each["position"][0] for each in messages] for messages in told] == [[4.0]]
+        await push(5.0)
+        assert len(line.heard) == before + 2
+        buffer.set_done()
+        await asyncio.gather(*tasks)
+
+    asyncio.run(act())
+
+
+def test_what_a_message_says_later_is_sent_later() -> None:
+    packer = frames.Packer()
+    props = {"visible": True}
+    window = [wire.SceneNodeUpdateMessage("/a", props)]
+    before = packer.frame(window)
+    assert packer.frame(window) is before
+    props["visible"] = False
+    asyncio.run(asyncio.sleep(2 * frames.FRESH))
+    assert opened(packer.frame(window)) != opened(before)
+
+
+def test_messages_that_are_gone_are_not_taken_for_later_ones() -> None:
+    packer = frames.Packer()
+    for number in range(200):
+        # Python gives a new message the place, and so the number, of one that is gone.
+        body, _ = opened(packer.frame([wire.SetPositionMessage(f"/{number}", (0.0, 0.0, 0.0))]))
+        assert body["messages"][0]["name"] == f"/{number}"
+
+
+def test_the_app_packs_so() -> None:
+    open_server("a key").stop()
+    assert _infra._message_producer is frames.produce
