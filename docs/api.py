@@ -34,6 +34,8 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
 | **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` of 8 to 64 letters and digits tells programs apart |
 | **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `look` tells |
+| **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .glb or .gltf file, to be placed by the key in the answer |
+| **HTTP** `GET`, `POST /api/v{version}/scene` | what stands around as a .zip ([scenes](scenes.md)); one that is brought waits for a `load` |
 | **HTTP** `POST /api/v{version}/stop` | STOP |
 | **HTTP** `GET /api/v{version}/openapi.json` | all this as OpenAPI |
 
@@ -54,6 +56,10 @@ with connect("http://127.0.0.1:8080", name="My script") as arm:
     there = arm.go(requests.Position(p=(0.45, 0.1, 0.0)))  # the tool point, pitch and roll kept
     print(there.why or "all as wished")
 ```
+
+`arm.upload(Path("bracket.stl"))` brings a mesh, `arm.ask(requests.Place(name="bracket",
+form=requests.Form.MESH, mesh=key))` stands it in front of the arm; `arm.save_scene()` and
+`arm.load_scene(data)` keep what stands around.
 
 `connect` gives the signs of life by itself. `aconnect` is the same for asyncio. What is refused
 raises `RefusedError`, whose text says why and what to do.

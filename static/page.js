@@ -144,6 +144,7 @@
     body.dataset.mood = status.mood;
     text("headline", { stopped: "Stopped", starting: "Starting" }[status.mood] ?? status.headline);
     text("why", status.stopped ? `${status.stopped} Nothing moves until Reset.` : status.why);
+    byId("objects-button").hidden = status.role === "viewer";
     byId("reset").hidden = !status.stopped || status.role === "viewer";
     const { mine, holder, windows, asking: wanting } = status;
     const wants = mine && wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
@@ -213,17 +214,23 @@
 
   byId("reset").addEventListener("click", () => say({ do: "reset" }));
   byId("help-button").addEventListener("click", () => byId("help").showModal());
-  byId("jog-button").addEventListener("click", () => {
-    const shown = byId("jog").hidden;
-    byId("jog").hidden = !shown;
-    byId("jog-button").setAttribute("aria-expanded", String(shown));
-    Jog.show(shown);
-  });
+  function show(id, shown) {
+    byId(id).hidden = !shown;
+    byId(`${id}-button`).setAttribute("aria-expanded", String(shown));
+    if (id === "jog") Jog.show(shown);
+  }
+  // Both lie in the same corner.
+  for (const [id, other] of [["jog", "objects"], ["objects", "jog"]])
+    byId(`${id}-button`).addEventListener("click", () => {
+      show(other, false);
+      show(id, byId(id).hidden);
+    });
   document.querySelector("#speed input").addEventListener("input", ({ target }) => {
     document.querySelector("#speed output").value = `${target.value} %`;
     say({ do: "speed", value: target.value / 100 });
   });
   Jog.begin({ say, stop });
+  Objects.begin({ say });
 
   // The instruments, which come when they are first wanted.
 

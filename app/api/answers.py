@@ -279,7 +279,10 @@ class Loop(Answer, frozen=True, kw_only=True):
 
 
 class Thing(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that stands around or is held; ``T`` (4, 4) in the base frame. See ``place``."""
+    """Something that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
+
+    ``fixed``: to the hand. ``colour``: null for its own.
+    """
 
     name: str
     form: str
@@ -287,6 +290,12 @@ class Thing(msgspec.Struct, frozen=True, kw_only=True):
     T: list[Numbers]
     can_be_held: bool
     held: bool
+    mesh: str | None = None
+    scale: float = 1.0
+    colour: str | None = None
+    opacity: float = 1.0
+    hidden: bool = False
+    fixed: bool = False
 
 
 class Things(Answer, frozen=True, kw_only=True):
@@ -338,6 +347,28 @@ class Links(Answer, frozen=True, kw_only=True):
     links: list[Link]
 
 
+class Mesh(Answer, frozen=True, kw_only=True):
+    """A file that was uploaded and can now be placed.
+
+    ``key``: for ``place``. ``name``: of the file, and of no thing there is. ``said``: what was
+    read, in words. ``size``: along x, y, z [m].
+    """
+
+    key: str
+    name: str
+    said: str
+    size: Numbers
+    triangles: int
+
+
+class Scene(Answer, frozen=True, kw_only=True):
+    """A scene that was uploaded and can now be loaded. ``key``: for ``load``."""
+
+    key: str
+    things: list[str]
+    said: str
+
+
 AnyAnswer = (
     Welcome
     | Done
@@ -352,6 +383,8 @@ AnyAnswer = (
     | Values
     | World
     | Links
+    | Mesh
+    | Scene
 )
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)

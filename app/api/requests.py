@@ -55,6 +55,7 @@ Press = Annotated[str, Meta(min_length=1, max_length=LONGEST_PRESS)] | None
 Name = Annotated[str, Meta(min_length=1, max_length=40)]
 FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
 NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
+Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
 
 
 class Frame(Enum):
@@ -72,6 +73,19 @@ class Form(Enum):
     BOX = "box"
     CYLINDER = "cylinder"
     SPHERE = "sphere"
+    MESH = "mesh"
+    """A file that was uploaded; it counts as its convex hull."""
+
+
+class Mount(Enum):
+    """What a thing can be fixed to."""
+
+    HAND = "hand"
+    """It goes with the hand, whatever the fingers do, and counts as a part of it."""
+    WORLD = "world"
+    """It stays where it is."""
+    TABLE = "table"
+    """Likewise, once it is put down upright on the table below."""
 
 
 class Request(
@@ -260,19 +274,48 @@ class Resume(Request, frozen=True):
 
 
 class Place(Request, frozen=True, kw_only=True):
-    """Put a thing somewhere: a new one, or one that is there, of which only ``T`` need be given.
+    """Put a thing somewhere: a new one, or one that is there, of which what is not given stays.
 
     ``form`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
-    cylinder (radius, height) or sphere (radius). Its frame is in the middle of its underside.
-    ``can_be_held``: the fingers may touch it, and hold it when both do.
+    cylinder (radius, height) or sphere (radius); of a mesh ``mesh`` is its key, as the upload told
+    it, and the size is the file's. Its frame is in the middle of its underside. A new thing without
+    ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may touch it,
+    and hold it when both do. ``colour``: as "#94a3b8", or "own" for that of the file. ``hidden``:
+    it is not drawn, and counts for contacts even so.
     """
 
     name: Name
-    T: Matrix4
+    T: Matrix4 | None = None
     frame: Frame = Frame.BASE
     form: Form | None = None
     size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
+    mesh: Key | None = None
     can_be_held: bool | None = None
+    scale: Annotated[float, Meta(ge=1e-3, le=1e3)] | None = None
+    colour: Annotated[str, Meta(pattern="^(own|#[0-9a-f]{6})$")] | None = None
+    opacity: Annotated[float, Meta(ge=0.05, le=1.0)] | None = None
+    hidden: bool | None = None
+
+
+class Attach(Request, frozen=True, kw_only=True):
+    """Fix a thing to the hand, as a camera or another tool, or to the world again.
+
+    ``T``: where on the hand, in the frame of the arm's default tool; without it, it stays where it
+    is.
+    """
+
+    name: Name
+    to: Mount
+    T: Matrix4 | None = None
+
+
+class Load(Request, frozen=True, kw_only=True):
+    """Have the things of a scene that was uploaded, in place of all there are, and its water.
+
+    The arm stays where it is.
+    """
+
+    scene: Key
 
 
 class Remove(Request, frozen=True, kw_only=True):
@@ -403,6 +446,8 @@ AnyRequest = (
     | Pause
     | Resume
     | Place
+    | Attach
+    | Load
     | Remove
     | Fill
     | Set

@@ -92,6 +92,50 @@ def openapi_json() -> bytes:
             },
         }
     }
+    too_much = {
+        "413": {"description": "It is too long."},
+        "429": told("Too many at once.", {"$ref": "#/components/schemas/Refused"}),
+    }
+    paths[f"{root}/mesh"] = {
+        "post": {
+            "summary": "Bring a mesh, to be placed by its key.",
+            "parameters": [
+                _query("name", "The file's name, with its ending.", required=True),
+                _query("format", "wrl, stl, obj, ply, glb or gltf, where the name has no ending."),
+                _query("unit", "mm, cm, in or m; without it that is guessed, and said."),
+            ],
+            "requestBody": _file("application/octet-stream"),
+            "responses": {
+                "200": told("It is kept.", {"$ref": "#/components/schemas/Mesh"}),
+                "422": told("It cannot be read.", {"$ref": "#/components/schemas/Refused"}),
+                **too_much,
+                **refused,
+            },
+        }
+    }
+    paths[f"{root}/scene"] = {
+        "get": {
+            "summary": "What stands around, as a .zip of scene.yaml and its meshes.",
+            "responses": {
+                "200": {
+                    "description": "Now.",
+                    "content": {"application/zip": {"schema": {"type": "string"}}},
+                },
+                "409": told("Not now.", {"$ref": "#/components/schemas/Refused"}),
+                **refused,
+            },
+        },
+        "post": {
+            "summary": "Bring a scene, to be loaded by its key.",
+            "requestBody": _file("application/zip"),
+            "responses": {
+                "200": told("It is kept.", {"$ref": "#/components/schemas/Scene"}),
+                "422": told("It cannot be read.", {"$ref": "#/components/schemas/Refused"}),
+                **too_much,
+                **refused,
+            },
+        },
+    }
     described = {
         "openapi": "3.1.0",
         "info": {"title": TITLE, "version": str(requests.VERSION)},
@@ -103,3 +147,18 @@ def openapi_json() -> bytes:
         },
     }
     return msgspec.json.encode(described)
+
+
+def _query(name: str, said: str, *, required: bool = False) -> dict[str, Any]:
+    return {
+        "name": name,
+        "in": "query",
+        "required": required,
+        "schema": {"type": "string"},
+        "description": said,
+    }
+
+
+def _file(kind: str) -> dict[str, Any]:
+    content = {kind: {"schema": {"type": "string", "format": "binary"}}}
+    return {"required": True, "content": content}

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
+from app.control import commands as cmd
 from app.control.joint_session import JointSession
 from app.control.session import Session
 from app.control.things import Hand, Thing
@@ -25,6 +26,7 @@ from app.runtime.clock import MonotonicClock
 from app.runtime.link import ArmEnd
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
+from app.scene.scene import Scene
 from app.settings import Settings
 from app.view.texts import UNCHECKED
 
@@ -94,12 +96,17 @@ def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described | 
 class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
-    def __init__(self, settings: Settings, urdf: Path, tool: str | None) -> None:
-        found = recognised(settings, urdf, tool)
-        arm = found.model.arm if isinstance(found, Described) else found.machine.joints
-        session, self.notes = found.session, found.notes
-        driver = SimulatedDriver(arm, session.ready, gripper=0.0)
+    def __init__(
+        self, settings: Settings, robot: Described | Jointed, scene: Scene | None = None
+    ) -> None:
+        """``scene``: what stands around in place of the robot's own, and where the arm stands."""
+        arm = robot.model.arm if isinstance(robot, Described) else robot.machine.joints
+        session, self.notes = robot.session, robot.notes
+        start = session.ready if scene is None or scene.joints is None else scene.joints
+        driver = SimulatedDriver(arm, start, gripper=0.0)
         self._mailbox = Mailbox(session.check)
+        if scene is not None:
+            self._mailbox.put(cmd.Furnish(scene.things, scene.water))
         self._loop = ControlLoop(session, driver, self._mailbox, MonotonicClock(), settings.rate)
         self._silence = settings.silence
         self._link: ArmEnd | None = None

@@ -12,10 +12,13 @@ import sys
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.errors import ConfigurationError, KatanaError
 from app.settings import Settings
+
+if TYPE_CHECKING:
+    from app.exchange.meshes import Mesh
 
 START_SECONDS = 60.0
 GOODBYE_SECONDS = 5.0
@@ -36,8 +39,10 @@ class Front:
         robot: tuple[Path, str | None],
         workspace: Path | None,
         listening: tuple[socket.socket, socket.socket | None],
+        meshes: tuple[Mesh, ...] = (),
     ) -> None:
         """Starts it. ``robot``: see ``described``. ``workspace``: file of a reachability map.
+        ``meshes``: that the things there are at first are of.
 
         ``listening``: the port for browsers, and the one for JSON lines if there is one.
         """
@@ -47,7 +52,7 @@ class Front:
         self.pipe, theirs = spawn.Pipe()
         self._process = spawn.Process(
             target=_run,
-            args=(settings, robot, workspace, listening, theirs, telling),
+            args=(settings, robot, workspace, listening, meshes, theirs, telling),
             name="katana450 front",
             daemon=True,
         )
@@ -104,6 +109,7 @@ def _run(
     robot: tuple[Path, str | None],
     workspace: Path | None,
     listening: tuple[socket.socket, socket.socket | None],
+    meshes: tuple[Mesh, ...],
     pipe: Connection,
     telling: Connection,
 ) -> None:
@@ -114,7 +120,7 @@ def _run(
         os.setpriority(os.PRIO_PROCESS, 0, 0)
     start_log()
     try:
-        _serve(settings, robot, workspace, listening, pipe, telling)
+        _serve(settings, robot, workspace, listening, meshes, pipe, telling)
     except KatanaError as error:
         telling.send(error)
     except (EOFError, BrokenPipeError):
@@ -127,19 +133,23 @@ def _serve(
     robot: tuple[Path, str | None],
     workspace: Path | None,
     listening: tuple[socket.socket, socket.socket | None],
+    meshes: tuple[Mesh, ...],
     pipe: Connection,
     telling: Connection,
 ) -> None:
+    from app.exchange.meshes import Meshes
     from app.gateway.gateway import Gateway
 
-    gateway = Gateway(settings, *listening)
+    kept = Meshes()
+    kept.put(meshes, ())
+    gateway = Gateway(settings, *listening, kept)
     gateway.start()
     telling.send(OPEN)
     try:
         # The libraries that read the robot take most of a second: the page loads in the meantime.
         from app.cli.parts import attached
 
-        link, view = attached(gateway, settings, robot, workspace, pipe)
+        link, view = attached(gateway, settings, robot, workspace, kept, pipe)
         link.start()
         view.start()
         telling.send(READY)

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from app.api import answers, requests
 from app.cli.programs_options import URL
 from app.client import Client, connect
-from app.client.asynchronous import LostError
+from app.client.files import LostError
 from app.errors import ConfigurationError, KatanaError
 from app.programs.script import Script
 

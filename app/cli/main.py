@@ -44,7 +44,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 bare=options.bare,
                 programs=options.programs,
             )
-            return serve(settings, options.urdf, options.tool, options.workspace)
+            return serve(
+                settings,
+                options.urdf,
+                options.tool,
+                options.workspace,
+                options.scene,
+                options.objects,
+            )
         if options.command == "access":
             from app.cli.access import access
 
@@ -113,6 +120,21 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="FILE.npz",
         help="a map written by `katana450 workspace --out`, to be shown in the scene",
+    )
+    serve.add_argument(
+        "--scene",
+        type=Path,
+        metavar="FILE",
+        help="what stands around: a scene.yaml with its meshes beside it, or a .zip of both",
+    )
+    serve.add_argument(
+        "--object",
+        dest="objects",
+        action="append",
+        default=[],
+        metavar="FILE[@x,y,z]",
+        help="an object besides, of a .wrl, .stl, .obj, .ply, .glb or .gltf file; where it stands "
+        "in mm, else in front of the arm; as often as there are",
     )
     serve.add_argument(
         "--silence",

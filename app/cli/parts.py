@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app.cli.assembly import Described, Jointed, recognised
 from app.errors import ConfigurationError
+from app.exchange.meshes import Meshes
 from app.exchange.reachability_file import load_map
 from app.exchange.scripts import Scripts
 from app.exchange.urdf_mechanism import load_mechanism
@@ -18,7 +19,7 @@ from app.runtime.navigator import Navigator
 from app.settings import Settings
 from app.view.follower import Follower
 from app.view.machine_view import MachineView
-from app.view.view import View
+from app.view.view import Besides, View
 
 
 def attached(
@@ -26,12 +27,13 @@ def attached(
     settings: Settings,
     robot: tuple[Path, str | None],
     workspace: Path | None,
+    meshes: Meshes,
     pipe: Connection,
 ) -> tuple[FrontEnd, Follower]:
     """The front's end of ``pipe``, and the view, neither running yet; ``gateway`` has the arm.
 
-    ``robot``: see ``described``. ``workspace``: file of a reachability map. Raises
-    ConfigurationError, EOFError.
+    ``robot``: see ``described``. ``workspace``: file of a reachability map. ``meshes``: those that
+    things are of. Raises ConfigurationError, EOFError.
     """
     found = recognised(settings, *robot)
     link = FrontEnd(pipe, found.session.check)
@@ -41,7 +43,9 @@ def attached(
                 f"{workspace} maps where a tool can be. {found.machine.joints.why}"
             )
         return link, _machine(gateway, settings, found, link)
-    return link, _arm(gateway, settings, found, link, (robot[0], workspace))
+    stored = None if workspace is None else load_map(workspace)
+    besides = Besides(stored, (gateway.steering, Scripts(settings.programs)), meshes)
+    return link, _arm(gateway, settings, found, link, robot[0], besides)
 
 
 def _arm(
@@ -49,10 +53,10 @@ def _arm(
     settings: Settings,
     found: Described,
     link: FrontEnd,
-    files: tuple[Path, Path | None],
+    urdf: Path,
+    besides: Besides,
 ) -> View:
     model, session, _ = found
-    urdf, workspace = files
     navigator = Navigator(session, link.board, link)
     view = View(
         gateway.viser,
@@ -61,8 +65,7 @@ def _arm(
         navigator,
         session,
         settings.frame_rate,
-        None if workspace is None else load_map(workspace),
-        (gateway.steering, Scripts(settings.programs)),
+        besides,
     )
     navigator.tell = gateway.announce
     mechanism, _ = load_mechanism(urdf)

@@ -7,13 +7,19 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from app.cli.front import OPEN, READY, Front, start_log
 from app.gateway.listen import HERE, listen
 from app.settings import Settings
 from robot_description import URDF_PATH
+
+if TYPE_CHECKING:
+    from app.cli.assembly import Described
+    from app.exchange.scene_file import StoredScene
 
 AWAKE = 0.2
 """[s] How soon a signal is heeded, and a front that ended."""
@@ -35,13 +41,18 @@ def serve(
     urdf: Path = URDF_PATH,
     tool: str | None = None,
     workspace: Path | None = None,
+    scene: Path | None = None,
+    objects: Sequence[str] = (),
 ) -> int:
     """Run the app until SIGINT or SIGTERM; returns the exit status.
 
     ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
-    ``workspace``: file of a reachability map that can be shown.
+    ``workspace``: file of a reachability map that can be shown. ``scene``, ``objects``: see
+    ``furnished``.
     """
     start_log()
+    # Read before anything runs: the front shows what it is given here, each time it is started.
+    robot, stored = _furnished(settings, (urdf, tool), scene, objects)
     stopping = threading.Event()
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
@@ -57,14 +68,16 @@ def serve(
     url = settings.public_url or f"{scheme}://{_shown(settings.host)}:{port}"
 
     def front() -> Front:
-        return Front(settings, (urdf, tool), workspace, (listening, lines))
+        meshes = () if stored is None else stored.meshes
+        return Front(settings, (urdf, tool), workspace, (listening, lines), meshes)
 
     current = front()
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
-        from app.cli.assembly import RunningArm
+        from app.cli.assembly import RunningArm, recognised
 
-        arm = RunningArm(settings, urdf, tool)
+        found = recognised(settings, urdf, tool) if robot is None else robot
+        arm = RunningArm(settings, found, None if stored is None else stored.scene)
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr)
         current.wait_for(OPEN)
@@ -97,6 +110,25 @@ def serve(
         current.stop()
         listening.close()
     return 0
+
+
+def _furnished(
+    settings: Settings,
+    urdf_and_tool: tuple[Path, str | None],
+    scene: Path | None,
+    objects: Sequence[str],
+) -> tuple[Described | None, StoredScene | None]:
+    """The robot and what stands around it, where somebody says what."""
+    if scene is None and not objects:
+        return None, None
+    from app.cli.assembly import described
+    from app.cli.furnishing import furnished
+
+    robot = described(settings, *urdf_and_tool)
+    stored, said = furnished(robot, scene, objects)
+    for sentence in said:
+        print(f"katana450: {sentence}", flush=True)
+    return robot, stored
 
 
 def _shown(host: str) -> str:

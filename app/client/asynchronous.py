@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import quote
 
@@ -16,7 +17,7 @@ from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.api import answers, requests
-from app.errors import KatanaError
+from app.client.files import LostError, RefusedError, Site
 
 SOCKET = f"/api/v{requests.VERSION}/socket"
 
@@ -29,19 +30,12 @@ FOLLOWED = 30.0
 A = TypeVar("A", bound=answers.Answer)
 
 
-class RefusedError(KatanaError):
-    """The server did not do what was asked; the message says why, and what to do."""
-
-
-class LostError(KatanaError):
-    """The line to the server is gone. A moving arm is stopped then."""
-
-
 class AsyncClient:
     """One connection; made by ``aconnect``, which also gives signs of life."""
 
-    def __init__(self, socket: ClientConnection, welcome: answers.Welcome) -> None:
+    def __init__(self, socket: ClientConnection, welcome: answers.Welcome, site: Site) -> None:
         self._socket = socket
+        self._site = site
         self.welcome = welcome
         self._asked = 0
         self._waiting: dict[requests.Id, asyncio.Future[answers.Answer]] = {}
@@ -113,6 +107,24 @@ class AsyncClient:
     async def joints(self, q: npt.ArrayLike) -> answers.State:
         """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
         return await self.go(requests.Joints(q=np.asarray(q, dtype=float).tolist()))
+
+    async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
+        """Bring the mesh in ``file`` to the server, to be placed by its key.
+
+        unit: mm, cm, in or m; None to have it guessed. Raises RefusedError with what is wrong.
+        """
+        data = await asyncio.to_thread(file.read_bytes)
+        return await asyncio.to_thread(self._site.mesh, data, file.name, unit)
+
+    async def save_scene(self) -> bytes:
+        """What stands around, as a .zip."""
+        return await asyncio.to_thread(self._site.saved)
+
+    async def load_scene(self, data: bytes) -> answers.Scene:
+        """Have what stands around in the .zip ``data``, in place of all there is."""
+        scene = await asyncio.to_thread(self._site.scene, data)
+        await self.ask(requests.Load(scene=scene.key))
+        return scene
 
     async def _say(self, request: requests.Request) -> None:
         if self._lost is not None:
@@ -192,7 +204,7 @@ async def aconnect(
     if not isinstance(welcome, answers.Welcome):
         await socket.close()
         raise LostError(f"The server at {url} speaks another language: {welcome}.")
-    client = AsyncClient(socket, welcome)
+    client = AsyncClient(socket, welcome, Site(url, token))
     try:
         yield client
     finally:

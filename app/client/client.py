@@ -6,6 +6,7 @@ import asyncio
 import threading
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy.typing as npt
@@ -48,6 +49,18 @@ class Client:
     def joints(self, q: npt.ArrayLike) -> answers.State:
         """See ``AsyncClient.joints``."""
         return self._wait(self._client.joints(q))
+
+    def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
+        """See ``AsyncClient.upload``."""
+        return self._wait(self._client.upload(file, unit))
+
+    def save_scene(self) -> bytes:
+        """See ``AsyncClient.save_scene``."""
+        return self._wait(self._client.save_scene())
+
+    def load_scene(self, data: bytes) -> answers.Scene:
+        """See ``AsyncClient.load_scene``."""
+        return self._wait(self._client.load_scene(data))
 
     def states(self, hz: float = FOLLOWED) -> Iterator[answers.State]:
         """See ``AsyncClient.states``."""

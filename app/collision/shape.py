@@ -28,6 +28,7 @@ class Shape:
         geometry: what coal measures.
         centre, radius: of a ball that holds it, (3,) and scalar [m].
         low, high: corners (3,) of a box along the axes that holds it [m].
+        mark: what it is made of; that of another shape is another.
     """
 
     geometry: Any
@@ -35,6 +36,7 @@ class Shape:
     radius: float
     low: FloatArray
     high: FloatArray
+    mark: bytes
 
 
 def hull(points: npt.ArrayLike) -> Shape:
@@ -51,7 +53,7 @@ def hull(points: npt.ArrayLike) -> Shape:
     geometry = coal.Convex.convexHull(listed, False, "")
     centre = 0.5 * (low + high)
     radius = float(np.linalg.norm(corners - centre, axis=1).max())
-    return Shape(geometry, frozen(centre), radius, frozen(low), frozen(high))
+    return Shape(geometry, frozen(centre), radius, frozen(low), frozen(high), corners.tobytes())
 
 
 def box(size: npt.ArrayLike) -> Shape:
@@ -59,7 +61,12 @@ def box(size: npt.ArrayLike) -> Shape:
     size = _lengths(size, 3, "The size of a box")
     half = frozen(0.5 * size)
     return Shape(
-        coal.Box(*size.tolist()), frozen(np.zeros(3)), float(np.linalg.norm(half)), -half, half
+        coal.Box(*size.tolist()),
+        frozen(np.zeros(3)),
+        float(np.linalg.norm(half)),
+        -half,
+        half,
+        b"box" + size.tobytes(),
     )
 
 
@@ -73,6 +80,7 @@ def cylinder(radius: float, length: float) -> Shape:
         float(np.hypot(radius, 0.5 * length)),
         -half,
         half,
+        b"cylinder" + half.tobytes(),
     )
 
 
@@ -80,7 +88,9 @@ def sphere(radius: float) -> Shape:
     """A ball about its middle [m]."""
     _lengths((radius,), 1, "The radius of a sphere")
     half = frozen((radius, radius, radius))
-    return Shape(coal.Sphere(radius), frozen(np.zeros(3)), radius, -half, half)
+    return Shape(
+        coal.Sphere(radius), frozen(np.zeros(3)), radius, -half, half, b"sphere" + half.tobytes()
+    )
 
 
 def half_space() -> Shape:
@@ -92,6 +102,7 @@ def half_space() -> Shape:
         FAR,
         frozen(-far),
         frozen(far * (1.0, 1.0, 0.0)),
+        b"half-space",
     )
 
 

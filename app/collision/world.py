@@ -191,8 +191,7 @@ class World:
         for part in self.parts:
             told.update(f"{part.name} {part.mover}".encode())
             for shape in part.shapes:
-                for each in (shape.centre, shape.low, shape.high):
-                    told.update(np.asarray(each, dtype=np.float64).tobytes())
+                told.update(shape.mark)
         return Likeness(told.digest(), frozen(self.T_mover_body))
 
     def with_carried(self, carried: Part) -> World:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.control.looks import AS_MADE, LONGEST_NAME, Trait
-from app.control.things import FARTHEST, Thing
+from app.control.things import FARTHEST, MOST, Mount, Thing
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
@@ -326,6 +326,36 @@ class Together:
             raise InputError("Commands that are given together are single ones.")
 
 
+@dataclass(frozen=True)
+class Attach:
+    """Fix the thing of that name to the hand, or to the world again; what is held stays."""
+
+    name: str
+    to: Mount
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.to, Mount):
+            raise InputError(f"A thing is fixed to one of {list(Mount)}, not {self.to!r}.")
+
+
+@dataclass(frozen=True, eq=False)
+class Furnish:
+    """Have these things about and no others, at one go; what is held stays, as the only one of its
+    name. ``volume``: of water in the cup [m^3]; None for no water anywhere."""
+
+    things: tuple[Thing, ...]
+    volume: float | None = None
+
+    def __post_init__(self) -> None:
+        names = {thing.name for thing in self.things}
+        if len(names) < len(self.things) or len(names) > MOST:
+            raise InputError(f"A scene has up to {MOST} things, each with a name of its own.")
+        if any(thing.held for thing in self.things):
+            raise InputError("What is put somewhere is a thing out of the hand.")
+        if self.volume is not None:
+            _check_finite("The volume", self.volume)
+
+
 Command = (
     SetJoint
     | SetAxes
@@ -350,6 +380,8 @@ Command = (
     | GoAlong
     | Place
     | Remove
+    | Attach
+    | Furnish
     | Fill
     | Shift
     | Dress
@@ -359,7 +391,7 @@ Command = (
 )
 
 
-THINGS = (Place, Shift, Remove, Fill, Dress)
+THINGS = (Place, Shift, Attach, Furnish, Remove, Fill, Dress)
 """Those about what stands around and what is seen: no joint moves by them."""
 
 

@@ -24,7 +24,8 @@ OPENED = 0.02
 
 def gripped(surroundings: Surroundings, world: World | None, state: State) -> State:
     """``state`` after what the fingers did in this tick."""
-    if world is None or surroundings.hand is None or not state.things:
+    hand = surroundings.hand
+    if world is None or hand is None or not (hand.fingers and state.things):
         return state
     x = np.append(state.setpoint, state.gripper_setpoint)
     if state.grip is not None:
@@ -35,8 +36,8 @@ def gripped(surroundings: Surroundings, world: World | None, state: State) -> St
     if state.gripper_goal >= state.gripper_setpoint:
         return without(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
     for thing in state.things:
-        if thing.can_be_held:
-            felt = _felt(surroundings.hand.fingers, world, thing, x)
+        if thing.can_be_held and not thing.fixed:
+            felt = _felt(hand.fingers, world, thing, x)
             if min(felt.values()) <= TOUCHING:
                 return _closed(surroundings, state, thing, felt, x)
     return state

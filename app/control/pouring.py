@@ -73,7 +73,7 @@ class Pouring:
         if dt <= 0.0 or (stands and poured.still and poured.velocity == NOWHERE):
             return poured
         flow, middle = self._flow(things), self._middle(T)
-        if not stands and not _thing(things, CUP).held:
+        if not stands and not _thing(things, CUP).carried:
             # Somebody put it elsewhere, which is no motion.
             moved = flow.step(poured.water, T, NOWHERE, 0.0)
             return replace(poured, water=moved, middle=middle, velocity=NOWHERE)

@@ -32,7 +32,7 @@ from app.control.state import (
     Target,
     ToolTarget,
 )
-from app.control.things import Hand, Surroundings, Thing, placed
+from app.control.things import Hand, Surroundings, Thing, furnished_with, placed
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import Branch, branch_of
@@ -128,7 +128,7 @@ class Session:
 
     def check(self, command: cmd.Command) -> None:
         """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
-        check(self.arm, self.pouring, command)
+        check(self.arm, self.pouring, self.surroundings.hand, command)
 
     def choices(self, state: State) -> tuple[Choice, ...]:
         """What there is to choose from on each branch."""
@@ -249,12 +249,24 @@ class Session:
                 return dressed(state, command)
             case cmd.Together(commands=commands):
                 return functools.reduce(self._take, commands, state)
+            case cmd.Attach(name=name, to=to):
+                x = np.append(state.setpoint, state.gripper_setpoint)
+                mounted = tuple(
+                    self.surroundings.mounted(each, to, x) if each.name == name else each
+                    for each in state.things
+                )
+                return replace(state, things=mounted)
+            case cmd.Furnish(things=things, volume=volume):
+                furnished = replace(state, things=furnished_with(state.things, things))
+                return self._fill(furnished, volume)
             case cmd.Fill(volume=volume):
                 return self._fill(state, volume)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
 
-    def _fill(self, state: State, volume: float) -> State:
+    def _fill(self, state: State, volume: float | None) -> State:
+        if volume is None:
+            return replace(state, poured=None)
         assert self.pouring is not None
         x = np.append(state.setpoint, state.gripper_setpoint)
         return replace(state, poured=self.pouring.fill(volume, state.things, x))

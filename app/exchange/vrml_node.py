@@ -21,6 +21,8 @@ class Type(Enum):
     FLOAT = "SFFloat"
     FLOAT_LIST = "MFFloat"
     TIME = "SFTime"
+    PAIR = "SFVec2f"
+    PAIR_LIST = "MFVec2f"
     VECTOR = "SFVec3f"
     VECTOR_LIST = "MFVec3f"
     COLOR = "SFColor"
@@ -40,6 +42,8 @@ WIDTHS: Mapping[Type, int] = MappingProxyType(
         Type.FLOAT: 1,
         Type.FLOAT_LIST: 1,
         Type.TIME: 1,
+        Type.PAIR: 2,
+        Type.PAIR_LIST: 2,
         Type.VECTOR: 3,
         Type.VECTOR_LIST: 3,
         Type.COLOR: 3,
@@ -108,7 +112,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
         "PositionInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.VECTOR_LIST},
     }
 )
-"""Every node that is used, with the types of its fields."""
+"""Every node that is written, with the types of its fields."""
 
 EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
     {

@@ -24,22 +24,30 @@ from app.exchange.vrml_node import (
 )
 
 T = TypeVar("T")
+N = TypeVar("N", int, float)
 
 HEADER = "#VRML V2.0 utf8"
 
 LINE = 16
 """Rows of numbers a line: long enough to be small, short enough for old readers."""
 
+LONGEST = 160
+"""Characters of what an error tells of a file."""
+
 DEEPEST = 200
 """Nodes in nodes; a file that goes deeper is refused before Python's stack ends."""
 
+# Possessive, so that what does not match fails at once, whatever a stranger wrote.
 _TOKEN = re.compile(
-    r'[\s,]*(?:#[^\n\r]*[\s,]*)*("(?:[^"\\]|\\.)*"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
+    r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
 )
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _ZERO_AFTER = re.compile(r"\.0(?![0-9e])")
 _BARE_ZERO = re.compile(r"(?<![0-9.])0(?=\.)")
-_INTEGER = re.compile(r"[+-]?(?:[0-9]+|0[xX][0-9a-fA-F]+)")
+_INTEGER = re.compile(r"[+-]?(?:[0-9]{1,10}|0[xX][0-9a-fA-F]{1,8})")
+_NUMBERS, _INTEGERS = (
+    re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
+)
 _NAME = re.compile(r"[^\x00-\x20\"#',.\[\]\\{}\x7f0-9+-][^\x00-\x20\"#',.\[\]\\{}\x7f]*")
 
 
@@ -111,18 +119,24 @@ def read_world(text: str, name: str = "The file") -> World:
     """
     if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
         raise InputError(f"{name} does not begin with {HEADER!r}, so it is not VRML97.")
-    return _Reader(text, name).world()
+    return Reader(text, name).world()
 
 
-class _Reader:
+class Reader:
+    """Reads the nodes of a table of their fields; what else is there it refuses."""
+
+    fields = FIELDS
+
     def __init__(self, text: str, name: str) -> None:
+        """`name` says in errors which file the `text` is of."""
         self._text, self._name = text, name
-        self._at = 0
+        self._at = self._next = 0
         self._tokens = self._scan()
         self._ahead = next(self._tokens)
         self._named: dict[str, Node | None] = {}
 
     def world(self) -> World:
+        """What the file holds."""
         nodes: list[Node] = []
         routes: list[Route] = []
         while self._ahead:
@@ -136,17 +150,18 @@ class _Reader:
         return World(tuple(nodes), tuple(routes))
 
     def _scan(self) -> Iterator[str]:
-        place = len(self._text.partition("\n")[0])
+        self._next = len(self._text.partition("\n")[0])
         while True:
-            found = _TOKEN.match(self._text, place)
+            found = _TOKEN.match(self._text, self._next)
             if found is None:
                 raise self._error("a text that does not end, or a stray sign")
-            self._at, place = found.start(1), found.end()
+            self._at, self._next = found.start(1), found.end()
             yield found[1]
 
     def _error(self, what: str) -> InputError:
         line = self._text.count("\n", 0, self._at) + 1
-        return InputError(f"{self._name}, line {line}: {what}.")
+        short = what if len(what) <= LONGEST else f"{what[:LONGEST]}…"
+        return InputError(f"{self._name}, line {line}: {short}.")
 
     def _take(self) -> str:
         token = self._ahead
@@ -173,24 +188,27 @@ class _Reader:
         token = self._take()
         if token == "USE":
             used = self._new_name()
-            if self._named.get(used) is None:
+            node = self._named.get(used)
+            if node is None:
                 raise self._error(f"{used!r} is used before it is defined")
-            return Use(used)
+            return self._used(node, used)
         if token == "DEF":
             name = self._new_name()
-            if name in self._named:
-                raise self._error(f"{name!r} is defined twice")
-            self._named[name] = None
+            self._define(name)
             token = self._take()
-        kinds = FIELDS.get(token)
+        kinds = self.fields.get(token)
         if kinds is None:
-            raise self._error(f"{token!r} is no node that is understood")
+            node = self._unknown(token, name)
+            if name is not None:
+                self._named[name] = node
+            return node
         self._expect("{")
         fields: dict[str, Value] = {}
         while self._ahead != "}":
             field = self._take()
             if field not in kinds:
-                raise self._error(f"{token} has no field {field!r}")
+                self._stray(token, field)
+                continue
             if field in fields:
                 raise self._error(f"the field {field} stands twice in one {token}")
             fields[field] = self._value(kinds[field], depth)
@@ -199,6 +217,22 @@ class _Reader:
         if name is not None:
             self._named[name] = node
         return node
+
+    def _define(self, name: str) -> None:
+        if name in self._named:
+            raise self._error(f"{name!r} is defined twice")
+        self._named[name] = None
+
+    def _used(self, _node: Node, name: str) -> Node | Use:
+        return Use(name)
+
+    def _unknown(self, kind: str, _name: str | None) -> Node:
+        """A node that is not in the table."""
+        raise self._error(f"{kind!r} is no node that is understood")
+
+    def _stray(self, kind: str, field: str) -> None:
+        """What stands where a node of that kind would have a field."""
+        raise self._error(f"{kind} has no field {field!r}")
 
     def _value(self, kind: Type, depth: int) -> Value:
         match kind:
@@ -218,7 +252,8 @@ class _Reader:
             case Type.INT:
                 return self._integer()
             case Type.INT_LIST:
-                return tuple(self._items(self._integer))
+                whole = self._row(_INTEGERS, int)
+                return tuple(self._items(self._integer)) if whole is None else whole
         width = WIDTHS[kind]
         if kind not in LISTS:
             row = tuple(self._float() for _ in range(width))
@@ -226,7 +261,9 @@ class _Reader:
         # One value of a list may stand without brackets.
         if self._ahead != "[":
             return tuple(self._float() for _ in range(width))
-        numbers = tuple(self._items(self._float))
+        numbers = self._row(_NUMBERS, float)
+        if numbers is None:
+            numbers = tuple(self._items(self._float))
         if len(numbers) % width:
             raise self._error(f"{len(numbers)} numbers are no rows of {width}")
         return numbers
@@ -239,6 +276,22 @@ class _Reader:
         while self._ahead != "]":
             yield one()
         self._take()
+
+    def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...] | None:
+        """A list that holds plain numbers alone, at once; None if it is not that simple."""
+        if self._ahead != "[":
+            return None
+        end = self._text.find("]", self._next)
+        plain = self._text[self._next : end].replace(",", " ")
+        if end < 0 or not pattern.fullmatch(plain):
+            return None
+        numbers = tuple(map(one, plain.split()))
+        if not all(map(math.isfinite, numbers)):
+            return None
+        self._next = end
+        self._take()
+        self._take()
+        return numbers
 
     def _string(self) -> str:
         token = self._take()

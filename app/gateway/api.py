@@ -20,10 +20,9 @@ from app.gateway import program
 from app.gateway.desk import Desk
 from app.gateway.door import Door, Visitor
 from app.gateway.hub import Hub, Window, key_of
+from app.gateway.uploads import ROOT, Uploads, body_of
 
 log = logging.getLogger(__name__)
-
-ROOT = f"/api/v{requests.VERSION}"
 
 QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "links")
 """Each is a path of its own."""
@@ -41,6 +40,7 @@ class Api:
         self._hub = hub
         self._door = door
         self._desk = Desk(hub)
+        self._uploads = Uploads(hub, self._visitor)
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
     def routes(self) -> list[BaseRoute]:
@@ -56,6 +56,7 @@ class Api:
             *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
             Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
             Route(f"{ROOT}/do", self._do, methods=["POST"]),
+            *self._uploads.routes(),
             Route(f"{ROOT}/openapi.json", described),
             WebSocketRoute(f"{ROOT}/socket", socket),
         ]
@@ -126,16 +127,6 @@ class Api:
     def _forget(self, key: str) -> None:
         window, _ = self._posting.pop(key)
         self._hub.leave(window, for_good=True)
-
-
-async def body_of(request: Request, largest: int) -> bytes:
-    """What is sent by POST, at most ``largest`` bytes."""
-    body = b""
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > largest:
-            raise HTTPException(413, "That is too long.")
-    return body
 
 
 def _json(answer: answers.Answer, status: int = 200) -> Response:

@@ -7,10 +7,9 @@ import numpy as np
 
 from app.api import answers, requests
 from app.control import commands as cmd
-from app.control.things import MOST, Form, Thing
-from app.errors import InputError
 from app.gateway import tell
 from app.gateway.hub import Hub, Window
+from app.gateway.placing import Placing
 from app.geometry import se3
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
@@ -31,6 +30,7 @@ class Desk:
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
+        self._placing = Placing(hub)
 
     def do(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life."""
@@ -103,56 +103,19 @@ class Desk:
                 return cmd.TurnTool(pitch, roll)
             case requests.Gripper(angle=angle):
                 return cmd.SetGripper(angle)
-            case requests.Place():
-                return cmd.Place(self._thing(request))
-            case requests.Fill(ml=ml):
-                return cmd.Fill(1e-6 * ml)
-            case requests.Remove(name=name):
-                self._out_of_the_hand(name)
-                return cmd.Remove(name)
             case requests.Tool(name=name):
                 return cmd.SetTool(name)
             case requests.Read(reading=reading):
                 return cmd.SetReading(reading)
             case requests.Branch(shoulder=shoulder, elbow=elbow):
                 return cmd.TakeBranch(Branch(shoulder, elbow))
-        return None
+        return self._placing.command(request)
 
     def _setting(self, asked: requests.Set) -> cmd.Command:
         """What sets fields of the VRML world, all at once."""
         arm = self._hub.present()
         first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
         return arm.nodes.command(arm.state, (first, *asked.more))
-
-    def _thing(self, asked: requests.Place) -> Thing:
-        """What is to be put where; what is not said of it stays as it is."""
-        T = np.array(asked.T)
-        if asked.frame is requests.Frame.SHOULDER:
-            T = self._hub.present().robot.T_base_shoulder @ T
-        known = self._out_of_the_hand(asked.name)
-        form = None if known is None else known.form
-        size = None if known is None else known.size
-        if asked.form is not None:
-            form = Form(asked.form.value)
-        if asked.size is not None:
-            size = tuple(asked.size)
-        if form is None or size is None:
-            raise InputError(f"There is no {asked.name!r} yet: say its form and size.")
-        if known is None and len(self._hub.present().state.things) >= MOST:
-            raise InputError(f"There are {MOST} things already: take one away.")
-        held = known is not None and known.can_be_held
-        can_be_held = held if asked.can_be_held is None else asked.can_be_held
-        return Thing(asked.name, form, size, T, can_be_held)
-
-    def _out_of_the_hand(self, name: str) -> Thing | None:
-        """The thing of that name, if there is one. Raises InputError when it is held."""
-        arm = self._hub.present()
-        if any(part.name == name for part in arm.robot.bodies) or name == "table":
-            raise InputError(f"{name!r} is no thing that can be put elsewhere.")
-        known = next((each for each in arm.state.things if each.name == name), None)
-        if known is not None and known.held:
-            raise InputError(f"{name!r} is held: open the gripper first.")
-        return known
 
     def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
         """(4, 4) from ``frame`` into {S}."""

@@ -18,6 +18,7 @@ import viser
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from app.errors import ConfigurationError
+from app.exchange.meshes import Meshes
 from app.gateway.access import AccessFile
 from app.gateway.application import application
 from app.gateway.door import LOOPBACK_NAMES, Address, Door, public_origin
@@ -45,9 +46,14 @@ class Gateway:
     """Owns the port, and viser behind it."""
 
     def __init__(
-        self, settings: Settings, listening: socket.socket, lines: socket.socket | None = None
+        self,
+        settings: Settings,
+        listening: socket.socket,
+        lines: socket.socket | None = None,
+        meshes: Meshes | None = None,
     ) -> None:
         """``listening``: the port; ``lines``: that for programs which speak JSON lines.
+        ``meshes``: those that things are of, where uploaded ones are kept too.
 
         Raises ConfigurationError when it must not be served there as ``settings`` say.
         """
@@ -61,7 +67,7 @@ class Gateway:
             self.viser: viser.ViserServer = open_server(key)
             self.port: int = self._listening.getsockname()[1]
             self.address = _address(settings, self._listening)
-            self._hub = Hub(time.monotonic, settings.silence)
+            self._hub = Hub(time.monotonic, settings.silence, meshes)
             self.steering = Steering(self._hub.performer, lambda: self._loop)
             door = Door(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)

@@ -23,10 +23,12 @@ from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import LeaseError
 from app.exchange.machine import Machine
+from app.exchange.meshes import Meshes
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
 from app.gateway.nodes import Nodes
 from app.gateway.performer import Performer
+from app.gateway.scenes import Scenes
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.programs.bench import Rig
@@ -135,8 +137,14 @@ class Window:
 class Hub:
     """The one place where it is decided who may move the arm. Times are in seconds."""
 
-    def __init__(self, clock: Callable[[], float], hold_after: float = Settings.silence) -> None:
-        """``hold_after``: silence of whoever drives [s] that stops an arm that moves."""
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        hold_after: float = Settings.silence,
+        meshes: Meshes | None = None,
+    ) -> None:
+        """``hold_after``: silence of whoever drives [s] that stops an arm that moves. ``meshes``:
+        those there are at first."""
         self.clock = clock
         self._hold_after = hold_after
         self.lease = Lease()
@@ -145,6 +153,8 @@ class Hub:
         """None until the arm is there."""
         self.journal = Journal()
         self.performer = Performer(self)
+        self.meshes = Meshes() if meshes is None else meshes
+        self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}

@@ -12,6 +12,7 @@ from app.control.choices import Choice
 from app.control.grip import touching
 from app.control.margins import Margins
 from app.control.pouring import Pouring
+from app.control.solid import Colour
 from app.exchange.machine import Machine
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
@@ -205,10 +206,22 @@ def things(hub: Hub) -> answers.Things:
                 T=arm.surroundings.pose(each, x).tolist(),
                 can_be_held=each.can_be_held,
                 held=each.held,
+                mesh=None if each.solid is None else each.solid.key,
+                scale=each.scale,
+                colour=None if each.look.colour is None else hexadecimal(each.look.colour),
+                opacity=each.look.opacity,
+                hidden=each.look.hidden,
+                fixed=each.fixed,
             )
             for each in now.things
         ]
     )
+
+
+def hexadecimal(colour: Colour) -> str:
+    """As "#94a3b8"."""
+    red, green, blue = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def loop(lateness: Lateness) -> answers.Loop:

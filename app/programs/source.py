@@ -81,13 +81,16 @@ class Value:
         )
 
 
-def read(text: str) -> Value:
-    """The one value that `text` is. Raises ScriptError with its place for what it cannot be."""
+def read(text: str, what: str = "script") -> Value:
+    """The one value that `text` is. Raises ScriptError with its place for what it cannot be.
+
+    ``what``: how a person calls it.
+    """
     if len(text.encode("utf-8", "replace")) > LARGEST:
-        raise ScriptError((Problem(1, 1, f"A script has at most {LARGEST // 1024} KB."),))
+        raise ScriptError((Problem(1, 1, f"A {what} has at most {LARGEST // 1024} KB."),))
     try:
         # Read event by event first: composing recurses, and takes anchors for values.
-        _check_bounds(text)
+        _check_bounds(text, what)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -100,11 +103,11 @@ def read(text: str) -> Value:
         line = text[: getattr(error, "position", 0) or 0].count("\n") + 1
         raise ScriptError((Problem(line, 1, f"This cannot be read: {said}."),)) from error
     if node is None:
-        raise ScriptError((Problem(1, 1, "The script is empty; give it `steps:`."),))
+        raise ScriptError((Problem(1, 1, f"The {what} is empty."),))
     return _value(node)
 
 
-def _check_bounds(text: str) -> None:
+def _check_bounds(text: str, what: str) -> None:
     depth = 0
     for count, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
         said = ""
@@ -113,13 +116,13 @@ def _check_bounds(text: str) -> None:
         elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
             depth -= 1
         if getattr(event, "anchor", None) is not None:
-            said = "Anchors and aliases (& and *) are not understood; name poses in `poses:`."
+            said = "Anchors and aliases (& and *) are not understood; say it in full."
         elif getattr(event, "tag", None) is not None:
-            said = "Tags (!) are not understood: a script is plain data."
+            said = f"Tags (!) are not understood: a {what} is plain data."
         elif depth > DEEPEST:
             said = f"This is more than {DEEPEST} levels deep."
         elif count > MOST_VALUES:
-            said = f"A script holds at most {MOST_VALUES} values."
+            said = f"A {what} holds at most {MOST_VALUES} values."
         if said:
             raise ScriptError((Problem(*_place(event.start_mark), said),))
 

@@ -9,7 +9,8 @@ from typing import Self
 import numpy as np
 
 from app.control import commands as cmd
-from app.control.things import Form, Thing
+from app.control.room import girth
+from app.control.things import Thing
 from app.errors import InputError
 from app.geometry import se3
 from app.programs import fields as read
@@ -18,9 +19,6 @@ from app.programs.fields import Fields
 from app.programs.order import Filling, Putting
 from app.programs.setting import Setting
 from app.programs.source import Value
-
-ROUND = {Form.BOX: 0.71, Form.CYLINDER: 1.0, Form.SPHERE: 1.0}
-"""Of the largest side or the radius, how far a form reaches from its middle."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class Put:
 
     def lay(self, bench: Bench) -> None:
         thing = bench.thing(self.name)
-        if thing.held:
+        if thing.carried:
             raise InputError(f"{self.name} is in the hand: set it down first.")
         T = se3.from_rotation_translation(thing.T[:3, :3], (self.x, self.y, 0.0))
         put = replace(thing, T=T)
@@ -83,4 +81,4 @@ def _is_put(step: object) -> bool:
 def _overlap(one: Thing, other: Thing) -> bool:
     """Whether two things on the table are in each other, taken for round."""
     apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
-    return apart < max(one.size[:2]) * ROUND[one.form] + max(other.size[:2]) * ROUND[other.form]
+    return apart < girth(one) + girth(other)

@@ -74,6 +74,8 @@ class Stage:
         x = np.append(state.q, state.gripper)
         found = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
         for thing in state.things:
+            if thing.look.hidden:
+                continue
             T = self._session.surroundings.pose(thing, x)
             shapes = self._known.get(thing.name) or (_plain(thing),)
             found += [Item(thing.name, shape, T) for shape in shapes]
@@ -139,7 +141,8 @@ def _in_file(path: Path) -> Sequence[Shape]:
 
 
 def _plain(thing: Thing) -> Shape:
-    colour = COLOUR[0] / 255.0, COLOUR[1] / 255.0, COLOUR[2] / 255.0
+    red, green, blue = thing.look.colour or COLOUR
+    colour = red / 255.0, green / 255.0, blue / 255.0
     made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), form(thing), COLOUR)
     (shape,) = shapes_of(made)
     return Shape(Material("plain", colour), shape.vertices, shape.normals, shape.faces)

@@ -75,14 +75,18 @@ def standing_around(props: Props) -> tuple[Part, ...]:
     return (table(), *(obstacle(each.name, each.T_shape, each.shape) for each in things))
 
 
-def hand_of(model: RobotModel, world: World) -> Hand | None:
-    """The fingers and what they hang on; None for an arm without."""
+def hand_of(model: RobotModel, world: World) -> Hand:
+    """The fingers and what they hang on; without any, what the last joint turns."""
     driven = {body.name for body in model.bodies if body.joint in model.fingers}
     fingers = [part for part in world.parts if part.name in driven]
-    if not fingers:
-        return None
-    palm = int(world.linkage.parent[fingers[0].mover])
-    return Hand(palm, tuple(part.name for part in fingers))
+    if fingers:
+        palm = int(world.linkage.parent[fingers[0].mover])
+    else:
+        palm = int(np.flatnonzero(world.linkage.variable == model.arm.chain.n - 1)[-1])
+    chain = model.arm.chain
+    T_base_palm = world.linkage.poses(np.zeros(chain.n + 1))[palm]
+    T_palm_tool = se3.inverse(T_base_palm) @ model.T_base_shoulder @ chain.M
+    return Hand(palm, tuple(part.name for part in fingers), frozen(T_palm_tool))
 
 
 def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:

@@ -142,6 +142,10 @@ class Guard:
                 return None if value in handle.options else "that is no choice of the list"
             case viser.GuiSliderHandle() | viser.GuiNumberHandle():
                 return _range([value], [handle.min], [handle.max])
+            case viser.GuiRgbHandle():
+                if len(value) != 3:
+                    return "a colour has three numbers"
+                return _range(value, [0] * 3, [255] * 3)
             case viser.GuiVector3Handle():
                 if len(value) != 3:
                     return "a vector has three numbers"

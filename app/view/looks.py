@@ -57,7 +57,7 @@ def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
     handles = gui.add_checkbox(
         "Handles on things",
         initial_value=False,
-        hint="Arrows by which cup and basin can be put elsewhere on the table",
+        hint="Arrows by which cup, basin and objects can be put elsewhere on the table",
     )
     handles.on_update(lambda _: shows.handles(handles.value))
     cloud = shows.reachability

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from app.control.commands import Command
 from app.control.session import Session
 from app.control.state import State
+from app.exchange.meshes import Meshes
 from app.robot.model import RobotModel
 from app.robot.props import load_props
 from app.view.scenery import Scenery
@@ -28,7 +29,7 @@ def recorded(
     # Nobody is let in: the server is there for what it would send.
     server = open_server(secrets.token_hex())
     try:
-        scenery = Scenery(server, model, session, load_props(), _ignore)
+        scenery = Scenery(server, model, session, load_props(), _ignore, Meshes())
         traces = Traces(server, model)
         recording = server.get_scene_serializer()
         for number, state in enumerate(states):

@@ -9,6 +9,7 @@ import viser
 from app.control.commands import Command
 from app.control.session import Session
 from app.control.state import State
+from app.exchange.meshes import Meshes
 from app.robot.model import RobotModel
 from app.robot.props import Props
 from app.view.conduit import Conduits
@@ -30,14 +31,16 @@ class Scenery:
         session: Session,
         props: Props,
         put: Callable[[Command], None],
+        meshes: Meshes,
     ) -> None:
-        """``session``: knows where things are. ``put``: takes what is done with their handles."""
+        """``session``: knows where things are. ``put``: takes what is done with their handles.
+        ``meshes``: those that things are of."""
         self._server = server
         self._model = model
         self._session = session
         furnish(server)
         Workcell(server, props)
-        self.things = ThingNodes(server, props, session.surroundings, put)
+        self.things = ThingNodes(server, props, session.surroundings, put, meshes)
         self.arm = ArmNodes(server, model)
         self._conduits = Conduits(server, model, self.arm)
         # Made when there is water.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, field
 
 import numpy as np
 import viser
@@ -11,6 +12,7 @@ from app.control.commands import Command
 from app.control.session import Session
 from app.control.state import PoseTarget, State, Status, ToolTarget
 from app.errors import InputError
+from app.exchange.meshes import Meshes
 from app.exchange.reachability_file import StoredMap
 from app.exchange.scripts import Scripts
 from app.geometry.arrays import FloatArray
@@ -24,6 +26,7 @@ from app.view.ellipsoid import Ellipsoid
 from app.view.follower import Follower
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
+from app.view.objects import ObjectsPanel
 from app.view.paint import PaintNodes
 from app.view.panel import Panel
 from app.view.programs import ProgramsPanel, Steering
@@ -49,6 +52,19 @@ GHOST_FROM = np.deg2rad(0.2)
 """[rad] The ghost shows while a joint is farther than this from its goal."""
 
 
+@dataclass(frozen=True)
+class Besides:
+    """What is shown besides the arm.
+
+    workspace: a map of it. programs: who runs them, and which there are. meshes: those that things
+    are of.
+    """
+
+    workspace: StoredMap | None = None
+    programs: tuple[Steering, Scripts] | None = None
+    meshes: Meshes = field(default_factory=Meshes)
+
+
 class View(Follower):
     """Shows each new snapshot to every browser; hands what people do to the mailbox."""
 
@@ -60,30 +76,32 @@ class View(Follower):
         mailbox: CommandSink,
         session: Session,
         frame_rate: float,
-        stored: StoredMap | None = None,
-        programs: tuple[Steering, Scripts] | None = None,
+        besides: Besides | None = None,
     ) -> None:
         """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
-        second [Hz]. ``stored``: a workspace that can be shown. ``programs``: who runs them, and
-        which there are.
+        second [Hz].
 
         Raises ConfigurationError for the map of another arm.
         """
         super().__init__(server, board, frame_rate)
+        besides = Besides() if besides is None else besides
         self._model = model
         self._mailbox = mailbox
         props = load_props()
-        self._scenery = Scenery(server, model, session, props, self._put_from_gizmo)
+        self._scenery = Scenery(server, model, session, props, self._put_from_gizmo, besides.meshes)
         state = board.snapshot.state
-        arm, things = self._scenery.arm, self._scenery.things
-        self._paint = PaintNodes(server, arm, things, session.surroundings)
-        self._tint = Tint(server, model, arm.path, props)
+        self._paint = PaintNodes(server, self._scenery.arm)
+        self._tint = Tint(server, model, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._traces = Traces(server, model)
         self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
-        cloud = None if stored is None else ReachabilityCloud(server, model, stored)
+        cloud = (
+            None
+            if besides.workspace is None
+            else ReachabilityCloud(server, model, besides.workspace)
+        )
         self._cameras = Cameras(server, model)
         shows = Shows(
             self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, cloud
@@ -92,9 +110,10 @@ class View(Follower):
         self._tool = ""
         self._T_base_goal = np.eye(4)
         self._panel = Panel(server, model, mailbox.put, session.choices, shows, state)
+        self._objects = ObjectsPanel(server, mailbox.put, lambda: board.snapshot.state)
         self._programs: ProgramsPanel | None = None
-        if programs is not None:
-            steering, scripts = programs
+        if besides.programs is not None:
+            steering, scripts = besides.programs
             self._programs = ProgramsPanel(
                 server, model, steering, scripts, lambda: board.snapshot.state
             )
@@ -129,12 +148,9 @@ class View(Follower):
             self._ellipsoid.follow(state)
             self._traces.follow(state)
             self._cameras.follow(state)
-            self._panel.follow(
-                state,
-                time.perf_counter(),
-                self._board.ledger,
-                caught_up=snapshot.ticket == self._mailbox.last_ticket,
-            )
+            caught_up = snapshot.ticket == self._mailbox.last_ticket
+            self._panel.follow(state, time.perf_counter(), self._board.ledger, caught_up=caught_up)
+            self._objects.follow(state, caught_up=caught_up)
             if self._programs is not None:
                 self._programs.follow()
         self._server.flush()

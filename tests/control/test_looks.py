@@ -13,6 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.control import commands as cmd
+from app.control import solid
+from app.control.aims import PAINT, look_of
 from app.control.looks import AS_MADE, MOST, Choice, Look, Looks, Trait
 from app.control.session import Session
 from app.control.things import Form, Thing
@@ -107,7 +109,7 @@ def test_a_stop_lets_parts_be_painted_and_no_joint_be_moved(session: Session) ->
     said = cmd.Together((cmd.SetAxes(((0, 0.5),)), cmd.Dress("cup", Trait.CHOICE, -1)))
     state = session.step(state, [said], 0.02)
     np.testing.assert_array_equal(state.goal, session.ready)
-    assert state.looks.of("cup").choice is Choice.HIDDEN
+    assert look_of(state, "cup").choice is Choice.HIDDEN
 
 
 def test_a_thing_is_shifted_by_halves_and_takes_its_paint_with_it_when_it_goes(
@@ -133,6 +135,19 @@ def test_a_thing_is_shifted_by_halves_and_takes_its_paint_with_it_when_it_goes(
     held = replace(state, things=(replace(thing, held=True),))
     moved = session.step(held, [cmd.Shift("cube", position=np.zeros(3))], 0.02)
     np.testing.assert_array_equal(moved.things[0].T, thing.T)
+    assert thing.look == solid.Look((0, 0, 255))
+    assert look_of(state, "cube") == Look(Choice.PAINTED, (0.0, 0.0, 1.0))
+    for trait, value, look in (
+        (Trait.TRANSPARENCY, 0.4, solid.Look((0, 0, 255), 0.6)),
+        (Trait.CHOICE, -1, solid.Look((0, 0, 255), 0.6, hidden=True)),
+        (Trait.CHOICE, 1, solid.Look((0, 0, 255), 0.6)),
+        (Trait.TRANSPARENCY, 1.0, solid.Look((0, 0, 255), solid.FAINTEST)),
+        (Trait.CHOICE, 0, solid.PLAIN),
+        (Trait.CHOICE, 1, solid.Look(PAINT)),
+        (Trait.COLOUR, None, solid.PLAIN),
+    ):
+        state = session.step(state, [cmd.Dress("cube", trait, value)], 0.02)
+        assert state.things[0].look == look
     gone = session.step(state, [cmd.Remove("cube")], 0.02)
     assert (gone.things, gone.looks) == ((), Looks())
     for bad in ({"position": np.array((0.0, 0.0, 9.0))}, {"R": np.ones((3, 3))}):

@@ -15,7 +15,7 @@ import pytest
 
 from app.api import answers, requests
 from app.client import Client, connect
-from app.client.asynchronous import LostError
+from app.client.files import LostError
 from app.errors import KatanaError
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
 

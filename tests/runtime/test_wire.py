@@ -11,6 +11,7 @@ from app.control.arm import Arm
 from app.control.following import Following
 from app.control.plans import plan_to
 from app.control.session import Session
+from app.control.solid import Solid
 from app.planning.plan import Plan
 from app.runtime.wire import KEPT_HERE, Names, Plans
 
@@ -46,3 +47,25 @@ def test_old_ones_are_forgotten(plan: Plan) -> None:
         names.note(number, one)
     assert plans.loaded(names.dumped(each[-1])) is each[-1]
     assert plans.loaded(names.dumped(each[0])) is not each[0]
+
+
+def solid(key: str) -> Solid:
+    return Solid(key, (1.0, 1.0, 1.0), np.random.default_rng(1).normal(size=(64, 3)))
+
+
+def test_a_solid_goes_whole_once_and_then_as_its_key() -> None:
+    names, plans = Names(), Plans()
+    one, other = solid("one"), solid("other")
+    first = plans.loaded(names.dumped([one, other, one]))
+    assert [each.key for each in first] == ["one", "other", "one"]
+    assert first[0] is first[2]
+    np.testing.assert_array_equal(first[1].corners, other.corners)
+    data = names.dumped([other, one])
+    assert len(data) < 200 < len(pickle.dumps(one))
+    again = plans.loaded(data)
+    assert again == [first[1], first[0]]
+    # One that was away comes whole again, so that neither end remembers without end.
+    plans.loaded(names.dumped([one]))
+    (back,) = plans.loaded(names.dumped([other]))
+    np.testing.assert_array_equal(back.corners, other.corners)
+    assert back.size == other.size

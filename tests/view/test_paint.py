@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import viser
 
@@ -12,32 +11,24 @@ from app.control.looks import Looks, Trait
 from app.control.session import Session
 from app.control.state import State
 from app.exchange.urdf_mechanism import load_mechanism
-from app.geometry import se3, so3
-from app.robot.collision import things_of
 from app.robot.model import RobotModel
-from app.robot.props import load_props
 from app.view.paint import PaintNodes
 from app.view.scene import ArmNodes
-from app.view.things import ThingNodes
 from robot_description import URDF_PATH
 
 
 class Shown:
-    """A scene of arm, things and paint."""
+    """A scene of arm and paint."""
 
     def __init__(self, server: viser.ViserServer, model: RobotModel, session: Session) -> None:
-        props = load_props()
-        around = session.surroundings
         self.server = server
         self.arm = ArmNodes(server, model)
-        self.things = ThingNodes(server, props, around, lambda _: None)
-        self.paint = PaintNodes(server, self.arm, self.things, around)
-        self.state = replace(session.begin(session.ready, 0.0, 0.0), things=things_of(props))
+        self.paint = PaintNodes(server, self.arm)
+        self.state = session.begin(session.ready, 0.0, 0.0)
         self.show()
 
     def show(self, **changes: object) -> State:
         self.state = replace(self.state, **changes)  # type: ignore[arg-type]
-        self.things.follow(self.state)
         self.paint.follow(self.state)
         return self.state
 
@@ -82,25 +73,3 @@ def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
     shown.show(looks=Looks())
     assert [shape.visible for shape in shown.arm.shapes["pan_link"]] == made
     assert shown.painted() == {}
-
-
-def test_a_painted_thing_goes_where_the_thing_goes(shown: Shown) -> None:
-    shown.show(looks=Looks().having("cup", Trait.COLOUR, (0.0, 1.0, 0.0)))
-    ((name, colour),) = shown.painted().items()
-    assert colour == (0, 255, 0)
-    assert not shown.things.node("cup").visible
-    T = se3.from_rotation_translation(so3.rotation_z(0.7), (0.3, -0.2, 0.0))
-    things = tuple(
-        replace(each, T=T) if each.name == "cup" else each for each in shown.state.things
-    )
-    shown.show(things=things)
-    carrier = shown.server.scene._handle_from_node_name[name.removesuffix("/shape")]
-    np.testing.assert_allclose(carrier.position, T[:3, 3], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(so3.from_quaternion(carrier.wxyz), T[:3, :3], rtol=0, atol=1e-12)
-    assert not shown.things.node("cup").visible
-    left = tuple(each for each in things if each.name != "cup")
-    shown.show(things=left, looks=Looks())
-    assert shown.painted() == {}
-    assert not shown.things.node("cup").visible
-    shown.show(things=things)
-    assert shown.things.node("cup").visible

@@ -1,0 +1,134 @@
+"""Files over HTTP: meshes and scenes, read off the thread that everybody is served by."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from app.api import answers, requests
+from app.errors import InputError, LeaseError
+from app.exchange.meshes import read_mesh
+from app.exchange.scene_file import LARGEST_ZIP, read_scene_zip
+from app.exchange.shape_file import LONGEST_NAME, MOST_BYTES
+from app.gateway.bucket import Bucket
+from app.gateway.door import Visitor
+from app.gateway.hub import Hub
+
+ROOT = f"/api/v{requests.VERSION}"
+
+RATE, AT_ONCE = 0.5, 10.0
+"""Files a second, and at once, of everybody together."""
+
+WAITING = 4
+"""Files that are read or wait for it."""
+
+PATIENCE = 60.0
+"""[s] Until a file is here and read, whoever sends it slowly."""
+
+NOT_ALLOWED, TOO_SLOW, NOT_NOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 403, 408, 409, 413, 422, 429
+
+T = TypeVar("T")
+
+
+class Uploads:
+    """The routes. What comes is kept for a while, and used by a request that names its key."""
+
+    def __init__(self, hub: Hub, visitor: Callable[[Request], Visitor]) -> None:
+        """``visitor``: who asks, or the HTTPException that turns them away."""
+        self._hub = hub
+        self._visitor = visitor
+        self._often = Bucket(RATE, AT_ONCE, hub.clock())
+        self._reading = asyncio.Lock()
+        self._waiting = 0
+
+    def routes(self) -> list[BaseRoute]:
+        """All of them."""
+        return [
+            Route(f"{ROOT}/mesh", self._mesh, methods=["POST"]),
+            Route(f"{ROOT}/scene", self._load, methods=["POST"]),
+            Route(f"{ROOT}/scene", self._save, methods=["GET"]),
+        ]
+
+    async def _mesh(self, request: Request) -> Response:
+        query = request.query_params
+        name, unit, format = query.get("name", ""), query.get("unit"), query.get("format")
+        if format and not name.lower().endswith(f".{format}"):
+            name = f"{name or 'shape'}.{format}"
+
+        async def keep() -> answers.Answer:
+            if len(name) > 4 * LONGEST_NAME:
+                raise InputError("The name of the file is too long.")
+            data = await body_of(request, MOST_BYTES)
+            mesh = await self._off(lambda: read_mesh(data, name, unit or None))
+            arm = self._hub.arm
+            return self._hub.scenes.keep_mesh(mesh, None if arm is None else arm.state)
+
+        return await self._answered(request, keep)
+
+    async def _load(self, request: Request) -> Response:
+        async def keep() -> answers.Answer:
+            arm = self._hub.present()
+            data = await body_of(request, LARGEST_ZIP)
+            hand = arm.surroundings.hand
+            T_palm_tool = None if hand is None else hand.T_palm_tool
+            stored = await self._off(lambda: read_scene_zip(data, T_palm_tool))
+            return self._hub.scenes.keep(data, stored, arm)
+
+        return await self._answered(request, keep)
+
+    async def _save(self, request: Request) -> Response:
+        self._visitor(request)
+        try:
+            arm = self._hub.present()
+            content = await asyncio.to_thread(self._hub.scenes.zipped, arm)
+        except (InputError, LeaseError) as error:
+            return _json(answers.Refused(why=str(error)), NOT_NOW)
+        headers = {"Content-Disposition": 'attachment; filename="scene.zip"'}
+        return Response(content, media_type="application/zip", headers=headers)
+
+    async def _answered(
+        self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
+    ) -> Response:
+        """What ``keep`` answers, for somebody who may drive, and not too often."""
+        if not self._visitor(request).role.may_drive:
+            raise HTTPException(NOT_ALLOWED, "You may watch, not bring anything.")
+        if self._waiting >= WAITING or not self._often.take(self._hub.clock()):
+            why = "Too many files at once. Wait a moment."
+            return _json(answers.Refused(why=why), TOO_MANY)
+        self._waiting += 1
+        try:
+            async with asyncio.timeout(PATIENCE):
+                return _json(await keep())
+        except TimeoutError:
+            return _json(answers.Refused(why=f"That took more than {PATIENCE:g} s."), TOO_SLOW)
+        except InputError as error:
+            return _json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
+        except LeaseError as error:
+            return _json(answers.Refused(why=str(error)), NOT_NOW)
+        finally:
+            self._waiting -= 1
+
+    async def _off(self, read: Callable[[], T]) -> T:
+        """What ``read`` makes, one at a time: each may take a process and a gigabyte."""
+        async with self._reading:
+            return await asyncio.to_thread(read)
+
+
+async def body_of(request: Request, largest: int) -> bytes:
+    """What is sent by POST, at most ``largest`` bytes."""
+    body = bytearray()
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > largest:
+            raise HTTPException(TOO_LONG, "That is too long.")
+    return bytes(body)
+
+
+def _json(answer: answers.Answer, status: int = 200) -> Response:
+    return Response(answers.encoded(answer), status, media_type="application/json")

@@ -1,0 +1,89 @@
+// Objects of any shape: a file is read over there, told what it is, and stands before the arm.
+"use strict";
+const Objects = (() => {
+  const API = "api/v1/";
+  const byId = (id) => document.getElementById(id);
+  let say = () => {};
+  let file = null; // the last that was chosen
+  let placed = null; // and the name it stands under
+
+  function tell(words, bad) {
+    const line = byId("read");
+    line.textContent = words;
+    line.classList.toggle("bad", Boolean(bad));
+  }
+
+  // What is sent, and the answer; what is refused is told where it was asked.
+  async function ask(path, body) {
+    const busy = document.querySelectorAll("#objects button, #objects select");
+    for (const each of busy) each.disabled = true;
+    try {
+      const answer = await fetch(API + path, { method: "POST", body });
+      const text = await answer.text();
+      if (answer.ok) return JSON.parse(text);
+      tell(text.startsWith("{") ? JSON.parse(text).why : text, true);
+    } catch {
+      tell("The server cannot be reached.", true);
+    } finally {
+      for (const each of busy) each.disabled = false;
+    }
+    return null;
+  }
+
+  async function add(again) {
+    if (!file) return;
+    tell(`Reading ${file.name} …`);
+    const query = new URLSearchParams({ name: file.name });
+    if (byId("unit").value) query.set("unit", byId("unit").value);
+    const mesh = await ask(`mesh?${query}`, file);
+    if (!mesh) return;
+    // Another unit is for the object that stands there already.
+    placed = again && placed ? placed : mesh.name;
+    say({ do: "place", name: placed, form: "mesh", mesh: mesh.key });
+    tell(`${placed}: ${mesh.said}`);
+  }
+
+  async function load(scene) {
+    tell(`Reading ${scene.name} …`);
+    const answer = await ask("scene", scene);
+    if (!answer) return;
+    say({ do: "load", scene: answer.key });
+    tell(answer.said);
+  }
+
+  async function save() {
+    const answer = await fetch(`${API}scene`).catch(() => null);
+    if (!answer?.ok) return tell(answer ? (await answer.json()).why : "The server cannot be reached.", true);
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(await answer.blob());
+    link.download = "scene.zip";
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    tell("Saved: scene.zip holds scene.yaml and the files of its objects.");
+  }
+
+  function chosen(input, use) {
+    input.addEventListener("change", () => {
+      const [first] = input.files;
+      // So that the same file can be chosen again.
+      input.value = "";
+      if (first) use(first);
+    });
+  }
+
+  function begin(page) {
+    say = page.say;
+    byId("add").addEventListener("click", () => byId("object-file").click());
+    byId("load").addEventListener("click", () => byId("scene-file").click());
+    byId("save").addEventListener("click", save);
+    byId("unit").addEventListener("change", () => add(true));
+    chosen(byId("object-file"), (first) => {
+      file = first;
+      placed = null;
+      add(false);
+    });
+    chosen(byId("scene-file"), load);
+  }
+
+  return { begin };
+})();

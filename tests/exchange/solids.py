@@ -1,0 +1,39 @@
+"""Surfaces measured in another way than they are read."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import numpy.typing as npt
+
+from app.exchange.shape_file import ShapeFile
+
+Numbers = npt.NDArray[np.float64]
+
+
+def volume(shape: ShapeFile) -> float:
+    """[m^3] That it holds, by the divergence theorem; positive if its faces look outward."""
+    a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def sides(shape: ShapeFile) -> list[float]:
+    """[mm] Along x, y and z."""
+    return [float(side) for side in np.round(np.ptp(shape.vertices, axis=0) * 1e3, 3)]
+
+
+def is_closed(shape: ShapeFile) -> bool:
+    """Whether each edge is of one face in each direction."""
+    edges = Counter((int(face[i]), int(face[i - 2])) for face in shape.faces for i in range(3))
+    return all(edges[b, a] == count for (a, b), count in edges.items())
+
+
+def triangles(vertices: Numbers, faces: npt.NDArray[np.int64], digits: int) -> Counter[object]:
+    """Each by its corners, rounded, the least corner first."""
+    found: Counter[object] = Counter()
+    # Adding zero makes 0 of -0.
+    for corners in (np.round(vertices[faces], digits) + 0.0).tolist():
+        least = corners.index(min(corners))
+        found[str(corners[least:] + corners[:least])] += 1
+    return found

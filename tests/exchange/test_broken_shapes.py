@@ -1,0 +1,456 @@
+"""Files that are broken, hostile or of another kind: each is refused in words, or read well."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+import os
+import random
+import resource
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.errors import InputError
+from app.exchange.reading import bind
+from app.exchange.shape_file import (
+    LARGEST,
+    MEMORY,
+    SECONDS,
+    SMALLEST,
+    Format,
+    ShapeFile,
+    read_shape,
+    read_shape_guarded,
+)
+from app.exchange.surface import MOST_TRIANGLES
+from app.exchange.vrml_text import HEADER
+
+FOREIGN = Path(__file__).parent / "foreign"
+
+MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 60
+"""Of each seed."""
+
+PLY = """ply
+format ascii 1.0
+element vertex {vertices}
+property float x
+property float y
+property float z
+element face {faces}
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+{rest}"""
+
+
+def ply(rest: str = "3 0 1 2\n", vertices: object = 3, faces: object = 1) -> bytes:
+    return PLY.format(rest=rest, vertices=vertices, faces=faces).encode()
+
+
+PAINTED = (
+    ply()
+    .replace(
+        b"float z\n",
+        b"float z\n"
+        + b"".join(b"property uchar %s\n" % part for part in (b"red", b"green", b"blue")),
+    )
+    .replace(b" 0\n", b" 0 9 9 9\n")
+)
+
+
+def stl(count: int = 1, corners: tuple[float, ...] = (0, 0, 0, 1, 0, 0, 0, 1, 0)) -> bytes:
+    return bytes(80) + struct.pack("<I12fH", count, 0.0, 0.0, 1.0, *corners, 0)
+
+
+FACET = "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 {} 0 endloop endfacet"
+
+
+def gltf(**changes: Any) -> bytes:
+    """One triangle, with parts of the document replaced; None takes one away."""
+    numbers = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    } | changes
+    return glb(json.dumps(document).encode(), numbers)
+
+
+def glb(told: bytes, numbers: bytes) -> bytes:
+    told += b" " * (-len(told) % 4)
+    chunks = struct.pack("<I4s", len(told), b"JSON") + told
+    chunks += struct.pack("<I4s", len(numbers), b"BIN\0") + numbers
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def test_the_files_that_are_broken_below_are_read_when_they_are_not() -> None:
+    text = f"solid\n{FACET.format(1)}\nendsolid\n".encode()
+    cases = [(Format.PLY, ply()), (Format.STL, stl()), (Format.STL, text), (Format.GLB, gltf())]
+    for format, data in cases:
+        assert len(read_shape(data, format, "a").faces) == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "no STL file"),
+        (stl()[:-1], "says 1 triangles, which take 134 bytes, but has 133"),
+        (stl(2**31), "says 2147483648 triangles"),
+        (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.nan, 0)), "no finite numbers"),
+        (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.inf, 0)), "no finite numbers"),
+        (stl(corners=(0,) * 9), "has no triangles"),
+        (b"solid a\nendsolid a\n", "has no triangles"),
+        (f"solid\n{FACET.format(1)}\n".encode(), "line 3: the file ends before 'endsolid'"),
+        (f"solid\n\n{FACET.format(1)[:-9]}\nendsolid".encode(), "broken at line 3"),
+        (f"solid\n{FACET.format('x')}\nendsolid".encode(), "no numbers"),
+        (f"solid\n{FACET.format('nan')}\nendsolid".encode(), "no finite numbers"),
+        (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "no finite numbers"),
+        (f"solid\nsolid\n{FACET.format(1)}\nendsolid".encode(), "broken at line 2"),
+        (
+            bytes(80) + struct.pack("<I", MOST_TRIANGLES + 1) + bytes(50 * (MOST_TRIANGLES + 1)),
+            "more than 200000 triangles",
+        ),
+    ],
+)
+def test_no_stl(data: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(data, Format.STL, "a.stl")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "has no triangles"),
+        ("v 0 0 0\np 1\n", "has no triangles. It has points"),
+        ("v 1 2", "line 1: a vertex has three finite coordinates"),
+        ("v 1 2 nan", "three finite"),
+        ("v 1 2 1e999", "three finite"),
+        ("v a b c", "made of numbers"),
+        ("v 0 0 0\nf 1 2 3", "vertex 1, counted from 0, but only 1 vertices"),
+        ("v 0 0 0\nf 0 0 0", "line 2: there is no vertex 0"),
+        ("v 0 0 0\nf -2 -1 -1", "there is no vertex -2"),
+        ("v 0 0 0\nf 1 1 99999999999999999999999", "there is no vertex 9999"),
+        ("v 0 0 0 1 0 0\nf 1 2 3", "vertex 1, counted from 0"),
+        ("f 1/2/3 x/1/1", "'x/1/1' is no corner"),
+        ("hello", "line 1: 'hello' is no statement"),
+        ("v 0 0 0\n" + "f" + " 1" * 200_003, "more than 200000 triangles"),
+    ],
+)
+def test_no_obj(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(text.encode(), Format.OBJ, "a.obj")
+
+
+OBJ = (
+    b"mtllib ../../etc/passwd\no a\nv 0 0 0 1 0 0\nv 1 0 0 \\\n 1 0 0\nv 1 1 0 1 0 0\n"
+    b"f -3 -2 -1\nv 0 0 1\nvt 0 0\nvn 0 0 1\nusemtl gold\nf 1/1/1 2//1 3/1 -1 # four\r\nl 1 2\n"
+)
+
+
+def test_statements_of_obj() -> None:
+    shape = read_shape(OBJ, Format.OBJ, "a.obj")
+    assert (len(shape.vertices), len(shape.faces)) == (4, 3)
+    assert shape.said.endswith("Left out: materials, which are in another file, lines.")
+    assert shape.colours is not None
+    assert shape.colours[0].tolist() == [255, 0, 0, 255]
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "does not begin with 'ply'"),
+        (b"ply\n", "header does not end"),
+        (ply(vertices="x"), "'element vertex x' in its header is not understood"),
+        (ply(vertices=-3), "not understood"),
+        (ply().replace(b"float x", b"quad x"), "'property quad x'"),
+        (ply().replace(b"list uchar", b"list float"), "not understood"),
+        (ply().replace(b"ascii 1.0", b"ascii 2.0"), "not understood"),
+        (ply().replace(b"format ascii 1.0\n", b""), "tells no format"),
+        (ply().replace(b"float z", b"float w"), "no vertices with x, y and z"),
+        (ply(faces=0), "has no triangles"),
+        (ply(faces=2**31), "ends too early|no length"),
+        (ply(vertices=2**31), "ends too early"),
+        (ply("3 0 1 3\n"), "vertex 3, counted from 0, but only 3 vertices"),
+        (ply("3 0 1 -1\n"), "vertex -1"),
+        (PAINTED.replace(b"3 0 1 2", b"3 0 1 9"), "vertex 9, counted from 0"),
+        (ply("4 0 1 2\n"), "ends too early|no length"),
+        (ply("-3 0 1 2\n"), "no length"),
+        (ply("3.5 0 1 2\n"), "no length"),
+        (ply("nan 0 1 2\n"), "no length"),
+        (ply("3 0 1 nan\n"), "vertex"),
+        (ply("3 0 1 1e999\n"), "vertex"),
+        (ply("3 0 1 x\n"), "broken"),
+        (ply().replace(b"0 1 0\n", b"0 inf 0\n"), "no finite numbers"),
+        (ply().replace(b"ascii", b"binary_little_endian"), "ends too early"),
+    ],
+)
+def test_no_ply(data: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(data, Format.PLY, "a.ply")
+
+
+def test_rows_of_ply_may_differ() -> None:
+    """Polygons of several sizes, text and binary, lists besides, and colours as numbers 0..1."""
+    header = ply(faces=2, vertices=4).decode().partition("0 0 0")[0]
+    header = header.replace("z\n", "z\nproperty float red\nproperty float green\n")
+    header = header.replace("element face", "property float blue\nelement face")
+    header = header.replace("end_h", "property list uint8 float32 extra\nelement edge 1\n"
+                            "property int a\nend_h")  # fmt: skip
+    square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    text = "".join(f"{x} {y} {z} 1 .5 0\n" for x, y, z in square)
+    text += "4 0 1 2 3 0\n3 2 1 0 2 7 8\n5\n"
+    body = b"".join(struct.pack(">6f", *corner, 1.0, 0.5, 0.0) for corner in square)
+    body += struct.pack(">B4iB", 4, 0, 1, 2, 3, 0) + struct.pack(">B3iB2f", 3, 2, 1, 0, 2, 7, 8)
+    body += struct.pack(">i", 5)
+    binary = header.replace("ascii", "binary_big_endian").encode() + body
+    for data in ((header + text).encode(), binary):
+        shape = read_shape(data, Format.PLY, "a.ply")
+        assert shape.faces.shape == (3, 3)
+        assert shape.colours is not None
+        assert shape.colours[0].tolist() == [255, 128, 0, 255]
+        assert shape.said.endswith("Left out: 1 edge.")
+
+
+def deep(levels: int) -> bytes:
+    return b'{"asset": ' + b"[" * levels + b"]" * levels + b"}"
+
+
+ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "no glTF 2.0, or is broken"),
+        (b"glTF", "no GLB 2.0"),
+        (gltf()[:-4], "length is not what it says"),
+        (b"{", "broken"),
+        (deep(100_000), "broken"),
+        (gltf(asset=None), "Expected `object`, got `null` - at `\\$.asset`"),
+        (gltf(asset={"version": "1.0"}), "glTF 1.0"),
+        (gltf(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression"),
+        (gltf(buffers=[{"byteLength": 36, "uri": "/etc/passwd"}]), "'/etc/passwd'"),
+        (gltf(buffers=[{"byteLength": 36, "uri": "http://a/b"}]), "which is not opened"),
+        (gltf(buffers=[{"byteLength": 36, "uri": "data:;base64,@"}]), "no base64"),
+        (gltf(buffers=[{"byteLength": 37}]), "shorter than it says"),
+        (gltf(bufferViews=[{"buffer": 1, "byteLength": 36}]), "a part that it has not"),
+        (gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteOffset": 4}]), "beyond"),
+        (gltf(bufferViews=[{"buffer": 0, "byteLength": 36, "byteStride": 4}]), "beyond"),
+        (gltf(bufferViews=[{"buffer": -1, "byteLength": 36}]), "Expected `int` >= 0"),
+        (gltf(accessors=[ACCESSOR | {"count": 2**31}]), "beyond its buffer"),
+        (gltf(accessors=[ACCESSOR | {"count": 2**80}]), "broken"),
+        (gltf(accessors=[ACCESSOR | {"type": "VEC2"}]), "wrong type"),
+        (gltf(accessors=[ACCESSOR | {"componentType": 9}]), "wrong type"),
+        (gltf(accessors=[ACCESSOR | {"bufferView": None}]), "sparse or packed"),
+        (gltf(accessors=[ACCESSOR | {"sparse": {"count": 1}}]), "sparse or packed"),
+        (gltf(nodes=[{"mesh": 1}]), "a part that it has not"),
+        (gltf(nodes=[{"mesh": 0, "children": [0]}]), "hangs in two places"),
+        (gltf(nodes=[{"mesh": 0, "rotation": [0, 0, 0, 0]}]), "no finite place"),
+        (gltf(nodes=[{"mesh": 0, "matrix": [1e308] * 16}]), "no finite"),
+        (gltf(nodes=[{"mesh": 0, "scale": [1, 1]}]), "length 3"),
+        (gltf(scenes=[{"nodes": []}]), "has no triangles"),
+        (gltf(scene=7), "a part that it has not"),
+        (gltf(meshes=[{"primitives": [{"attributes": {}}]}]), "has no triangles"),
+        (
+            gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 1}]}]),
+            "It has lines and points",
+        ),
+        (
+            gltf(meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "indices": 0}]}]),
+            "wrong type",
+        ),
+    ],
+)
+def test_no_gltf(data: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(data, Format.GLB, "a.glb")
+
+
+@pytest.mark.parametrize(("mode", "faces"), [(4, 1), (5, 2), (6, 2)])
+def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], "<f4")
+    if mode == 6:
+        corners = corners[[0, 1, 3, 2]]
+    count = 3 if mode == 4 else 4
+    light = np.full((4, 4), 65535, "<u2")
+    light[:, 1] = 0
+    index = np.arange(count, dtype="u1")
+    data = corners.tobytes() + light.tobytes() + index.tobytes()
+    views = [(0, 48), (48, 32), (80, count)]
+    kinds = [(5126, "VEC3", 4), (5123, "VEC4", 4), (5121, "SCALAR", count)]
+    primitive = {
+        "attributes": {"POSITION": 0, "COLOR_0": 1},
+        "indices": 2,
+        "mode": mode,
+        "material": 0,
+    }
+    told = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": len(data)}],
+        "bufferViews": [{"buffer": 0, "byteOffset": a, "byteLength": n} for a, n in views],
+        "accessors": [
+            {"bufferView": i, "componentType": c, "type": t, "count": n, "normalized": i == 1}
+            for i, (c, t, n) in enumerate(kinds)
+        ],
+        "materials": [
+            {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 0, 0.5], "baseColorTexture": {}}}
+        ],
+        "meshes": [{"primitives": [primitive]}],
+        "nodes": [
+            {"children": [1], "translation": [0, 0, 0.5]},
+            {"mesh": 0, "scale": [1, -1, 1], "rotation": [0, 0, math.sqrt(0.5), math.sqrt(0.5)]},
+        ],
+        "animations": [{}],
+    }
+    shape = read_shape(glb(json.dumps(told).encode(), data), Format.GLB, "a.glb")
+    assert len(shape.faces) == faces
+    # Mirrored, turned by 90 degrees about its z, moved, then made upright: x, -z, y.
+    assert np.ptp(shape.vertices, axis=0).tolist() == pytest.approx([1.0, 0.0, 1.0])
+    assert shape.vertices[:, 1] == pytest.approx(-0.5)
+    a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
+    assert (np.cross(b - a, c - a)[:, 1] < 0.0).all()
+    assert shape.colours is not None
+    assert np.unique(shape.colours, axis=0).tolist() == [[188, 0, 0, 128]]
+    assert shape.said.endswith("Left out: pictures on the surface, motion.")
+
+
+NUMBERS = [b"nan", b"-1", b"1e999", b"2147483648", b"4294967295", b"9" * 30, b"[", b"}", b'"', b"0"]
+
+
+SEEDS = {
+    file: (FOREIGN / file).read_bytes()
+    for file in (
+        *("vtk.wrl", "castle.wrl", "meshlab.stl", "vtk.stl", "meshlab.obj", "vtk.ply"),
+        *("meshlab.ply", "assimp.glb", "vtk.gltf"),
+    )
+} | {"colours.obj": OBJ, "colours.ply": PAINTED}
+
+
+def mutated(data: bytes, chance: random.Random) -> bytes:
+    """With some bytes, pieces or numbers changed, or its end cut off."""
+    found = bytearray(data)
+    for _ in range(chance.randint(1, 4)):
+        at = chance.randrange(len(found))
+        piece = slice(at, at + chance.randint(1, 40))
+        match chance.randrange(7):
+            case 0:
+                found[at] ^= 1 << chance.randrange(8)
+            case 1:
+                found[at] = chance.choice((0, 1, 127, 128, 255))
+            case 2:
+                del found[at:]
+            case 3:
+                del found[piece]
+            case 4:
+                found[at:at] = found[piece] * chance.choice((1, 1, 1000))
+            case 5:
+                found[at : at + 4] = struct.pack("<I", chance.choice((0, 2**31, 2**32 - 1)))
+            case _:
+                found[at : at + chance.randrange(8)] = b" %s " % chance.choice(NUMBERS)
+        if not found:
+            break
+    return bytes(found)
+
+
+def looked_at(data: bytes, format: Format) -> ShapeFile | None:
+    """What is read; None where it is refused in a sentence. Anything else fails."""
+    try:
+        shape = read_shape(data, format, "fuzz.bin", 1e-3)
+    except InputError as error:
+        said = str(error)
+        assert said[0].isalnum()
+        assert said[-1] == "."
+        assert len(said) < 400
+        return None
+    assert np.isfinite(shape.vertices).all()
+    assert shape.faces.min() >= 0
+    assert shape.faces.max() == len(shape.vertices) - 1
+    assert shape.colours is None or shape.colours.shape == (len(shape.faces), 4)
+    assert SMALLEST <= np.ptp(shape.vertices, axis=0).max() <= LARGEST
+    return shape
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_mutated_files_are_read_or_refused(seed: str) -> None:
+    data, format = SEEDS[seed], Format.of(seed)
+    chance = random.Random(seed)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    read = 0
+    for _ in range(MUTATIONS):
+        start = time.process_time()
+        read += looked_at(mutated(data, chance), format) is not None
+        assert time.process_time() - start < SECONDS
+    assert read < MUTATIONS
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MEMORY
+
+
+@settings(max_examples=MUTATIONS, deadline=None)
+@given(st.sampled_from(Format), st.binary(max_size=200), st.integers(0, 150))
+def test_any_bytes_behind_any_beginning_are_read_or_refused(
+    format: Format, data: bytes, kept: int
+) -> None:
+    beginnings = {Format.WRL: "castle.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
+    beginning = beginnings.get(format, "meshlab.ply" if format is Format.PLY else "assimp.glb")
+    looked_at((FOREIGN / beginning).read_bytes()[:kept] + data, format)
+
+
+def deeply() -> bytes:
+    return f"{HEADER}\n{'Group { children ' * 500_000}".encode()
+
+
+def laughs() -> bytes:
+    rows = ["DEF n0 Shape { geometry Box { } }"]
+    rows += [f"DEF n{i} Group {{ children [ {f'USE n{i - 1} ' * 10} ] }}" for i in range(1, 30)]
+    return f"{HEADER}\n{' '.join(rows)}".encode()
+
+
+@pytest.mark.parametrize(
+    ("make", "format"),
+    [
+        (lambda: gzip.compress(f"{HEADER}\n".encode() + bytes(50_000_000), 1), Format.WRL),
+        (deeply, Format.WRL),
+        (laughs, Format.WRL),
+        (lambda: ply(faces=99_999_999_999), Format.PLY),
+        (lambda: ply("9" * 1_000_000 + " 1" * 1_000_000, faces=0), Format.PLY),
+    ],
+    ids=["bomb", "deep", "laughs", "faces", "wide"],
+)
+def test_hostile_files_end_in_words_in_time(make: Callable[[], bytes], format: Format) -> None:
+    data = make()
+    start = time.perf_counter()
+    with pytest.raises(InputError):
+        read_shape_guarded(data, format, "../../hostile\n.bin")
+    assert time.perf_counter() - start < SECONDS + 2.0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems count no address space")
+def test_a_reading_that_wants_more_memory_than_it_may_ends() -> None:
+    assert bind.__module__ == "app.exchange.reading"
+    words = "from app.exchange.reading import bind; bind(); bytearray({} << 20)"
+    for mebibytes, ends in ((2048, 1), (64, 0)):
+        done = subprocess.run(
+            [sys.executable, "-c", words.format(mebibytes)],
+            cwd=Path(__file__).parents[2],
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            capture_output=True,
+            check=False,
+        )
+        assert done.returncode == ends
+        assert (b"MemoryError" in done.stderr) == bool(ends)

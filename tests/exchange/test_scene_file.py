@@ -1,0 +1,309 @@
+"""Scenes as files: what is saved is what is loaded, and what is wrong is told where it is."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.control.solid import Look, Solid
+from app.control.things import Form, Thing
+from app.errors import InputError
+from app.exchange import scene_file
+from app.exchange.meshes import Mesh, Meshes, read_mesh
+from app.exchange.scene_file import (
+    StoredScene,
+    read_scene_folder,
+    read_scene_zip,
+    scene_zip,
+    write_scene_folder,
+)
+from app.exchange.shape_file import Format, Up
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray, frozen
+from app.scene.scene import MeshFile, Scene
+from app.scene.text import parsed, written
+
+T_PALM_TOOL = frozen(se3.from_rotation_translation(so3.exp((0.1, 0.2, 0.3)), (0.01, -0.02, 0.15)))
+NAMES = st.text(
+    st.characters(categories=("L", "N", "P", "S"), max_codepoint=0x2FFF), min_size=1, max_size=20
+).map(lambda text: f"a{text}")
+
+
+def ring() -> bytes:
+    content: bytes = trimesh.creation.torus(40.0, 12.0, 24, 12).export(file_type="stl")
+    return content
+
+
+@pytest.fixture(scope="module")
+def mesh() -> Mesh:
+    return read_mesh(ring(), "ring.stl")
+
+
+SOLID = Solid("ab12", (0.1, 0.2, 0.05), np.random.default_rng(3).normal(size=(20, 3)))
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> FloatArray:
+    p = draw(st.tuples(*(st.floats(-1.9, 1.9),) * 3))
+    w = draw(st.tuples(*(st.floats(-1.8, 1.8),) * 3))
+    return se3.from_rotation_translation(so3.exp(w), p)
+
+
+@st.composite
+def things(draw: st.DrawFn, name: str) -> Thing:
+    form = draw(st.sampled_from(Form))
+    colour = draw(st.none() | st.tuples(*(st.integers(0, 255),) * 3))
+    look = Look(colour, draw(st.floats(0.05, 1.0)), draw(st.booleans()))
+    size = draw(st.lists(st.floats(0.01, 1.0), min_size=form.numbers, max_size=form.numbers))
+    return Thing(
+        name,
+        form,
+        tuple(size),
+        draw(poses()),
+        draw(st.booleans()),
+        solid=SOLID if form is Form.MESH else None,
+        scale=draw(st.sampled_from((1.0, 0.5)) | st.floats(0.2, 1.9)),
+        look=look,
+        fixed=draw(st.booleans()),
+    )
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> Scene:
+    names = draw(st.lists(NAMES, max_size=5, unique=True))
+    joints = draw(st.none() | st.lists(st.floats(-3.0, 3.0), min_size=5, max_size=5))
+    return Scene(
+        tuple(draw(things(name)) for name in names),
+        draw(st.none() | st.floats(0.0, 2e-4)),
+        None if joints is None else np.array(joints),
+    )
+
+
+@given(scenes())
+@settings(max_examples=60, deadline=None)
+def test_what_is_written_is_read(scene: Scene) -> None:
+    """To a nanometre, and the text of that to the letter."""
+    file = MeshFile("meshes/it.stl", "mm", None, "0" * 64)
+    text = written(scene, {SOLID.key: file}, T_PALM_TOOL)
+    back = parsed(text).scene({file: SOLID}, T_PALM_TOOL)
+    assert written(back, {SOLID.key: file}, T_PALM_TOOL) == text
+    assert (back.water is None) == (scene.water is None)
+    assert (back.water or 0.0) == pytest.approx(scene.water or 0.0, abs=1e-12)
+    if scene.joints is not None:
+        assert back.joints is not None
+        np.testing.assert_allclose(back.joints, scene.joints, atol=1e-10)
+    assert len(back.things) == len(scene.things)
+    for one, other in zip(scene.things, back.things, strict=True):
+        np.testing.assert_allclose(other.T, one.T, atol=3e-9)
+        np.testing.assert_allclose(other.size, one.size, atol=1e-9)
+        assert other.scale == pytest.approx(one.scale, rel=1e-11)
+        assert other.look.opacity == pytest.approx(one.look.opacity, rel=1e-11)
+        for name in ("name", "form", "can_be_held", "fixed", "held"):
+            assert getattr(one, name) == getattr(other, name)
+        assert (other.look.colour, other.look.hidden) == (one.look.colour, one.look.hidden)
+        assert (other.solid is None) == (one.solid is None)
+
+
+def scene_of(mesh: Mesh) -> StoredScene:
+    T = se3.from_rotation_translation(so3.rotation_z(0.5), (0.4, 0.1, 0.0))
+    stands = Thing("ring", Form.MESH, (), T, solid=mesh.solid)
+    camera = Thing("camera", Form.MESH, (), np.eye(4), solid=mesh.solid, scale=0.3, fixed=True)
+    return StoredScene(Scene((stands, camera), None, np.zeros(5)), (mesh,))
+
+
+@pytest.mark.parametrize("kind", ["zip", "folder"])
+def test_a_scene_comes_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: Path) -> None:
+    stored = scene_of(mesh)
+    if kind == "zip":
+        data = scene_zip(stored, T_PALM_TOOL)
+        back = read_scene_zip(data, T_PALM_TOOL)
+        assert scene_zip(back, T_PALM_TOOL) == data
+    else:
+        write_scene_folder(tmp_path / "my.yaml", stored, T_PALM_TOOL)
+        assert sorted(p.name for p in tmp_path.rglob("*.*")) == ["my.yaml", "ring.stl"]
+        back = read_scene_folder(tmp_path / "my.yaml", T_PALM_TOOL)
+    (again,) = back.meshes
+    assert again.key == mesh.key
+    assert again.file == mesh.file
+    for one, other in zip(stored.scene.things, back.scene.things, strict=True):
+        np.testing.assert_allclose(other.T, one.T, atol=1e-9)
+        assert other.solid is not None
+        np.testing.assert_array_equal(other.solid.corners, mesh.solid.corners)
+
+
+def zipped(**files: bytes | str) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name.replace("__", "/").replace("_yaml", ".yaml"), content)
+    return out.getvalue()
+
+
+MESH = """\
+scene: 1
+things:
+- name: it
+  form: mesh
+  mesh: {{file: {file}}}
+  pose: [0, 0, 0, 0, 0, 0]
+"""
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["../ring.stl", "/etc/passwd", "a/../../ring.stl", "C:ring.stl", "..\\ring.stl", "'a\\0.stl'"],
+)
+def test_no_path_leads_out_of_a_scene(path: str, tmp_path: Path) -> None:
+    (tmp_path / "ring.stl").write_bytes(ring())
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "scene.yaml").write_text(MESH.format(file=path))
+    with pytest.raises(InputError, match=r"line 3.*no relative path|in the folder"):
+        read_scene_folder(inside / "scene.yaml", None)
+    with pytest.raises(InputError, match="no relative path"):
+        read_scene_zip(zipped(scene_yaml=MESH.format(file=path)), None)
+
+
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "ring.stl").write_bytes(ring())
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "link.stl").symlink_to(tmp_path / "ring.stl")
+    (inside / "scene.yaml").write_text(MESH.format(file="link.stl"))
+    with pytest.raises(InputError, match="not in the folder"):
+        read_scene_folder(inside / "scene.yaml", None)
+
+
+def ball(*, name: str = "it", size: str = "9", besides: str = "") -> str:
+    return f"- {{name: {name}, form: sphere, size: [{size}], pose: [0,0,0,0,0,0]{besides}}}\n"
+
+
+THINGS = "scene: 1\nthings:\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1, column 1: The scene is empty"),
+        ("scene: 2\n", "line 1.*version 1"),
+        ("things: []\n", "needs 'scene'"),
+        (THINGS + "- {name: it}\n", "line 3.*needs 'form'"),
+        (
+            THINGS + "- name: it\n  form: box\n  size: [1, 2]\n  pose: [0, 0, 0]\n",
+            "line 5, column 9.*of 3(.|\n)*line 6, column 9: A pose is six numbers",
+        ),
+        (THINGS + ball(size=".nan"), "line 3.*A number"),
+        (THINGS + ball(besides=", colour: red"), "line 3.*A colour is as"),
+        (THINGS + ball(besides=", coluor: 1"), "line 3.*did you mean 'colour'"),
+        (THINGS + ball(size="3000"), "line 3, column 3.*from 0.001 to 2 m"),
+        (THINGS + ball() + ball(), "line 4.*two things called 'it'"),
+        (THINGS + ball(besides=", attach: hand"), "line 3.*has no hand"),
+        (THINGS + ball() + "# " + "-" * 70_000, "at most 64 KB"),
+        ("scene: 1\nthings: &a []\n", "Anchors"),
+        ("scene: 1\nwater: -1\n", "line 2.*not between"),
+        (MESH.format(file="gone.stl"), "line 3.*gone.stl"),
+        (MESH.format(file="it.exe"), "line 3.*it.exe"),
+        (MESH.format(file="scene.yaml"), "line 3.*scene.yaml is of no format"),
+        (MESH.format(file="it.stl, sha256: abc"), "line 5.*64 digits"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_scene_zip(zipped(scene_yaml=text), None)
+
+
+def test_another_file_than_it_was_saved_with_is_noticed(mesh: Mesh) -> None:
+    text = MESH.format(file=f"ring.stl, sha256: '{mesh.sha256}'")
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr("scene.yaml", text)
+        archive.writestr("ring.stl", ring() + b"\0")
+    with pytest.raises(InputError, match=r"line 3(.|\n)*another file|cannot|broken"):
+        read_scene_zip(out.getvalue(), None)
+
+
+def test_a_broken_or_swollen_zip_is_refused(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = scene_zip(scene_of(mesh), T_PALM_TOOL)
+    random = np.random.default_rng(0)
+    for cut in random.integers(0, len(whole), 40).tolist():
+        with pytest.raises(InputError):
+            read_scene_zip(whole[:cut], T_PALM_TOOL)
+    monkeypatch.setattr(scene_file, "read_mesh", lambda *_: mesh)
+    for _ in range(60):
+        bent = bytearray(whole)
+        bent[int(random.integers(len(bent)))] ^= int(random.integers(1, 256))
+        try:
+            read_scene_zip(bytes(bent), T_PALM_TOOL)
+        except InputError:
+            continue
+    monkeypatch.setattr(scene_file, "LARGEST_ZIP", 100_000)
+    bomb = zipped(scene_yaml=MESH.format(file="zeros.stl"), **{"zeros.stl": bytes(1_000_000)})
+    assert len(bomb) < 5000
+    with pytest.raises(InputError, match="Unpacked"):
+        read_scene_zip(bomb, None)
+    many = zipped(**{f"f{i}": b"" for i in range(scene_file.MOST_FILES + 1)})
+    with pytest.raises(InputError, match="at most 64 files"):
+        read_scene_zip(many, None)
+    with pytest.raises(InputError, match=r"no scene\.yaml"):
+        read_scene_zip(zipped(other=b""), None)
+
+
+def made(key: str, size: int) -> Mesh:
+    solid = Solid(key, SOLID.size, SOLID.corners)
+    none = np.zeros((0, 3))
+    return Mesh(
+        bytes(size), Format.STL, "mm", None, key, none, none.astype(np.int64), None, solid, ""
+    )
+
+
+def test_the_store_gives_up_what_is_not_used_and_nothing_else() -> None:
+    store = Meshes(most=3, most_bytes=100)
+    for key in ("a", "b", "c"):
+        store.put([made(key, 10)], ())
+    store.put([made("d", 10)], {"a"})
+    assert store.get("a") is not None
+    assert store.get("b") is None
+    with pytest.raises(InputError, match="upload its file again"):
+        store.need("b")
+    for refused, used in ((made("e", 95), {"a"}), (made("e", 1), {"a", "c", "d"})):
+        with pytest.raises(InputError, match="There is room for 3 meshes"):
+            store.put([refused], used)
+        assert all(store.get(key) is not None for key in "acd")
+    store.put([made("e", 95)], ())
+    assert [store.get(key) is None for key in "acde"] == [True, True, True, False]
+
+
+def test_a_mesh_stands_on_its_underside_and_its_key_tells_how_it_was_read(mesh: Mesh) -> None:
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    np.testing.assert_allclose(low[:2], -high[:2], atol=1e-9)
+    assert low[2] == 0.0
+    np.testing.assert_allclose(high - low, mesh.solid.size, atol=1e-12)
+    assert mesh.unit == "mm"
+    told = read_mesh(ring(), "other.stl", "mm")
+    assert told.key == mesh.key
+    others: list[Callable[[], Mesh]] = [
+        lambda: read_mesh(ring(), "ring.stl", "cm"),
+        lambda: read_mesh(ring(), "ring.stl", up=Up.Y),
+    ]
+    assert all(other().key != mesh.key for other in others)
+    with pytest.raises(InputError, match="A unit is one of mm, cm, in, m"):
+        read_mesh(ring(), "ring.stl", "ft")
+
+
+def test_the_scene_of_the_documents_is_understood() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "scenes.md"
+    text = page.read_text(encoding="utf-8").partition("```yaml\n")[2].partition("```")[0]
+    draft = parsed(re.sub(r".*sha256.*\n", "", text))
+    assert [entry.name for entry in draft.entries] == ["cup", "bracket"]
+    assert draft.entries[1].mesh == MeshFile("meshes/bracket.stl", "mm", "z", None)
+    assert draft.entries[1].fixed
+    assert draft.water == pytest.approx(1.5e-4)

@@ -1,0 +1,313 @@
+"""Shapes in: what three and more foreign programs wrote, what we write, and what is no shape."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import cKDTree  # type: ignore[import-untyped]
+from trimesh.exchange.gltf import export_gltf
+
+from app.control import things
+from app.control.things import Form, Thing
+from app.errors import InputError
+from app.exchange import shape_file
+from app.exchange.glb import glb_files
+from app.exchange.mechanism import Mechanism
+from app.exchange.shape_file import (
+    LARGEST,
+    LONGEST_NAME,
+    SMALLEST,
+    Format,
+    Up,
+    label,
+    read_shape,
+    read_shape_guarded,
+    thing_name,
+)
+from app.exchange.vrml import world_of
+from app.exchange.vrml_text import world_text
+from app.geometry import se3, so3
+from robot_description import URDF_PATH
+from tests.exchange.conftest import GANTRY_POSE, POSES
+from tests.exchange.solids import Numbers, is_closed, sides, triangles, volume
+
+FOREIGN = Path(__file__).parent / "foreign"
+
+FLAT, UPRIGHT = [60.0, 40.0, 25.0], [60.0, 25.0, 40.0]
+
+
+@pytest.mark.parametrize(
+    ("file", "standing", "colour"),
+    [
+        ("vtk.wrl", UPRIGHT, (255, 128, 0, 255)),
+        ("meshlab.wrl", UPRIGHT, (230, 230, 230, 255)),
+        ("gmsh.stl", FLAT, None),
+        ("vtk.stl", FLAT, None),
+        ("meshlab.stl", FLAT, None),
+        ("gmsh.obj", FLAT, None),
+        ("vtk.obj", FLAT, None),
+        ("meshlab.obj", FLAT, None),
+        ("vtk.ply", FLAT, None),
+        ("meshlab.ply", FLAT, (200, 100, 50, 255)),
+        ("assimp.ply", FLAT, None),
+        ("vtk.gltf", UPRIGHT, (255, 188, 0, 255)),
+        ("assimp.glb", UPRIGHT, (203, 203, 203, 255)),
+    ],
+)
+def test_the_bracket_of_other_programs_is_the_bracket(
+    file: str, standing: list[float], colour: tuple[int, ...] | None
+) -> None:
+    format = Format.of(file)
+    # Numbers that are millimetres, though glTF would have metres.
+    unit = 1e-3 if format in (Format.GLB, Format.GLTF) else None
+    shape = read_shape((FOREIGN / file).read_bytes(), format, file, unit)
+    assert (shape.unit, sides(shape), is_closed(shape)) == (1e-3, standing, True)
+    assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
+    if colour is None:
+        assert shape.colours is None
+    else:
+        assert shape.colours is not None
+        assert len(shape.colours) == len(shape.faces)
+        assert tuple(shape.colours[0].tolist()) == colour
+
+
+def test_a_whole_world_is_flattened() -> None:
+    """Extrusion, Cylinder, USE, Switch and text, as another program wrote them."""
+    shapes = [
+        read_shape((FOREIGN / file).read_bytes(), Format.WRL, file)
+        for file in ("castle.wrl", "bracket.wrl")
+    ]
+    for shape in shapes:
+        # A pin is a prism of 32 sides.
+        pin = 16.0 * 5e-3**2 * np.sin(np.pi / 16.0) * 40e-3
+        assert volume(shape) == pytest.approx(35e-6 + 2.0 * pin, rel=1e-6)
+        assert sides(shape) == [110.0, 115.0, 45.0]
+        assert shape.said.endswith("Left out: Text.")
+        assert shape.colours is not None
+        assert np.unique(shape.colours, axis=0).tolist() == [[255, 128, 0, 191]]
+    castle, ours = (triangles(shape.vertices * 1e3, shape.faces, 3) for shape in shapes)
+    assert castle == ours
+
+
+@pytest.mark.parametrize("file", ["gmsh.stl", "meshlab.stl", "meshlab.ply", "assimp.glb"])
+def test_another_reader_finds_the_same_triangles(file: str) -> None:
+    data = (FOREIGN / file).read_bytes()
+    shape = read_shape(data, Format.of(file), file, 1e-3, Up.Z)
+    other = trimesh.load_mesh(io.BytesIO(data), file_type=file[-3:], process=False)
+    assert triangles(shape.vertices * 1e3, shape.faces, 3) == triangles(
+        other.vertices, other.faces, 3
+    )
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [("gmsh.wrl", "VRML 1.0, which is not read"), ("assimp.gltf", "'assimp.bin'")],
+)
+def test_what_other_programs_write_and_is_not_read_is_named(file: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape((FOREIGN / file).read_bytes(), Format.of(file), file)
+
+
+def written(mesh: trimesh.Trimesh, kind: str) -> bytes:
+    """By trimesh, which is none of ours."""
+    if kind == "gltf":
+        files = export_gltf(trimesh.Scene(mesh), embed_buffers=True)  # type: ignore[no-untyped-call]
+        return bytes(files["model.gltf"])
+    kind, _, encoding = kind.partition(" ")
+    data = mesh.export(file_type=kind, **({"encoding": encoding} if encoding else {}))
+    return data.encode() if isinstance(data, str) else bytes(data)
+
+
+@pytest.mark.parametrize(
+    "kind", ["stl", "stl_ascii", "obj", "ply binary", "ply ascii", "glb", "gltf"]
+)
+def test_every_format_says_the_same(kind: str) -> None:
+    turn = se3.from_rotation_translation(so3.exp((0.2, 0.4, 0.6)), (5.0, 0.0, 0.0))
+    mesh = trimesh.creation.annulus(10.0, 30.0, 25.0, transform=turn)
+    mesh.visual.face_colors = [0, 255, 0, 128]
+    format = Format(kind.split(maxsplit=1)[0].removesuffix("_ascii"))
+    shape = read_shape(written(mesh, kind), format, "a", 1e-3, Up.Z)
+    assert len(shape.faces) == len(mesh.faces)
+    assert is_closed(shape)
+    assert volume(shape) == pytest.approx(mesh.volume * 1e-9, rel=1e-6)
+    far = cKDTree(mesh.vertices * 1e-3).query(shape.vertices)[0]
+    assert len(shape.vertices) == len(mesh.vertices)
+    assert far.max() < 1e-8
+    if format is not Format.STL:
+        assert shape.colours is not None
+        assert set(shape.colours[:, 1]) == {255}
+        # Colours of an OBJ have no opacity.
+        assert set(shape.colours[:, 3]) == {255 if format is Format.OBJ else 128}
+
+
+def placed(mechanism: Mechanism, values: dict[str, float]) -> tuple[Numbers, int]:
+    """(n, 9) corners of every triangle in the root, and how many."""
+    frames = mechanism.frames(values)
+    rows = [
+        (shape.vertices @ frames[link.name][:3, :3].T + frames[link.name][:3, 3])[shape.faces]
+        for link in mechanism.links
+        for shape in link.shapes
+    ]
+    found = np.concatenate(rows).reshape(-1, 9)
+    return found, len(found)
+
+
+@pytest.mark.parametrize("which", ["arm", "gantry"])
+def test_what_we_write_is_read_back(which: str, katana: Mechanism, gantry: Mechanism) -> None:
+    mechanism, pose = (katana, POSES[1]) if which == "arm" else (gantry, GANTRY_POSE)
+    values = mechanism.values(pose)
+    expected, count = placed(mechanism, values)
+    ((_, glb),) = glb_files(mechanism, values).items()
+    wrl = world_text(world_of(mechanism, values)).encode()
+    for format, data, near in ((Format.WRL, wrl, 1e-5), (Format.GLB, glb, 1e-6)):
+        shape = read_shape(data, format, "whole", 1.0)
+        rows = shape.vertices[shape.faces].reshape(-1, 9)
+        # Rounding lets slivers vanish, but nothing else.
+        assert 0.99 * count < len(rows) <= count
+        assert cKDTree(expected).query(rows, p=np.inf)[0].max() <= near
+        missing = expected[cKDTree(rows).query(expected, p=np.inf)[0] > near].reshape(-1, 3, 3)
+        edges = np.linalg.norm(missing - np.roll(missing, 1, axis=1), axis=2)
+        assert len(missing) == 0 or edges.min(axis=1).max() < 2.0 * near
+        assert shape.colours is not None
+
+
+@pytest.mark.parametrize(
+    "file", ["stl/wrist_link.stl", "collision/pan_link_2.stl", "meshes/wrist_link.glb"]
+)
+def test_the_files_of_the_arm_are_read(file: str) -> None:
+    path = URDF_PATH.parent / file
+    data = path.read_bytes()
+    shape = read_shape(data, Format.of(file), file, 1.0, Up.Z)
+    other = trimesh.load_scene(path).to_mesh()
+    theirs = triangles(other.vertices, other.faces, 6)
+    ours = triangles(shape.vertices, shape.faces, 6)
+    assert not ours - theirs
+    # Those that have two corners in one place.
+    assert sum((theirs - ours).values()) <= 0.01 * len(other.faces)
+    assert volume(shape) == pytest.approx(other.volume, rel=1e-5)
+
+
+TETRAHEDRON = "v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nv 0 0 {0}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+def tetrahedron(size: float) -> bytes:
+    return TETRAHEDRON.format(size).encode()
+
+
+@pytest.mark.parametrize(
+    ("size", "told", "unit", "said"),
+    [
+        (1.5, None, 1.0, "taken as m, since 1.5 mm would be small"),
+        (2.5, None, 1e-3, "taken as mm, since 2.5 m would be too large"),
+        (1500.0, None, 1e-3, "taken as mm"),
+        (3.0, 0.0254, 0.0254, "the unit is in, as told"),
+        (3.0, 0.1, 0.1, "the unit is 0.1 m, as told"),
+    ],
+)
+def test_the_unit_is_told_or_guessed_and_said(
+    size: float, told: float | None, unit: float, said: str
+) -> None:
+    shape = read_shape(tetrahedron(size), Format.OBJ, "a.obj", told)
+    assert shape.unit == unit
+    assert volume(shape) == pytest.approx((size * unit) ** 3 / 6.0)
+    assert said in shape.said
+    assert "4 triangles" in shape.said
+
+
+@pytest.mark.parametrize(
+    ("size", "told", "said"),
+    [
+        (3000.0, None, "no unit would fit"),
+        (150.0, 1.0, "would fit with the unit mm or cm"),
+        (0.5, 1e-3, "0.5 mm long, with mm as its unit.*with the unit cm or in or m"),
+        (1e-9, None, "no unit would fit"),
+        (1.0, 0.0, "above 0"),
+        (1.0, float("nan"), "above 0"),
+        (1.0, float("inf"), "above 0"),
+    ],
+)
+def test_a_size_that_cannot_be_is_refused(size: float, told: float | None, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(tetrahedron(size), Format.OBJ, "a.obj", told)
+
+
+def test_gltf_is_in_metres_even_where_that_is_too_large() -> None:
+    with pytest.raises(InputError, match="with the unit mm or cm"):
+        read_shape((FOREIGN / "assimp.glb").read_bytes(), Format.GLB, "a.glb")
+
+
+def test_the_axis_that_is_up_can_be_told() -> None:
+    data = (FOREIGN / "vtk.wrl").read_bytes()
+    upright, flat = (read_shape(data, Format.WRL, "vtk.wrl", up=up) for up in (Up.Y, Up.Z))
+    assert (sides(upright), sides(flat)) == (UPRIGHT, FLAT)
+    x, y, z = flat.vertices.T
+    np.testing.assert_array_equal(upright.vertices, np.column_stack((x, -z, y)))
+    assert "as told" in flat.said
+
+
+@pytest.mark.parametrize(
+    ("name", "shown", "thing"),
+    [
+        ("cup.wrl", "cup.wrl", "cup"),
+        ("../../etc/passwd.stl", "passwd.stl", "passwd"),
+        ("C:\\parts\\arm 2.obj", "arm 2.obj", "arm 2"),
+        ("a\x00\n\x1b[2Jb.ply", "a[2Jb.ply", "a[2Jb"),
+        ("", "The file", "shape"),
+        (".stl", ".stl", "shape"),
+        ("x" * 300 + ".stl", "x" * 31 + "…xxxx.stl", "x" * 31 + "…xxxx"),
+    ],
+)
+def test_names_of_files_become_names_of_things(name: str, shown: str, thing: str) -> None:
+    assert (label(name), thing_name(name)) == (shown, thing)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.text(max_size=99))
+def test_any_name_makes_a_thing(name: str) -> None:
+    Thing(thing_name(name), Form.SPHERE, (0.1,), np.eye(4))
+    assert len(label(label(name))) <= LONGEST_NAME
+
+
+def test_bounds_are_those_of_things() -> None:
+    assert (LARGEST, SMALLEST) == (things.LARGEST, things.SMALLEST)
+    assert things.LONGEST_NAME == LONGEST_NAME
+
+
+def test_formats_go_by_the_end_of_a_name() -> None:
+    assert [Format.of(f"a.{each.value.upper()}") for each in Format] == list(Format)
+    assert Format.of("a.b.wrz") is Format.WRL
+    for name in ("wrl", "a.step", "a", ""):
+        with pytest.raises(InputError, match=r"\.wrl, \.stl"):
+            Format.of(name)
+
+
+def test_a_guarded_reading_is_the_same() -> None:
+    for file, unit, up in (("castle.wrl", None, Up.Z), ("gmsh.stl", 1e-3, None)):
+        data = (FOREIGN / file).read_bytes()
+        here = read_shape(data, Format.of(file), f"-{file}", unit, up)
+        there = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
+        assert (there.name, there.unit, there.said) == (here.name, here.unit, here.said)
+        np.testing.assert_array_equal(there.vertices, here.vertices)
+        np.testing.assert_array_equal(there.faces, here.faces)
+        np.testing.assert_array_equal(there.colours, here.colours)
+        assert there.vertices.dtype == np.float64
+
+
+def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match=r"hull\.ply does not begin with 'ply'"):
+        read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
+    with pytest.raises(InputError, match=r"has 20\.0 MB"):
+        read_shape_guarded(bytes(20_000_001), Format.PLY, "hull.ply")
+    monkeypatch.setattr(shape_file, "SECONDS", 0.01)
+    with pytest.raises(InputError, match=r"longer than 0.01 s"):
+        read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
+    monkeypatch.setattr(shape_file, "SECONDS", 5.0)
+    monkeypatch.setattr("sys.executable", "false")
+    with pytest.raises(InputError, match="wants more than 5 s or 1024 MiB"):
+        read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")

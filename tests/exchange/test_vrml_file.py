@@ -1,0 +1,281 @@
+"""Foreign VRML97: each geometry node, each grouping node, and what is left out or refused."""
+
+from __future__ import annotations
+
+import gzip
+
+import numpy as np
+import pytest
+
+from app.errors import InputError
+from app.exchange.shape_file import Format, ShapeFile, Up, read_shape
+from app.exchange.vrml_text import HEADER
+from app.geometry import so3
+from tests.exchange.solids import is_closed, sides, volume
+
+PRISM = 16.0 * np.sin(np.pi / 16.0)
+"""Area of the polygon of 32 corners on the unit circle."""
+
+
+def world(text: str, unit: float = 0.1) -> ShapeFile:
+    return read_shape(f"{HEADER}\n{text}".encode(), Format.WRL, "world.wrl", unit, Up.Z)
+
+
+def shown(geometry: str, unit: float = 0.1) -> ShapeFile:
+    return world(f"Shape {{ geometry {geometry} }}", unit)
+
+
+BOX = "Shape { geometry Box { } }"
+
+SQUARE = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0 ] } %s }"
+
+
+@pytest.mark.parametrize(
+    ("geometry", "litres", "size"),
+    [
+        ("Box { }", 8.0, [200, 200, 200]),
+        ("Box { size 1 2 3 }", 6.0, [100, 200, 300]),
+        ("Cylinder { radius 2 height 1 }", 4.0 * PRISM, [400, 100, 400]),
+        ("Cone { bottomRadius 2 height 3 }", 4.0 * PRISM, [400, 300, 400]),
+        ("Extrusion { }", 4.0, [200, 100, 200]),
+        ("Extrusion { spine [ 1 0 0, 4 0 0 ] }", 12.0, [300, 200, 200]),
+        ("Extrusion { spine [ 0 0 0, 0 1 0, 0 3 0 ] scale [ 1 1, 2 1, 2 1 ] }", 22.0, None),
+        ("Extrusion { spine [ 0 4 0, 0 0 0 ] orientation 0 1 0 .5 }", 16.0, None),
+    ],
+)
+def test_solids_have_their_volume(geometry: str, litres: float, size: list[float] | None) -> None:
+    shape = shown(geometry)
+    assert volume(shape) * 1e3 == pytest.approx(litres, rel=1e-9)
+    assert is_closed(shape)
+    assert size is None or sides(shape) == size
+
+
+def test_a_sphere_is_round() -> None:
+    shape = shown("Sphere { radius 3 }")
+    np.testing.assert_allclose(np.linalg.norm(shape.vertices, axis=1), 0.3)
+    assert volume(shape) == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=0.03)
+    assert is_closed(shape)
+
+
+def test_a_bent_extrusion_is_a_mitred_tube() -> None:
+    """A corner of a square: four mitres, so a frame of the square's area times its middle line."""
+    shape = shown(
+        "Extrusion { crossSection [ -.1 -.1, -.1 .1, .1 .1, .1 -.1, -.1 -.1 ] beginCap FALSE "
+        "endCap FALSE spine [ 0 0 0, 2 0 0, 2 2 0, 0 2 0, 0 0 0 ] }"
+    )
+    assert is_closed(shape)
+    # The standard's planes halve the corners but do not widen the section there.
+    assert abs(volume(shape) * 1e3) == pytest.approx(0.04 * 8.0 * np.sqrt(0.5), rel=1e-6)
+
+
+def test_the_sides_of_solids_can_be_left_out() -> None:
+    tube = shown("Cylinder { bottom FALSE top FALSE }")
+    disc = shown("Cylinder { side FALSE top FALSE }")
+    assert (len(tube.faces), len(disc.faces)) == (64, 30)
+    assert sides(disc)[1] == 0.0
+
+
+def test_a_grid_is_a_field_of_heights() -> None:
+    shape = shown("ElevationGrid { xDimension 3 zDimension 2 zSpacing 2 height [ 0 1 0 0 1 0 ] }")
+    assert sides(shape) == [200.0, 100.0, 200.0]
+    a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
+    assert (np.cross(b - a, c - a)[:, 1] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("fields", "colours"),
+    [
+        ("coordIndex [ 0 1 2 -1 0 2 3 ]", None),
+        (
+            (
+                "coordIndex [ 0 1 2 -1 0 2 3 -1 ] colorPerVertex FALSE "
+                "color Color { color [ 1 0 0, 0 1 0 ] }"
+            ),
+            [[255, 0, 0, 255], [0, 255, 0, 255]],
+        ),
+        (
+            (
+                "coordIndex [ 0 1 2 -1 0 2 3 -1 ] colorPerVertex FALSE colorIndex [ 1 0 ] "
+                "color Color { color [ 1 0 0, 0 1 0 ] }"
+            ),
+            [[0, 255, 0, 255], [255, 0, 0, 255]],
+        ),
+        (
+            (
+                "coordIndex [ 0 1 2 -1 0 2 3 -1 ] colorIndex [ 0 0 0 -1 1 1 0 -1 ] "
+                "color Color { color [ 1 0 0, 0 1 0 ] }"
+            ),
+            [[255, 0, 0, 255], [85, 170, 0, 255]],
+        ),
+    ],
+)
+def test_faces_have_their_colours(fields: str, colours: list[list[int]] | None) -> None:
+    shape = shown(SQUARE % fields)
+    found = None if shape.colours is None else shape.colours.tolist()
+    assert (len(shape.faces), found) == (2, colours)
+
+
+def test_clockwise_faces_are_turned_over() -> None:
+    up, down = (shown(SQUARE % f"coordIndex [ 0 1 2 3 ] ccw {ccw}") for ccw in ("TRUE", "FALSE"))
+    for shape, side in ((up, 1.0), (down, -1.0)):
+        a, b, c = shape.vertices[shape.faces[0]]
+        assert np.cross(b - a, c - a)[2] * side > 0.0
+
+
+def test_concave_faces_are_covered_once() -> None:
+    shape = shown(
+        "IndexedFaceSet { convex FALSE coordIndex [ 0 1 2 3 -1 ] "
+        "coord Coordinate { point [ 0 0 0, 2 1 0, 0 2 0, 1 1 0 ] } }"
+    )
+    a, b, c = np.moveaxis(shape.vertices[shape.faces], 1, 0)
+    twice = np.cross(b - a, c - a)[:, 2]
+    assert (twice > 0.0).all()
+    assert twice.sum() / 2.0 * 100.0 == pytest.approx(1.0)
+
+
+def test_transforms_do_as_the_standard_has_it() -> None:
+    """P' = T C R SR S -SR -C P, worked out one after the other."""
+    shape = world(
+        "Transform { translation 1 2 3 center .5 0 .25 rotation 0 0 2 .7 scale 1 2 -1.5 "
+        "scaleOrientation 1 0 0 .4 children Transform { rotation 0 1 0 1 children Shape { geometry "
+        + SQUARE % "coordIndex [ 0 1 2 3 ]"
+        + " } } }"
+    )
+    center, SR = np.array((0.5, 0.0, 0.25)), so3.rotation_x(0.4)
+    expected = []
+    for corner in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)):
+        p = SR.T @ (so3.rotation_y(1.0) @ corner - center)
+        p = so3.rotation_z(0.7) @ SR @ (p * (1.0, 2.0, -1.5))
+        expected.append(0.1 * (p + center + (1.0, 2.0, 3.0)))
+    for point in expected:
+        assert np.abs(shape.vertices - point).max(axis=1).min() < 1e-12
+
+
+def test_a_mirrored_solid_keeps_its_outside() -> None:
+    shape = world("Transform { scale -1 1 1 children Shape { geometry Cone { } } }")
+    assert volume(shape) > 0.0
+
+
+@pytest.mark.parametrize(
+    "group",
+    [
+        "Group { children [ %s NULL ] }",
+        'Anchor { url [ "x.wrl" ] children %s }',
+        "Billboard { children %s }",
+        "Collision { proxy Shape { geometry Sphere { } } children %s }",
+        "Switch { whichChoice 1 choice [ Shape { geometry Sphere { } } %s ] }",
+        "LOD { range 9 level [ %s Shape { geometry Sphere { } } ] }",
+        "DEF a Group { children %s ROUTE a.x TO a.y } ROUTE a.x TO b.set_x",
+        "DEF a Group { } DEF a Group { children %s }",
+        "Switch { choice DEF b %s } USE b",
+        'Script { field SFNode it DEF c Group { } url [ "javascript: {" ] } USE c %s',
+        "DEF T TimeSensor { cycleInterval 3 } %s PointLight { location 1 2 3 }",
+    ],
+)
+def test_groups_show_what_is_in_them(group: str) -> None:
+    shape = world(group % "Shape { appearance NULL geometry Box { } }")
+    assert volume(shape) == pytest.approx(8e-3)
+    assert "Left out" not in shape.said
+
+
+def test_what_is_left_out_is_said() -> None:
+    shape = world(
+        'Inline { url "a.wrl" } Wobbler { speed [ 1 2 { } ] } Shape { geometry Text { } } '
+        'Shape { geometry Box { } appearance Appearance { texture ImageTexture { url "a" } } }'
+    )
+    assert volume(shape) == pytest.approx(8e-3)
+    for what in ("other files that it shows", "Wobbler", "Text", "pictures on the surface"):
+        assert what in shape.said
+
+
+def test_materials_give_colour_and_opacity() -> None:
+    def material(fields: str) -> list[int]:
+        look = f"Appearance {{ material Material {{ {fields} }} }}"
+        colours = world(f"Shape {{ appearance {look} geometry Box {{ }} }}").colours
+        assert colours is not None
+        return [int(part) for part in colours[0]]
+
+    assert material("") == [204, 204, 204, 255]
+    assert material("diffuseColor 1 .5 0 transparency .5") == [255, 128, 0, 128]
+    assert material("diffuseColor 0 0 0 emissiveColor 0 0 1") == [0, 0, 255, 255]
+    both = world(
+        "Shape { geometry Box { } } Shape { geometry Sphere { } appearance Appearance { "
+        "material Material { diffuseColor 1 0 0 } } }"
+    )
+    assert both.colours is not None
+    assert {tuple(row) for row in both.colours.tolist()} == {
+        (204, 204, 204, 255),
+        (255, 0, 0, 255),
+    }
+
+
+def test_compressed_files_and_byte_order_marks_are_read() -> None:
+    text = f"{HEADER} by hand\nShape {{ geometry Box {{ }} }}".encode()
+    for data in (gzip.compress(text), b"\xef\xbb\xbf" + text):
+        assert volume(read_shape(data, Format.WRL, "a.wrz")) == pytest.approx(8.0)
+
+
+def chain(links: int, fan: int, shape: str = "Shape { geometry Box { } }") -> str:
+    """Each node uses the one before `fan` times."""
+    rows = [f"DEF n0 Group {{ children {shape} }}"]
+    rows += [f"DEF n{i} Group {{ children [ {f'USE n{i - 1} ' * fan}] }}" for i in range(1, links)]
+    return f"Switch {{ choice [ {' '.join(rows[:-1])} ] }} {rows[-1]}"
+
+
+def test_nodes_that_use_others_can_be_deep() -> None:
+    assert volume(world(chain(5000, 1))) == pytest.approx(8e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "has no triangles"),
+        ("Shape { geometry Text { } }", "has no triangles. It has Text"),
+        (chain(40, 2), "more than 20000 nodes"),
+        (chain(40, 2, "Group { }"), "more than 20000 nodes"),
+        (chain(14, 2, "Shape { geometry Sphere { } }"), "more than 200000 triangles"),
+        ("Group { children " * 300, "line 2: nodes lie more than 200 deep"),
+        ("PROTO Bolt [ ] { Box { } }", "line 2: PROTO Bolt: prototypes are not read"),
+        ('Group { EXTERNPROTO Bolt [ ] "b.wrl" }', "EXTERNPROTO Bolt"),
+        ("\nGroup { colour 1 }", "line 3: Group has no field 'colour'"),
+        ("DEF a Group { children USE a }", "before it is defined"),
+        ("Wobbler { a [ } ]", "'}' closes nothing"),
+        ("Wobbler { a { ", "ends too early"),
+        ("Wobbler", "'{' is wanted"),
+        ("Shape { geometry Box { size 1 0 1 } }", "Box of no size"),
+        ("Shape { geometry Sphere { radius -1 } }", "Sphere of no size"),
+        ("Shape { geometry Extrusion { spine [ 0 0 0 ] } }", "too short"),
+        ("Shape { geometry ElevationGrid { xDimension 2 height [ 1 ] } }", "heights"),
+        (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 4 ]'} }}", "vertex 4"),
+        (f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 99999999999 ]'} }}", "whole number"),
+        (
+            f"Shape {{ geometry {SQUARE % 'coordIndex [ 0 1 2 ] color Color { }'} }}",
+            "colours do not go",
+        ),
+        ("Shape { geometry Box { } geometry Box { } }", "stands twice"),
+        (
+            f"Transform {{ scale 1e9 1 1 children Transform {{ scale 1e300 1 1 children {BOX} }}}}",
+            "no finite numbers",
+        ),
+        ("Shape { geometry Box { size nan 1 1 } }", "a number is wanted"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        world(text)
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", "does not begin"),
+        (b"#VRML V1.0 ascii\nCube { }", "VRML 1.0"),
+        (b"#X3D V3.2 utf8\n", "does not begin"),
+        (gzip.compress(bytes(10))[:-6], "ends too early"),
+        (b"\x1f\x8b" + bytes(40), "broken"),
+        (gzip.compress(b"#VRML V2.0 utf8\n" + bytes(30_000_000)), "more than 20 MB when unpacked"),
+    ],
+)
+def test_what_is_no_vrml97_is_refused(data: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        read_shape(data, Format.WRL, "a.wrl")

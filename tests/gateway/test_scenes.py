@@ -1,0 +1,238 @@
+"""Meshes and scenes at the door of a real server: brought, placed, attached, saved and loaded."""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from app.api import answers, requests
+from app.cli.assembly import described
+from app.cli.furnishing import furnished
+from app.client import Client, RefusedError, connect
+from app.control.lease import Role
+from app.errors import InputError
+from app.exchange.scene_file import SCENE
+from app.exchange.shape_file import MOST_BYTES
+from app.gateway.access import AccessFile
+from app.gateway.uploads import AT_ONCE
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+from app.settings import Settings
+from robot_description import URDF_PATH
+from tests.browser.server import APP, AppServer
+from tests.gateway import client
+from tests.gateway.client import ask
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("files") / "ring.stl"
+    path.write_bytes(trimesh.creation.torus(40.0, 12.0, 24, 12).export(file_type="stl"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def scene(ring: Path) -> Path:
+    """A folder as a person writes it."""
+    path = ring.with_name("mine.yaml")
+    path.write_text(
+        """\
+scene: 1
+joints: [10, -68, 85, 8, 0]
+water: 80
+things:
+- {name: cup, form: cylinder, size: [32, 90], pose: [340, -260, 0, 0, 0, 0], can_be_held: true}
+- name: gate
+  form: mesh
+  mesh: {file: ring.stl, unit: mm}
+  pose: [420, 150, 0, 90, 0, 30]
+  colour: "#2477d4"
+"""
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def tokens(ring: Path) -> dict[str, str]:
+    """Of a link for each role."""
+    file, until = AccessFile.create(ring.with_name("access.json")), time.time() + 3600.0
+    return {role.value: file.give(role.value, role, until) for role in (Role.VIEWER, Role.OPERATOR)}
+
+
+@pytest.fixture(scope="module")
+def server(ring: Path, scene: Path, tokens: dict[str, str]) -> Iterator[AppServer]:
+    assert tokens
+    access = str(ring.with_name("access.json"))
+    begun = ("--scene", str(scene), "--object", f"{ring}@300,-400,50")
+    with AppServer((*APP, "--access", access, *begun)) as server:
+        yield server
+
+
+@pytest.fixture
+def arm(server: AppServer, tokens: dict[str, str]) -> Iterator[Client]:
+    with connect(server.url, "Test", tokens["operator"]) as arm:
+        arm.ask(requests.Acquire())
+        yield arm
+        arm.ask(requests.Release())
+
+
+def things(arm: Client) -> dict[str, answers.Thing]:
+    return {each.name: each for each in arm.look(answers.Things).things}
+
+
+def until(true: Callable[[], bool]) -> None:
+    end = time.monotonic() + 5.0
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_the_server_begins_with_its_scene_and_objects(server: AppServer, arm: Client) -> None:
+    now = things(arm)
+    assert list(now) == ["cup", "gate", "ring"]
+    assert now["gate"].colour == "#2477d4"
+    np.testing.assert_allclose(np.array(now["ring"].T)[:3, 3], (0.3, -0.4, 0.05), atol=1e-12)
+    state = arm.look(answers.State)
+    assert state.q[0] == pytest.approx(np.radians(10.0), abs=1e-12)
+    assert state.water is not None
+    assert state.water.cup_ml == pytest.approx(80.0, abs=1e-9)
+    assert "ring: 576 triangles" in server.output
+
+
+def test_a_mesh_is_placed_fixed_to_the_hand_and_met(
+    arm: Client, ring: Path, model: RobotModel
+) -> None:
+    told = arm.upload(ring)
+    assert told.name == "ring 2"
+    assert told.triangles == 576
+    np.testing.assert_allclose(told.size, (0.104, 0.104, 0.024), atol=1e-6)
+    other = arm.upload(ring, "cm").key
+    assert other != told.key
+    form = requests.Form.MESH
+    arm.ask(requests.Place(name="it", form=form, mesh=told.key, scale=0.5, opacity=0.4))
+    until(lambda: "it" in things(arm))
+    at = np.array(things(arm)["it"].T)[:3, 3]
+    assert 0.3 < np.hypot(*at[:2]) < 0.7
+    assert at[2] == 0.0
+    on_tool = np.eye(4)
+    on_tool[:3, 3] = (-0.05, 0.0, 0.06)
+    arm.ask(requests.Attach(name="it", to=requests.Mount.HAND, T=_rows(on_tool)))
+    until(lambda: things(arm)["it"].fixed)
+    T = model.T_base_shoulder @ forward(model.arm.chain, np.array(arm.look(answers.State).q))
+    np.testing.assert_allclose(things(arm)["it"].T, T @ on_tool, atol=1e-9)
+    arm.ask(requests.Place(name="it", colour="#ff0000", hidden=True))
+    until(lambda: things(arm)["it"].hidden)
+    np.testing.assert_allclose(things(arm)["it"].T, T @ on_tool, atol=1e-9)
+    arm.ask(requests.Attach(name="it", to=requests.Mount.TABLE))
+    until(lambda: not things(arm)["it"].fixed)
+    assert things(arm)["it"].T[2][3] == 0.0
+    arm.ask(requests.Remove(name="it"))
+    for wrong in (
+        requests.Place(name="it", form=form),
+        requests.Place(name="it", form=form, mesh="0" * 32),
+        requests.Place(name="it", form=requests.Form.BOX, size=[0.1] * 3, mesh=told.key),
+        requests.Place(name="it", form=form, mesh=told.key, scale=900.0),
+        requests.Place(name="cup", scale=2.0),
+        requests.Attach(name="nobody", to=requests.Mount.HAND),
+        requests.Attach(name="ring", to=requests.Mount.TABLE, T=_rows(np.eye(4))),
+        requests.Load(scene="0" * 32),
+    ):
+        with pytest.raises(RefusedError):
+            arm.ask(wrong)
+    assert list(things(arm)) == ["cup", "gate", "ring"]
+
+
+def test_a_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
+    data = arm.save_scene()
+    before = things(arm)
+    arm.ask(requests.Remove(name="gate"))
+    arm.ask(requests.Fill(ml=10.0))
+    until(lambda: "gate" not in things(arm))
+    told = arm.load_scene(data)
+    assert told.things == list(before)
+    until(lambda: things(arm) == before)
+    assert arm.save_scene() == data
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    assert sorted(files) == ["meshes/ring.stl", SCENE]
+    text = files[SCENE].decode()
+    for wrong, said in (
+        (text.replace("name: ring", "name: gate"), "two things called 'gate'"),
+        (text.replace("water: 80", "water: 5000"), "cannot hold 5000 ml"),
+        (text.replace("meshes/ring.stl", "../ring.stl"), "no relative path"),
+        (text[: len(text) // 2], "line"),
+    ):
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w") as archive:
+            for name, content in (files | {SCENE: wrong.encode()}).items():
+                archive.writestr(name, content)
+        with pytest.raises(RefusedError, match=said):
+            arm.load_scene(out.getvalue())
+        assert things(arm) == before
+
+
+def test_what_is_too_much_is_refused(
+    server: AppServer, arm: Client, tokens: dict[str, str]
+) -> None:
+    url = f"{server.url}/api/v1"
+
+    def ask(url: str, **options: Any) -> tuple[int, dict[str, str], bytes]:
+        return client.ask(url, Authorization=f"Bearer {tokens['operator']}", **options)
+
+    status, _, said = ask(f"{url}/mesh?name=a.stl", data=bytes(MOST_BYTES + 1))
+    assert (status, said) == (413, b"That is too long.")
+    for query in ("", "?name=a.exe", "?name=a.stl&unit=ft", f"?name={'a' * 200}.stl"):
+        status, _, said = ask(f"{url}/mesh{query}", data=b"x")
+        assert status in (422, 429), said
+        assert json.loads(said)["is"] == "refused"
+    seen = set()
+    for _ in range(int(AT_ONCE) + 2):
+        seen.add(ask(f"{url}/mesh?name=a.exe", data=b"")[0])
+    assert 429 in seen
+    # From another site's page nothing comes in.
+    assert ask(f"{url}/mesh?name=a.stl", data=b"x", Origin="https://evil.example")[0] == 403
+    assert arm.look(answers.State).status == "ok"
+
+
+def test_who_only_watches_brings_nothing(
+    server: AppServer, ring: Path, tokens: dict[str, str]
+) -> None:
+    with connect(server.url, "Eve", tokens["viewer"]) as watcher:
+        with pytest.raises(RefusedError, match="may watch"):
+            watcher.upload(ring)
+        assert watcher.save_scene()
+    assert ask(f"{server.url}/api/v1/mesh?name=ring.stl", data=ring.read_bytes())[0] == 401
+    assert ask(f"{server.url}/api/v1/scene")[0] == 401
+
+
+def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path) -> None:
+    robot = described(Settings(), URDF_PATH, None)
+    broken = scene.with_name("broken.yaml")
+    whole = scene.read_text()
+    for text, said in (
+        (whole.replace("form: mesh", "form: mush"), "broken.yaml:\nline 7, .*mush'.$"),
+        (whole.replace("10, -68", "10, 168").replace("form: mesh", "form: sphere"), "line 6"),
+        ("scene: 1\njoints: [0, 168, 85, 8, 0]\n", "limits"),
+        ("scene: 1\njoints: [0, 1]\n", "joint"),
+        ("scene: 1\nwater: 80\n", "no cup"),
+    ):
+        broken.write_text(text)
+        with pytest.raises(InputError, match=said):
+            furnished(robot, broken, [])
+    for told in ("/nowhere/it.stl", f"{scene}@1,2,x"):
+        with pytest.raises(InputError, match=r"it\.stl cannot be read|no format"):
+            furnished(robot, None, [told])
+
+
+def _rows(T: Any) -> requests.Matrix4:
+    a, b, c, d = (tuple(row) for row in np.asarray(T).tolist())
+    return a, b, c, d

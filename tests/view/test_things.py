@@ -1,0 +1,138 @@
+"""What stands around is drawn as it is said to look, and is coated where the arm is near."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+import viser
+
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.solid import Look
+from app.control.state import Finding, Reason, State
+from app.control.things import Form, Surroundings, Thing
+from app.exchange.creases import drawn, glb
+from app.exchange.meshes import Mesh, Meshes, read_mesh
+from app.robot.props import load_props
+from app.view.objects import NOTHING, ObjectsPanel
+from app.view.things import ThingNodes
+from app.view.tint import Tint
+
+PATH = "/things/1"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def mesh() -> Mesh:
+    painted = trimesh.creation.box((60.0, 40.0, 20.0))
+    painted.visual.face_colors = [[220, 30, 30, 255]] * 6 + [[30, 30, 220, 255]] * 6
+    return read_mesh(painted.export(file_type="ply"), "it.ply")
+
+
+def seen(state: State, *things: Thing, near: str = "") -> State:
+    found = (Finding(Reason.CONTACT, 0.005, parts=(near, "finger")),) if near else ()
+    return replace(state, things=things, findings=found)
+
+
+def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
+    server: viser.ViserServer, session: Session, mesh: Mesh
+) -> None:
+    meshes = Meshes()
+    meshes.put([mesh], ())
+    put: list[cmd.Command] = []
+    nodes = ThingNodes(server, load_props(), Surroundings(None, None), put.append, meshes)
+    state = session.begin(session.ready, 0.0, 0.0)
+    thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
+
+    def node(name: str = "shape") -> viser.SceneNodeHandle:
+        return server.scene._handle_from_node_name[f"{PATH}/{name}"]
+
+    nodes.follow(seen(state, thing))
+    own = node()
+    assert isinstance(own, viser.GlbHandle)
+    nodes.follow(seen(state, replace(thing, scale=2.0)))
+    assert node() is own
+    assert own.scale == 2.0
+    nodes.follow(seen(state, replace(thing, look=Look((1, 2, 3), 0.5))))
+    one = node()
+    assert isinstance(one, viser.MeshHandle)
+    assert (tuple(one.color), one.opacity, one.scale) == ((1, 2, 3), 0.5, 1.0)
+    nodes.follow(seen(state, replace(thing, look=Look((4, 5, 6)))))
+    assert node() is one
+    assert (tuple(one.color), one.opacity) == ((4, 5, 6), None)
+
+    def shown(path: str = PATH) -> bool:
+        return bool(server.scene._handle_from_node_name[path].visible)
+
+    nodes.follow(seen(state, replace(thing, look=Look((4, 5, 6), hidden=True))))
+    assert not shown()
+    nodes.follow(seen(state, replace(thing, look=Look((4, 5, 6)), scale=1.5), near="it"))
+    assert shown()
+    coat = node("contact")
+    assert isinstance(coat, viser.MeshHandle)
+    assert (tuple(coat.color), coat.scale) == (Tint.COLOUR, 1.5)
+    assert shown(f"{PATH}/contact")
+    nodes.follow(seen(state, replace(thing, look=Look((4, 5, 6)), scale=1.5)))
+    assert not shown(f"{PATH}/contact")
+    nodes.follow(seen(state))
+    assert not [each for each in server.scene._handle_from_node_name if each.startswith(PATH)]
+
+
+def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
+    server: viser.ViserServer, session: Session, mesh: Mesh
+) -> None:
+    nodes = ThingNodes(server, load_props(), Surroundings(None, None), print, Meshes())
+    state = session.begin(session.ready, 0.0, 0.0)
+    thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
+    nodes.follow(seen(state, thing))
+    shape = server.scene._handle_from_node_name[f"{PATH}/shape"]
+    assert isinstance(shape, viser.MeshHandle)
+    np.testing.assert_allclose(np.ptp(shape.vertices, axis=0), mesh.solid.size, atol=1e-6)
+    nodes.follow(seen(state))
+
+
+def test_faces_are_apart_at_creases_and_colours_and_one_where_they_bend(mesh: Mesh) -> None:
+    ball = trimesh.creation.icosphere(3)
+    assert len(drawn(ball.vertices, ball.faces).vertices) == len(ball.vertices)
+    half = np.where(ball.triangles_center[:, 2] > 0.0, 0, 1)
+    colours = np.array([[255, 0, 0, 255], [0, 0, 255, 255]], dtype=np.uint8)[half]
+    split = drawn(ball.vertices, ball.faces, colours)
+    assert split.colours is not None
+    np.testing.assert_array_equal(split.colours[split.faces][:, 0], colours)
+    np.testing.assert_allclose(split.vertices[split.faces], ball.triangles, atol=1e-12)
+    assert len(ball.vertices) < len(split.vertices) < len(ball.vertices) + 100
+    tube = trimesh.creation.cylinder(1.0, 2.0, sections=32)
+    # The round side is one, each lid another, its middle shared by nobody.
+    assert len(drawn(tube.vertices, tube.faces).vertices) == 4 * 32 + 2
+    # Read by another program: where it was, in its colours.
+    back = trimesh.load_scene(trimesh.util.wrap_as_stream(glb(mesh.drawn, 0.5)), file_type="glb")
+    np.testing.assert_allclose(np.ptp(back.bounds, axis=0), mesh.solid.size, atol=1e-6)
+
+
+def test_the_panel_shows_the_object_there_is(
+    server: viser.ViserServer, session: Session, mesh: Mesh
+) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    panel = ObjectsPanel(server, lambda _: 0, lambda: state)
+    assert panel._choice.value == NOTHING
+    thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid, scale=2.0, look=Look((9, 8, 7)))
+    other = replace(thing, name="other", scale=1.0)
+    panel.follow(seen(state, thing), caught_up=True)
+    assert (panel._choice.value, panel._scale.value) == ("it", 2.0)
+    assert tuple(panel._colour.value) == (9, 8, 7)
+    panel.follow(seen(state, thing, other), caught_up=False)
+    assert panel._choice.value == "it"
+    panel.follow(seen(state, thing, other), caught_up=True)
+    assert (panel._choice.value, panel._scale.value) == ("other", 1.0)
+    panel.follow(seen(state, thing), caught_up=True)
+    assert (panel._choice.value, panel._scale.value) == ("it", 2.0)
