@@ -108,7 +108,8 @@ UNHURRIED = 0.5
 
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
-    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 100})
+    # Room for a banner of ours, which there is while the picture is old.
+    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 200})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
@@ -146,19 +147,11 @@ def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.
 
 
 def tile(page: ViserPage) -> NDArray[np.uint8]:
-    """The middle of the scene, once the page has found room for all of it again."""
-
-    def fits() -> bool:
-        _, top, _, height = page.scene_rectangle()
-        size = page.page.viewport_size
-        return size is not None and TILE[1] <= height <= size["height"] - top
-
-    # A banner of ours moves the scene down while the picture is old.
-    page.wait_until(fits, "the scene to fit its window", seconds=60.0)
-    left, top, width, height = page.scene_rectangle()
-    picture = page.picture()
+    """The middle of the scene."""
+    picture = page.scene_picture()
     across, down = TILE
-    x, y = int(left + (width - across) / 2), int(top + (height - down) / 2)
+    height, width, _ = picture.shape
+    x, y = (width - across) // 2, (height - down) // 2
     shown = picture[y : y + down, x : x + across].astype(np.uint16)
     quarters = shown.reshape(down // 2, 2, across // 2, 2, 3)
     return (quarters.sum(axis=(1, 3)) // 4).astype(np.uint8)
