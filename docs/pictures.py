@@ -160,7 +160,7 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
-    pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(38.0)),
+    pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(50.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
 
