@@ -109,7 +109,8 @@ UNHURRIED = 0.5
 
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
-    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 100})
+    # Room for a banner of ours, which there is while the picture is old.
+    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 200})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
@@ -167,19 +168,11 @@ def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.
 
 
 def tile(page: ViserPage) -> NDArray[np.uint8]:
-    """The middle of the scene, once the page has found room for all of it again."""
-
-    def fits() -> bool:
-        _, top, _, height = page.scene_rectangle()
-        size = page.page.viewport_size
-        return size is not None and TILE[1] <= height <= size["height"] - top
-
-    # A banner of ours moves the scene down while the picture is old.
-    page.wait_until(fits, "the scene to fit its window", seconds=60.0)
-    left, top, width, height = page.scene_rectangle()
-    picture = page.picture()
+    """The middle of the scene."""
+    picture = page.scene_picture()
     across, down = TILE
-    x, y = int(left + (width - across) / 2), int(top + (height - down) / 2)
+    height, width, _ = picture.shape
+    x, y = (width - across) // 2, (height - down) // 2
     shown = picture[y : y + down, x : x + across].astype(np.uint16)
     quarters = shown.reshape(down // 2, 2, across // 2, 2, 3)
     return (quarters.sum(axis=(1, 3)) // 4).astype(np.uint8)
@@ -188,7 +181,7 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
-    pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(38.0)),
+    pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(50.0)),
     instruments: Camera((0.9, -0.75, 0.7), (0.25, 0.0, 0.2), math.radians(45.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }

@@ -375,6 +375,11 @@ class ViserPage:
         if "KATANA450_PICTURES" in os.environ:
             self.screenshot(path)
 
+    def scene_picture(self) -> NDArray[np.uint8]:
+        """Colours of the scene alone (height, width, 3), whatever the page around it does."""
+        with self._drawing():
+            return np.asarray(imageio.imread(self._canvas(), extension=".png")[..., :3])
+
     def screenshot(self, path: Path) -> Path:
         """Write a PNG of the window, or of the scene alone if the window cannot be had."""
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -388,8 +393,11 @@ class ViserPage:
                 return self.page.screenshot(timeout=20_000)
             except PlaywrightTimeoutError:
                 # The browser waits for a frame in vain while shaders compile; the canvas does not.
-                data: str = self.frame.evaluate("__viserMutable.canvas.toDataURL('image/png')")
-                return base64.b64decode(data.partition(",")[2])
+                return self._canvas()
+
+    def _canvas(self) -> bytes:
+        data: str = self.frame.evaluate("__viserMutable.canvas.toDataURL('image/png')")
+        return base64.b64decode(data.partition(",")[2])
 
     @contextmanager
     def _drawing(self) -> Iterator[None]:
