@@ -33,7 +33,7 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 | **websocket** `/api/v{version}/socket?name=NAME` | requests up, answers and states down |
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
 | **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` of 8 to 64 letters and digits tells programs apart |
-| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things` | what `look` tells |
+| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `look` tells |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .glb or .gltf file, to be placed by the key in the answer |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | what stands around as a .zip ([scenes](scenes.md)); one that is brought waits for a `load` |
 | **HTTP** `POST /api/v{version}/stop` | STOP |
@@ -68,8 +68,8 @@ raises `RefusedError`, whose text says why and what to do.
 
 [examples/octave](../examples/octave) has the few functions it takes (`katana_open`, `katana_say`,
 `katana_hear`, `katana_go`), kinematics in m-code, and the paper's circle streamed as joint angles.
-LabVIEW and Simulink connect alike: a TCP client block to the port of `--lines`, a JSON object and a
-line feed each way.
+`circle_by_name.m` sets rotations of the VRML world by DEF name instead, as VR Sink does. LabVIEW and
+Simulink connect alike: [simulink](simulink.md).
 
 ## By hand
 
@@ -92,10 +92,15 @@ def page() -> str:
     ):
         parts.append(f"## {title}\n")
         parts += [_kind(kind, tag) for kind in schema.kinds(union)]
+    parts.append("### In requests\n")
+    parts += [_kind(kind, None) for kind in (requests.Named, requests.Setting)]
     parts.append("### In answers\n")
     parts += [
         _kind(kind, None)
-        for kind in (answers.Finding, answers.Water, answers.Line, answers.Choice, answers.Thing)
+        for kind in (
+            *(answers.Finding, answers.Water, answers.Line, answers.Choice, answers.Thing),
+            *(answers.Value, answers.Node, answers.Field, answers.Link),
+        )
     ]
     return "\n".join(parts)
 

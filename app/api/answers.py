@@ -120,6 +120,14 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     why: str = ""
 
 
+class Value(msgspec.Struct, frozen=True, kw_only=True):
+    """What a field of a node of the VRML world is: a number, or as many as its type has."""
+
+    node: str
+    field: str
+    value: float | Numbers
+
+
 class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
@@ -139,12 +147,15 @@ class State(Answer, frozen=True, kw_only=True):
         touching: the fingers that touch what may be held. held: what both hold; null with an empty
             hand.
         branch: shoulder and elbow. reading: which numbers of a target count.
+        Where there are only joints, tool to roll, tool_speed, margins, branch and reading are null;
+            see ``arm``.
         status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
         speed: share of full speed.
         holder: name of who holds the arm. stopped: why nothing moves after a STOP.
         windows: how many pages and programs are open.
         water: of the cup; null where there is none.
         program: the one that is planned or runs, or ran last.
+        fields: of the VRML world, for who watches some.
     """
 
     t: float
@@ -156,17 +167,17 @@ class State(Answer, frozen=True, kw_only=True):
     goal: Numbers
     gripper: float
     gripper_goal: float
-    tool: str
-    T: list[Numbers]
-    pitch: float
-    roll: float
-    tool_speed: float
+    tool: str | None
+    T: list[Numbers] | None
+    pitch: float | None
+    roll: float | None
+    tool_speed: float | None
     holding: Numbers | None
-    margins: Margins
+    margins: Margins | None
     touching: list[str]
     held: str | None
-    branch: tuple[str, str]
-    reading: str
+    branch: tuple[str, str] | None
+    reading: str | None
     status: str
     moving: bool
     why: str
@@ -177,6 +188,7 @@ class State(Answer, frozen=True, kw_only=True):
     windows: int
     water: Water | None
     program: Progress | None = None
+    fields: tuple[Value, ...] = ()
 
 
 class Arm(Answer, frozen=True, kw_only=True):
@@ -189,7 +201,9 @@ class Arm(Answer, frozen=True, kw_only=True):
         tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one of
             them.
         gripper: closed and open [rad], and its speed [rad/s]; null without fingers.
-        T_base_shoulder: (4, 4) the frame {S} in the base frame.
+        T_base_shoulder: (4, 4) the frame {S} in the base frame; null where there are only joints.
+        slides: (n,) whether each joint slides; its numbers are in m then.
+        joints_only: why no tool can be brought to a pose; empty where one can.
     """
 
     name: str
@@ -201,9 +215,11 @@ class Arm(Answer, frozen=True, kw_only=True):
     jerk: Numbers
     ready: Numbers
     tools: dict[str, list[Numbers]]
-    default_tool: str
+    default_tool: str | None
     gripper: tuple[float, float, float] | None
-    T_base_shoulder: list[Numbers]
+    T_base_shoulder: list[Numbers] | None
+    slides: list[bool]
+    joints_only: str
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True):
@@ -288,6 +304,49 @@ class Things(Answer, frozen=True, kw_only=True):
     things: list[Thing]
 
 
+class Values(Answer, frozen=True, kw_only=True):
+    """What the fields are that were asked for, in that order."""
+
+    values: list[Value]
+
+
+class Field(msgspec.Struct, frozen=True, kw_only=True):
+    """One of a node's; ``type`` as VRML97 calls it. ``settable``: by ``set``, else only read."""
+
+    field: str
+    type: str
+    value: float | Numbers
+    settable: bool
+
+
+class Node(msgspec.Struct, frozen=True, kw_only=True):
+    """A node of the VRML world by its DEF name, and what it is of: a joint, link or thing."""
+
+    node: str
+    kind: str
+    of: str
+    fields: list[Field]
+
+
+class World(Answer, frozen=True, kw_only=True):
+    """All that can be set and got by name. Lengths in m, angles in rad, z up."""
+
+    nodes: list[Node]
+
+
+class Link(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a link is: ``T`` (4, 4) in the base frame."""
+
+    name: str
+    T: list[Numbers]
+
+
+class Links(Answer, frozen=True, kw_only=True):
+    """All of them, the base first."""
+
+    links: list[Link]
+
+
 class Mesh(Answer, frozen=True, kw_only=True):
     """A file that was uploaded and can now be placed.
 
@@ -311,7 +370,21 @@ class Scene(Answer, frozen=True, kw_only=True):
 
 
 AnyAnswer = (
-    Welcome | Done | Refused | Echo | State | Arm | Ledger | Branches | Loop | Things | Mesh | Scene
+    Welcome
+    | Done
+    | Refused
+    | Echo
+    | State
+    | Arm
+    | Ledger
+    | Branches
+    | Loop
+    | Things
+    | Values
+    | World
+    | Links
+    | Mesh
+    | Scene
 )
 
 _decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)

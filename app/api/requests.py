@@ -38,6 +38,8 @@ LEAST_SHARE = 0.01
 MOST_STATES = 100
 """States a second that one can be told: as many as there are."""
 
+MOST_JOINTS = 32
+
 Rates = tuple[float, float, float, float, float]
 """Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
 
@@ -51,6 +53,8 @@ LONGEST_PRESS = 64
 
 Press = Annotated[str, Meta(min_length=1, max_length=LONGEST_PRESS)] | None
 Name = Annotated[str, Meta(min_length=1, max_length=40)]
+FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
+NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
 Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
 
 
@@ -176,16 +180,16 @@ class Speed(Request, frozen=True, kw_only=True):
 
 
 class Joint(Request, frozen=True, kw_only=True):
-    """Drive one joint; ``axis`` counts from 1."""
+    """Drive one joint; ``axis`` counts from 1. What slides is told in m."""
 
-    axis: Annotated[int, Meta(ge=1, le=5)]
+    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
     value: float
 
 
 class Joints(Request, frozen=True, kw_only=True):
     """Drive all joints to ``q``; they arrive together, on a straight line in joint space."""
 
-    q: Annotated[list[float], Meta(min_length=1, max_length=16)]
+    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
 
 
 class Servo(Request, frozen=True, kw_only=True):
@@ -195,8 +199,8 @@ class Servo(Request, frozen=True, kw_only=True):
     other comes for 0.2 s the arm comes to rest.
     """
 
-    q: Annotated[list[float], Meta(min_length=1, max_length=16)]
-    qd: Annotated[list[float], Meta(min_length=1, max_length=16)] | None = None
+    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
+    qd: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)] | None = None
 
 
 class Pose(Request, frozen=True, kw_only=True):
@@ -326,6 +330,42 @@ class Fill(Request, frozen=True, kw_only=True):
     ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
 
+class Named(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A field of a node of the VRML world, by its DEF name."""
+
+    node: NodeName
+    field: NodeName
+
+
+class Setting(Named, frozen=True, kw_only=True):
+    """What such a field is to be; null for how it is made."""
+
+    value: FieldValue
+
+
+class Set(Request, frozen=True, kw_only=True):
+    """Set a field of the VRML world by the DEF name of its node, as VR Sink does; ``more`` at once.
+
+    Either all are set or, where one cannot be, none. The names are those of `katana450 export
+    vrml`; ``look`` at ``world`` lists them. A joint is never put anywhere: its ``rotation`` is an
+    order to go there, by the rules of ``joints``. ``value`` null: a colour, a transparency or a
+    choice as it is made.
+    """
+
+    node: NodeName
+    field: NodeName
+    value: FieldValue
+    more: tuple[Setting, ...] = ()
+
+
+class Get(Request, frozen=True, kw_only=True):
+    """Tell what a field of the VRML world is now, as VR Source does, and ``more`` of them."""
+
+    node: NodeName
+    field: NodeName
+    more: tuple[Named, ...] = ()
+
+
 class Order(Enum):
     """What a program can be told."""
 
@@ -360,16 +400,20 @@ class Steer(Request, frozen=True, kw_only=True):
 
 
 class Watch(Request, frozen=True, kw_only=True):
-    """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less."""
+    """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less.
+
+    ``fields``: of the VRML world, whose values each state is to bring.
+    """
 
     hz: Annotated[float, Meta(ge=0.0, le=MOST_STATES)]
+    fields: tuple[Named, ...] = ()
 
 
 class Look(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
-    the things around it."""
+    the things around it, the VRML world, where its links are."""
 
-    at: Literal["state", "arm", "ledger", "branches", "loop", "things"] = "state"
+    at: Literal["state", "arm", "ledger", "branches", "loop", "things", "world", "links"] = "state"
 
 
 AnyRequest = (
@@ -406,6 +450,8 @@ AnyRequest = (
     | Load
     | Remove
     | Fill
+    | Set
+    | Get
     | Program
     | Steer
     | Watch

@@ -19,6 +19,8 @@ READABLE = {
     "branches": answers.Branches,
     "loop": answers.Loop,
     "things": answers.Things,
+    "world": answers.World,
+    "links": answers.Links,
 }
 
 

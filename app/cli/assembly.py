@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from app.control import commands as cmd
+from app.control.joint_session import JointSession
 from app.control.session import Session
 from app.control.things import Hand, Thing
 from app.drivers.simulated import SimulatedDriver
+from app.errors import RobotDescriptionError
+from app.exchange.machine import Machine, load_machine
 from app.robot.bare import bare
 from app.robot.collision import hand_of, table, things_of, world_of
 from app.robot.model import RobotModel, load
@@ -67,14 +70,40 @@ def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     return Described(model, session, tuple(notes))
 
 
+class Jointed(NamedTuple):
+    """Likewise of a mechanism that is driven joint by joint."""
+
+    machine: Machine
+    session: JointSession
+    notes: tuple[str, ...]
+
+
+def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described | Jointed:
+    """An arm of the family with all it can do; of any other mechanism, its joints.
+
+    Raises RobotDescriptionError for what is neither, or where a tool was asked for.
+    """
+    try:
+        return described(settings, urdf, tool)
+    except RobotDescriptionError as error:
+        if tool is not None or settings.bare or not urdf.is_file():
+            raise
+        machine = load_machine(urdf, str(error))
+        notes = (*machine.notes, f"Joints only. {error}")
+        return Jointed(machine, JointSession(machine.joints, machine.way), notes)
+
+
 class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
-    def __init__(self, settings: Settings, robot: Described, scene: Scene | None = None) -> None:
+    def __init__(
+        self, settings: Settings, robot: Described | Jointed, scene: Scene | None = None
+    ) -> None:
         """``scene``: what stands around in place of the robot's own, and where the arm stands."""
-        model, session, self.notes = robot
+        arm = robot.model.arm if isinstance(robot, Described) else robot.machine.joints
+        session, self.notes = robot.session, robot.notes
         start = session.ready if scene is None or scene.joints is None else scene.joints
-        driver = SimulatedDriver(model.arm, start, gripper=0.0)
+        driver = SimulatedDriver(arm, start, gripper=0.0)
         self._mailbox = Mailbox(session.check)
         if scene is not None:
             self._mailbox.put(cmd.Furnish(scene.things, scene.water))

@@ -147,29 +147,9 @@ def _serve(
     telling.send(OPEN)
     try:
         # The libraries that read the robot take most of a second: the page loads in the meantime.
-        from app.cli.assembly import described
-        from app.exchange.reachability_file import load_map
-        from app.exchange.scripts import Scripts
-        from app.gateway.motion import Motion
-        from app.runtime.link import FrontEnd
-        from app.runtime.navigator import Navigator
-        from app.view.view import Besides, View
+        from app.cli.parts import attached
 
-        stored = None if workspace is None else load_map(workspace)
-        model, session, _ = described(settings, *robot)
-        link = FrontEnd(pipe, session.check)
-        navigator = Navigator(session, link.board, link)
-        view = View(
-            gateway.viser,
-            model,
-            link.board,
-            navigator,
-            session,
-            settings.frame_rate,
-            Besides(stored, (gateway.steering, Scripts(settings.programs)), kept),
-        )
-        navigator.tell = gateway.announce
-        gateway.attach(Motion(model, session, link, navigator, view.let_go))
+        link, view = attached(gateway, settings, robot, workspace, kept, pipe)
         link.start()
         view.start()
         telling.send(READY)

@@ -228,7 +228,8 @@ def _parser() -> argparse.ArgumentParser:
             type=Path,
             default=URDF_PATH,
             metavar="FILE",
-            help="another arm: pan, three parallel axes, roll (default: the Katana450)",
+            help="another arm: pan, three parallel axes, roll; `serve` drives any other tree joint "
+            "by joint (default: the Katana450)",
         )
         command.add_argument(
             "--tool", metavar="LINK", help="link that targets are for (default: the last one)"

@@ -74,11 +74,10 @@ def serve(
     current = front()
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
-        from app.cli.assembly import RunningArm, described
+        from app.cli.assembly import RunningArm, recognised
 
-        if robot is None:
-            robot = described(settings, urdf, tool)
-        arm = RunningArm(settings, robot, None if stored is None else stored.scene)
+        found = recognised(settings, urdf, tool) if robot is None else robot
+        arm = RunningArm(settings, found, None if stored is None else stored.scene)
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr)
         current.wait_for(OPEN)

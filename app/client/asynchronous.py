@@ -68,7 +68,7 @@ class AsyncClient:
         await self._say(request)
 
     async def look(self, kind: type[A]) -> A:
-        """One of answers.State, Arm, Ledger, Branches, Loop, Things."""
+        """One of answers.State, Arm, Ledger, Branches, Loop, Things, World, Links."""
         answer = await self.ask(requests.Look(at=kind.__name__.lower()))  # type: ignore[arg-type]
         if not isinstance(answer, kind):
             raise LostError(f"{kind.__name__} was asked for, and {answer} came.")

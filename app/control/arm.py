@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from app.errors import InputError
@@ -62,9 +62,8 @@ class Arm:
     def limits(self) -> Limits:
         """Of the joints' motion, gentle where nobody says."""
         chain = self.chain
-        acceleration = chain.speed / GENTLE if self.acceleration is None else self.acceleration
-        jerk = acceleration / SOFT if self.jerk is None else self.jerk
-        return Limits(chain.lower, chain.upper, chain.speed, acceleration, jerk)
+        gentle = limits_of(chain.lower, chain.upper, chain.speed, self.acceleration)
+        return gentle if self.jerk is None else replace(gentle, jerk=self.jerk)
 
     @cached_property
     def chains(self) -> Mapping[str, Chain]:
@@ -78,3 +77,11 @@ class Arm:
         except (KeyError, TypeError):
             known = ", ".join(self.tools)
             raise InputError(f"There is no tool {tool!r}; this arm has {known}.") from None
+
+
+def limits_of(
+    lower: FloatArray, upper: FloatArray, speed: FloatArray, acceleration: FloatArray | None = None
+) -> Limits:
+    """Gentle ones of joints whose own, (n,) each, say no more."""
+    acceleration = speed / GENTLE if acceleration is None else acceleration
+    return Limits(lower, upper, speed, acceleration, acceleration / SOFT)

@@ -19,29 +19,44 @@ def check(arm: Arm, pouring: Pouring | None, hand: Hand | None, command: cmd.Com
     match command:
         case cmd.SetJoint(axis=axis) if axis >= n:
             raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
+        case cmd.SetAxes(values=values):
+            for axis, value in values:
+                check(arm, pouring, hand, cmd.SetJoint(axis, value))
+        case cmd.Together(commands=commands):
+            for each in commands:
+                check(arm, pouring, hand, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
             raise InputError(f"This arm has {n} joints, the command {q.size}.")
         case cmd.SetTool(name=name):
             arm.chain_to(name)
-        case cmd.Fill(volume=volume):
-            if pouring is None:
-                raise InputError("There is no cup to fill.")
-            pouring.check(volume)
-        case cmd.Furnish(things=things, volume=volume):
-            for thing in things:
-                _check_hand(hand, thing)
-            if volume is not None:
-                if pouring is None or all(thing.name != CUP for thing in things):
-                    raise InputError("There is no cup to fill.")
-                pouring.check(volume)
-        case cmd.Place(thing=thing):
-            _check_hand(hand, thing)
-        case cmd.Attach(to=Mount.HAND) if hand is None:
-            raise InputError(NO_HAND)
         case cmd.Follow(plan=plan):
             chains = [segment.path.chain for segment in plan.segments]
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
                 raise InputError("The plan was made for another arm.")
+        case _:
+            _check_things(pouring, hand, command)
+
+
+def _check_things(pouring: Pouring | None, hand: Hand | None, command: cmd.Command) -> None:
+    match command:
+        case cmd.Fill(volume=volume):
+            _check_water(pouring, volume)
+        case cmd.Furnish(things=things, volume=volume):
+            for thing in things:
+                _check_hand(hand, thing)
+            if volume is not None:
+                has_cup = any(thing.name == CUP for thing in things)
+                _check_water(pouring if has_cup else None, volume)
+        case cmd.Place(thing=thing):
+            _check_hand(hand, thing)
+        case cmd.Attach(to=Mount.HAND) if hand is None:
+            raise InputError(NO_HAND)
+
+
+def _check_water(pouring: Pouring | None, volume: float) -> None:
+    if pouring is None:
+        raise InputError("There is no cup to fill.")
+    pouring.check(volume)
 
 
 def _check_hand(hand: Hand | None, thing: Thing) -> None:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.control.things import MOST, Mount, Thing
+from app.control.looks import AS_MADE, LONGEST_NAME, Trait
+from app.control.things import FARTHEST, MOST, Mount, Thing
 from app.errors import InputError
-from app.geometry import se3
+from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.reading import Reading
@@ -38,6 +39,20 @@ class SetJoint:
         if isinstance(self.axis, bool) or not isinstance(self.axis, int) or self.axis < 0:
             raise InputError(f"An axis is a whole number from 0, not {self.axis!r}.")
         _check_finite(f"The angle of axis {self.axis + 1}", self.value)
+
+
+@dataclass(frozen=True)
+class SetAxes:
+    """Drive some joints, each (axis, value): the value in [rad], the axis counted from 0.
+
+    The others go on to where they were going.
+    """
+
+    values: tuple[tuple[int, float], ...]
+
+    def __post_init__(self) -> None:
+        for axis, value in self.values:
+            SetJoint(axis, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +277,55 @@ class Remove:
     name: str
 
 
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """Put the thing of that name elsewhere, or turn it; what is held stays.
+
+    position: (3,) [m], R: (3, 3), of its frame in the base; None to keep what it has.
+    """
+
+    name: str
+    position: FloatArray | None = None
+    R: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.position is not None:
+            position = _vector(f"The position of {self.name!r}", self.position, 3)
+            if np.abs(position).max() > FARTHEST:
+                raise InputError(f"{self.name!r} would be more than {FARTHEST:g} m away.")
+            object.__setattr__(self, "position", position)
+        if self.R is not None:
+            R = so3.validated(self.R, f"The rotation of {self.name!r}")
+            object.__setattr__(self, "R", frozen(R))
+
+
+@dataclass(frozen=True)
+class Dress:
+    """Change one trait of how the link or thing ``name`` is shown; see ``Look.having``."""
+
+    name: str
+    trait: Trait
+    value: float | tuple[float, ...] | None
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and 0 < len(self.name) <= LONGEST_NAME):
+            raise InputError(
+                f"A part's name has 1 to {LONGEST_NAME} characters, not {self.name!r}."
+            )
+        AS_MADE.having(self.trait, self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Several at once, in one tick: all of them, or none when one cannot be."""
+
+    commands: tuple[Command, ...]
+
+    def __post_init__(self) -> None:
+        if any(isinstance(each, Together) for each in self.commands):
+            raise InputError("Commands that are given together are single ones.")
+
+
 @dataclass(frozen=True)
 class Attach:
     """Fix the thing of that name to the hand, or to the world again; what is held stays."""
@@ -294,6 +358,7 @@ class Furnish:
 
 Command = (
     SetJoint
+    | SetAxes
     | SetJoints
     | Servo
     | MoveTool
@@ -318,9 +383,16 @@ Command = (
     | Attach
     | Furnish
     | Fill
+    | Shift
+    | Dress
+    | Together
     | SpeedScale
     | Jog
 )
+
+
+THINGS = (Place, Shift, Attach, Furnish, Remove, Fill, Dress)
+"""Those about what stands around and what is seen: no joint moves by them."""
 
 
 def _check_finite(what: str, value: object) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ import numpy as np
 from app import tolerances
 from app.collision.world import World
 from app.control import commands as cmd
-from app.control.aims import gone, leaving, without
+from app.control.aims import dressed, gone, leaving, removed, shifted, turned, without
 from app.control.arm import Arm
 from app.control.checks import check
 from app.control.choices import Choice, choice, choices, wish, wish_on
@@ -47,16 +48,7 @@ TOOL_SPEED = 0.5
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
-SAFE = (
-    cmd.Stop,
-    cmd.Release,
-    cmd.SpeedScale,
-    cmd.Place,
-    cmd.Remove,
-    cmd.Attach,
-    cmd.Furnish,
-    cmd.Fill,
-)
+SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Together, *cmd.THINGS)
 """What counts while a stop holds the arm."""
 
 AT_START = 1e-6
@@ -213,10 +205,8 @@ class Session:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
                 return leaving(replace(state, jogging=jogging, since=None, let_go=False))
-            case cmd.SetJoint(axis=axis, value=value):
-                q = np.array(state.goal)
-                q[axis] = value
-                return self._aim(state, JointTarget(frozen(q)))
+            case cmd.SetJoint() | cmd.SetAxes():
+                return self._aim(state, turned(state, command))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
             case cmd.Servo(q=q, qd=qd):
@@ -252,8 +242,13 @@ class Session:
             case cmd.Place(thing=thing):
                 return replace(state, things=placed(state.things, thing))
             case cmd.Remove(name=name):
-                things = tuple(each for each in state.things if each.held or each.name != name)
-                return replace(state, things=things)
+                return removed(state, name)
+            case cmd.Shift():
+                return shifted(state, command)
+            case cmd.Dress():
+                return dressed(state, command)
+            case cmd.Together(commands=commands):
+                return functools.reduce(self._take, commands, state)
             case cmd.Attach(name=name, to=to):
                 x = np.append(state.setpoint, state.gripper_setpoint)
                 mounted = tuple(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from app.control.following import Following
+from app.control.looks import ALL_AS_MADE, Looks
 from app.control.pouring import Poured
 from app.control.things import Thing
 from app.geometry.arrays import FloatArray
@@ -68,6 +69,7 @@ class Reason(Enum):
     OUT_OF_REACH = "out of reach"
     POSITION_CHANGED = "position changed"
     AXIS_LIMIT = "axis limit"
+    SLIDE_LIMIT = "slide limit"
     GRIPPER_LIMIT = "gripper limit"
     YAW_FIXED = "yaw fixed"
     PITCH_CHANGED = "pitch changed"
@@ -83,9 +85,10 @@ class Finding:
 
     Attributes:
         reason: what holds the goal back.
-        amount: by how much [m or rad]; for a limit, the limit itself [rad]; for a gap, the leap
-            across it [rad]; for a contact, the distance that is left [m]; for a stop, how far the
-            tool went until it was at rest [m]; for a plan, how far its start is [rad].
+        amount: by how much [m or rad]; for a limit, the limit itself [rad or m]; for a gap, the
+            leap across it [rad]; for a contact, the distance that is left [m]; for a stop, how far
+            the tool, or else any link, went until it was at rest [m]; for a plan, how far its start
+            is [rad].
         axis: the axis it is about, counted from 0, where it is about one.
         parts: the two links or things it is about, where it is about two.
         time: for a stop, how long that took [s].
@@ -100,7 +103,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Halt:
-    """A stop: how far the tool went until it was at rest [m], and how long that took [s]."""
+    """A stop: how far the tool, or else any link, went until it was at rest [m], and how long that
+    took [s]."""
 
     way: float
     time: float
@@ -137,7 +141,8 @@ class State:
         q, gripper: where the arm is, as the driver last said, (n,) and scalar [rad].
         motion, gripper_setpoint: what the driver is told in this tick, and how it moves.
         goal, gripper_goal: where the arm is going: the nearest it can do to the target.
-        tool: the tool frame that targets and read-outs are of.
+        tool: the tool frame that targets and read-outs are of; empty where there are only joints,
+            and then the branch and the reading say nothing.
         target: what was wished, kept as it was wished.
         branch: the branch that dragging keeps.
         reading: which numbers of a target count, and what gives way.
@@ -153,6 +158,7 @@ class State:
         things: what stands around or is held, and can be put elsewhere.
         grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
         poured: the water of the cup; None where there is none.
+        looks: how links and things are shown.
         let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
         following: the plan the arm is on and where on it, until it is told to go elsewhere; None
             when it is on none.
@@ -182,6 +188,7 @@ class State:
     things: tuple[Thing, ...] = ()
     grip: float | None = None
     poured: Poured | None = None
+    looks: Looks = ALL_AS_MADE
 
     @property
     def status(self) -> Status:

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from app.control.arm import Arm
+from app.control.arm import Gripper
 from app.drivers.driver import Sent
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
+from app.motion.limiter import Limits
+
+
+class Jointed(Protocol):
+    """What it has to know of an arm; any ``Arm`` is one."""
+
+    @property
+    def limits(self) -> Limits: ...
+
+    @property
+    def gripper(self) -> Gripper: ...
 
 
 class SimulatedDriver:
     """Keeps to limits and speeds by itself, so that a fault upstream shows instead of hiding."""
 
-    def __init__(self, arm: Arm, q: FloatArray, gripper: float) -> None:
+    def __init__(self, arm: Jointed, q: FloatArray, gripper: float) -> None:
         """The arm stands at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad]."""
-        self._arm = arm
-        self._sent = Sent(frozen(arm.chain.clamp(q)), gripper)
+        self._limits = arm.limits
+        self._fingers = arm.gripper
+        self._sent = Sent(self._clamped(q), gripper)
         self._t: float | None = None
 
     def start(self, t: float) -> Sent:
@@ -32,16 +46,19 @@ class SimulatedDriver:
         self._t = max(t, self._t)
         if gripper == self._sent.gripper and (q == self._sent.q).all():
             return self._sent
-        step = self._arm.chain.speed * dt
-        moved = self._sent.q + np.clip(self._arm.chain.clamp(q) - self._sent.q, -step, step)
+        step = self._limits.speed * dt
+        moved = self._sent.q + np.clip(self._clamped(q) - self._sent.q, -step, step)
         self._sent = Sent(frozen(moved), self._gripper(gripper, dt))
         return self._sent
 
     def stop(self) -> None:
         self._t = None
 
+    def _clamped(self, q: FloatArray) -> FloatArray:
+        return frozen(np.clip(q, self._limits.lower, self._limits.upper))
+
     def _gripper(self, angle: float, dt: float) -> float:
-        fingers = self._arm.gripper
+        fingers = self._fingers
         step = fingers.speed * dt
         wanted = min(max(angle, fingers.lower), fingers.upper)
         return self._sent.gripper + min(max(wanted - self._sent.gripper, -step), step)

@@ -43,10 +43,28 @@ class Shape:
     faces: npt.NDArray[np.int64]
 
     @cached_property
+    def area(self) -> float:
+        """[m^2]"""
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    @cached_property
     def corners(self) -> FloatArray:
         """(8, 3) of the box round it."""
         ends = (self.vertices.min(axis=0), self.vertices.max(axis=0))
         return np.array(list(itertools.product(*np.transpose(ends).tolist())))
+
+
+PLAIN = (0.8, 0.8, 0.8)
+"""The colour that VRML gives what says none."""
+
+
+def main_colour(shapes: Sequence[Shape]) -> tuple[float, float, float]:
+    """sRGB 0..1 of most of their surface; PLAIN where there are none."""
+    areas: dict[Material, float] = {}
+    for shape in shapes:
+        areas[shape.material] = areas.get(shape.material, 0.0) + shape.area
+    return max(areas, key=areas.__getitem__).colour if areas else PLAIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +78,7 @@ class Joint:
         lower, upper: limits [rad] or [m], infinite where there are none.
         leader: the joint whose value it follows, by its own name when it is driven itself.
         factor, offset: value = factor * leader + offset.
+        speed: the most of it [rad/s] or [m/s], infinite where none is named.
     """
 
     name: str
@@ -70,6 +89,7 @@ class Joint:
     leader: str
     factor: float = 1.0
     offset: float = 0.0
+    speed: float = math.inf
 
     def motion(self, value: float) -> FloatArray:
         """(4, 4) that the joint adds at ``value`` of its own."""
@@ -88,6 +108,11 @@ class Link:
     T_parent_link: FloatArray
     joint: Joint | None
     shapes: tuple[Shape, ...]
+
+    @cached_property
+    def colour(self) -> tuple[float, float, float]:
+        """sRGB 0..1 of most of its surface; PLAIN without shapes."""
+        return main_colour(self.shapes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +140,11 @@ class Mechanism:
     def home(self) -> Mapping[str, FloatArray]:
         """(4, 4) of each link in the root at zero, where every joint adds nothing."""
         return self.frames({})
+
+    def axis(self, joint: Joint) -> FloatArray:
+        """(3,) unit direction of ``joint`` in the root's frame at zero."""
+        link = next(link for link in self.links if link.joint is joint)
+        return self.home[link.name][:3, :3] @ joint.axis
 
     def values(self, pose: Sequence[float]) -> dict[str, float]:
         """The value of every joint [rad] or [m] for those of the first driven ones.

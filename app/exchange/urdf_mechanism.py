@@ -106,8 +106,18 @@ def _joint(path: Path, joint: Any) -> Joint | None:
         leader = joint.mimic.joint
         factor = 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
         offset = 0.0 if joint.mimic.offset is None else float(joint.mimic.offset)
-    slides = MOVABLE[joint.type]
-    return Joint(joint.name, slides, frozen(axis / size), lower, upper, leader, factor, offset)
+    named = None if joint.limit is None else joint.limit.velocity
+    return Joint(
+        name=joint.name,
+        slides=MOVABLE[joint.type],
+        axis=frozen(axis / size),
+        lower=lower,
+        upper=upper,
+        leader=leader,
+        factor=factor,
+        offset=offset,
+        speed=math.inf if named is None else float(named),
+    )
 
 
 def _with_leaders(path: Path, mechanism: Mechanism) -> Mechanism:

@@ -3,12 +3,15 @@
 Geometry stands where it is at zero, in the root's frame, as a CAD program exports an assembly; each
 joint is a Transform whose `center` is a point of its axis and whose `rotation` is about that axis.
 The nested Transforms are therefore the product of exponentials, link by link.
+
+A link's shapes stand in a Switch: 0 as they are made, 1 painted in one colour, -1 hidden.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +27,8 @@ from app.exchange.mechanism import (
 )
 from app.exchange.names import distinct
 from app.exchange.trajectory_file import Motion
-from app.exchange.vrml_node import KEYWORDS, Node, Route, Use, Value, World
+from app.exchange.vrml_names import Names
+from app.exchange.vrml_node import Node, Route, Use, Value, World
 from app.exchange.vrml_text import world_text
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
@@ -33,8 +37,6 @@ DIGITS = 5
 """Decimals of a coordinate [m]: a hundredth of a millimetre."""
 
 NORMAL_DIGITS = 3
-
-CLOCK = "Clock"
 
 SKY = (0.87, 0.89, 0.92)
 
@@ -48,7 +50,7 @@ def world_of(
     mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
 ) -> World:
     """The whole mechanism at the joint `values` [rad, m]; with a motion it plays it by itself."""
-    names = _Names(mechanism)
+    names = Names(mechanism)
     root = _link(mechanism, mechanism.links[0], values, names, set())
     nodes = [
         *_surroundings(mechanism),
@@ -81,34 +83,11 @@ def vrml_files(
 
 def part_world(mechanism: Mechanism, link: Link) -> World:
     """One link alone where it is at zero, z up, so that all of them loaded make the mechanism."""
-    names = _Names(mechanism)
+    names = Names(mechanism)
     shapes = _shapes(mechanism, link, names, set())
     part = Node("Group", (("children", tuple(shapes)),), names.links[link.name])
     title = Node("WorldInfo", (("title", f"{mechanism.name} {link.name}"),))
     return World((title, Node("Transform", (("rotation", Z_UP), ("children", (part,))))))
-
-
-class _Names:
-    """VRML's names for all that has one."""
-
-    def __init__(self, mechanism: Mechanism) -> None:
-        links = [link.name for link in mechanism.links]
-        materials = {shape.material for link in mechanism.links for shape in link.shapes}
-        self._materials = sorted(materials, key=repr)
-        wanted = [*links, *mechanism.joints, *(m.name for m in self._materials), CLOCK]
-        made = distinct(wanted, KEYWORDS)
-        self.links = dict(zip(links, made, strict=False))
-        self.joints = dict(zip(mechanism.joints, made[len(links) :], strict=False))
-        rest = made[len(links) + len(mechanism.joints) :]
-        self._appearances = dict(zip(self._materials, rest, strict=False))
-        self.clock = made[-1]
-        self.way = "_motion"
-        while any(f"{joint}{self.way}" in made for joint in self.joints.values()):
-            self.way += "_"
-
-    def appearance(self, material: Material) -> str:
-        """Of its Appearance."""
-        return self._appearances[material]
 
 
 def _surroundings(mechanism: Mechanism) -> list[Node]:
@@ -149,11 +128,11 @@ def _link(
     mechanism: Mechanism,
     link: Link,
     values: Mapping[str, float],
-    names: _Names,
+    names: Names,
     told: set[Material],
 ) -> Node:
     """The node of a link with all that hangs on it."""
-    own = _shapes(mechanism, link, names, told)
+    own = _switch(mechanism, link, names, told)
     hung = [_link(mechanism, other, values, names, told) for other in mechanism.children(link)]
     center = ("center", _rounded(mechanism.home[link.name][:3, 3], 9))
     children = ("children", (*own, *hung))
@@ -164,25 +143,42 @@ def _link(
     return Node("Transform", (center, moved, ("children", (group,))), names.joints[link.joint.name])
 
 
+def _switch(
+    mechanism: Mechanism, link: Link, names: Names, told: set[Material]
+) -> tuple[Node, ...]:
+    """The shapes of a link as they are made, and once more to be painted."""
+    if not link.shapes:
+        return ()
+    dressed = names.dressed[link.name]
+    colours = (("diffuseColor", _rounded(link.colour, 4)), ("transparency", 0.0))
+    paint: Node | Use = Node("Material", colours, dressed.paint)
+    made: list[Node] = []
+    painted: list[Node] = []
+    for number, shape in enumerate(_shapes(mechanism, link, names, told)):
+        name = f"{names.links[link.name]}{names.surface}{number}"
+        look, (field, surface) = shape.fields
+        assert isinstance(surface, Node)
+        made.append(replace(shape, fields=(look, (field, replace(surface, name=name)))))
+        one = Node("Appearance", (("material", paint),))
+        painted.append(Node("Shape", (("appearance", one), (field, Use(name)))))
+        paint = Use(dressed.paint)
+    choices = tuple(Node("Group", (("children", tuple(each)),)) for each in (made, painted))
+    return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.look),)
+
+
 def _moved(mechanism: Mechanism, joint: Joint, value: float) -> tuple[str, Value]:
-    axis = _axis(mechanism, joint)
+    axis = mechanism.axis(joint)
     if joint.slides:
         return "translation", _rounded(value * axis, 9)
     return "rotation", (*_rounded(axis, 9), value)
 
 
-def _axis(mechanism: Mechanism, joint: Joint) -> FloatArray:
-    """(3,) unit direction of a joint in the root's frame at zero."""
-    link = next(link for link in mechanism.links if link.joint is joint)
-    return mechanism.home[link.name][:3, :3] @ joint.axis
-
-
-def _shapes(mechanism: Mechanism, link: Link, names: _Names, told: set[Material]) -> list[Node]:
+def _shapes(mechanism: Mechanism, link: Link, names: Names, told: set[Material]) -> list[Node]:
     T = mechanism.home[link.name]
     return [_shape(shape, T, names, told) for shape in link.shapes]
 
 
-def _shape(shape: Shape, T: FloatArray, names: _Names, told: set[Material]) -> Node:
+def _shape(shape: Shape, T: FloatArray, names: Names, told: set[Material]) -> Node:
     name = names.appearance(shape.material)
     appearance: Node | Use
     if shape.material in told:
@@ -217,9 +213,9 @@ def _material(material: Material) -> Node:
     )
 
 
-def _interpolator(joint: Joint, mechanism: Mechanism, motion: Motion, names: _Names) -> Node:
+def _interpolator(joint: Joint, mechanism: Mechanism, motion: Motion, names: Names) -> Node:
     name = f"{names.joints[joint.name]}{names.way}"
-    axis = _axis(mechanism, joint)
+    axis = mechanism.axis(joint)
     t, values = motion.keys(joint.name)
     keys = ("key", tuple((t / motion.t[-1]).tolist()))
     if joint.slides:

@@ -79,6 +79,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "ambientIntensity": Type.FLOAT,
         },
         "Group": _CHILDREN,
+        "Switch": {"whichChoice": Type.INT, "choice": Type.NODE_LIST},
         "Transform": {
             "translation": Type.VECTOR,
             "center": Type.VECTOR,
@@ -92,6 +93,7 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
             "specularColor": Type.COLOR,
             "ambientIntensity": Type.FLOAT,
             "shininess": Type.FLOAT,
+            "transparency": Type.FLOAT,
         },
         "IndexedFaceSet": {
             "solid": Type.BOOL,

@@ -24,7 +24,7 @@ from app.gateway.uploads import ROOT, Uploads, body_of
 
 log = logging.getLogger(__name__)
 
-QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things")
+QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "links")
 """Each is a path of its own."""
 
 PROGRAM = re.compile(r"[A-Za-z0-9_-]{8,64}")
@@ -71,6 +71,8 @@ class Api:
                 return _json(self._desk.look(at))
             except LeaseError as error:
                 raise HTTPException(TOO_SOON, str(error)) from error
+            except InputError as error:
+                return _json(answers.Refused(why=str(error)), REFUSED)
 
         return read
 

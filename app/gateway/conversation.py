@@ -33,6 +33,10 @@ NONSENSE = 1008
 """Close code for who says what is no request, again and again."""
 
 
+QUESTIONS = (requests.Beat, requests.Look, requests.Get)
+"""Requests that are answered without an id too."""
+
+
 class GoneError(Exception):
     """The other side has hung up."""
 
@@ -96,7 +100,7 @@ class Conversation(ABC):
     def answer(self, window: Window, request: requests.AnyRequest) -> None:
         """Do it and tell the answer, if the request has an id or is a question."""
         answer = self._desk.do(window, request)
-        if request.id is not None or isinstance(request, requests.Beat | requests.Look):
+        if request.id is not None or isinstance(request, QUESTIONS):
             self.tell(answer)
 
     async def run(self, window: Window) -> None:

@@ -44,6 +44,11 @@ class Desk:
                 return answers.Echo(n=n)
             case requests.Look(at=at):
                 return self.look(at)
+            case requests.Get(node=node, field=field, more=more):
+                arm, first = hub.present(), requests.Named(node=node, field=field)
+                return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
+        if isinstance(request, requests.Set):
+            return answers.Done(ticket=hub.move(window, self._setting(request)))
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
@@ -106,11 +111,17 @@ class Desk:
                 return cmd.TakeBranch(Branch(shoulder, elbow))
         return self._placing.command(request)
 
+    def _setting(self, asked: requests.Set) -> cmd.Command:
+        """What sets fields of the VRML world, all at once."""
+        arm = self._hub.present()
+        first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
+        return arm.nodes.command(arm.state, (first, *asked.more))
+
     def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
         """(4, 4) from ``frame`` into {S}."""
         if frame is requests.Frame.SHOULDER:
             return np.eye(4)
-        return se3.inverse(self._hub.present().model.T_base_shoulder)
+        return se3.inverse(self._hub.present().robot.T_base_shoulder)
 
     def look(self, at: str) -> answers.Answer:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
@@ -119,6 +130,9 @@ class Desk:
             case "arm":
                 arm = hub.present()
                 return tell.arm(arm.model, arm.ready.tolist())
+            case "links":
+                arm = hub.present()
+                return arm.nodes.links(arm.state)
             case "ledger":
                 return answers.Ledger(lines=[tell.line(line) for line in hub.journal.lines])
             case "branches":
@@ -126,6 +140,9 @@ class Desk:
                 return answers.Branches(choices=[tell.choice(each) for each in choices])
             case "things":
                 return tell.things(hub)
+            case "world":
+                arm = hub.present()
+                return arm.nodes.world(arm.state)
             case "loop":
                 return tell.loop(hub.present().lateness)
         return tell.state(hub)

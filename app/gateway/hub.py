@@ -22,9 +22,11 @@ from app.control.pouring import Pouring
 from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import LeaseError
+from app.exchange.machine import Machine
 from app.exchange.meshes import Meshes
 from app.gateway.door import Visitor
 from app.gateway.journal import Journal
+from app.gateway.nodes import Nodes
 from app.gateway.performer import Performer
 from app.gateway.scenes import Scenes
 from app.geometry.arrays import FloatArray
@@ -48,7 +50,13 @@ class Arm(Protocol):
     """What the gateway asks of the arm; ``Motion`` is one."""
 
     @property
-    def model(self) -> RobotModel: ...
+    def model(self) -> RobotModel | Machine: ...
+
+    @property
+    def robot(self) -> RobotModel: ...
+
+    @property
+    def nodes(self) -> Nodes: ...
 
     @property
     def snapshot(self) -> Snapshot: ...

@@ -23,6 +23,7 @@ UNITS = {
     Reason.OUT_OF_REACH: "m",
     Reason.POSITION_CHANGED: "m",
     Reason.AXIS_LIMIT: "rad",
+    Reason.SLIDE_LIMIT: "m",
     Reason.GRIPPER_LIMIT: "rad",
     Reason.YAW_FIXED: "rad",
     Reason.PITCH_CHANGED: "rad",

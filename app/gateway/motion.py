@@ -10,6 +10,7 @@ from app.api.requests import Rates
 from app.collision.world import World
 from app.control import commands as cmd
 from app.control.choices import Choice
+from app.control.joint_session import JointSession
 from app.control.ledger import Entry
 from app.control.margins import Margins, margins
 from app.control.pouring import Pouring
@@ -17,6 +18,8 @@ from app.control.session import Session
 from app.control.state import State
 from app.control.things import Surroundings
 from app.errors import InputError
+from app.exchange.machine import Machine
+from app.gateway.nodes import Nodes
 from app.geometry.arrays import FloatArray
 from app.kinematics.statics import holding_torques
 from app.kinematics.velocity import JogFrame
@@ -26,6 +29,7 @@ from app.robot.weight import loads_of
 from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.link import FrontEnd
+from app.runtime.mailbox import CommandSink
 from app.runtime.navigator import Navigator
 
 
@@ -34,20 +38,24 @@ class Motion:
 
     def __init__(
         self,
-        model: RobotModel,
-        session: Session,
+        model: RobotModel | Machine,
+        session: Session | JointSession,
         link: FrontEnd,
-        navigator: Navigator,
+        navigator: Navigator | None,
+        nodes: Nodes,
         let_go: Callable[[], None],
     ) -> None:
-        """``let_go`` takes the handles of the view out of every hand."""
+        """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
+        has a name in its VRML world. ``let_go`` takes the handles of the view out of every hand."""
         self.model = model
+        self.nodes = nodes
         self._session = session
         self._link = link
         self._board = link.board
         self._navigator = navigator
+        self._sink: CommandSink = link if navigator is None else navigator
         self._let_go = let_go
-        self._loads = loads_of(model)
+        self._loads = () if isinstance(model, Machine) else loads_of(model)
         self._measured: (
             tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
         ) = None
@@ -74,8 +82,17 @@ class Motion:
 
     @property
     def rig(self) -> Rig:
-        """What programs are planned for."""
-        return Rig(self._session, self.model.T_base_shoulder)
+        """What programs are planned for. Raises InputError where there are only joints."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
+        return Rig(self._session, self.robot.T_base_shoulder)
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm. Raises InputError, and says why, where there are only joints."""
+        if isinstance(self.model, Machine):
+            raise InputError(f"Only its joints can be driven. {self.model.joints.why}")
+        return self.model
 
     @property
     def lateness(self) -> Lateness:
@@ -85,31 +102,33 @@ class Motion:
     @property
     def holding(self) -> FloatArray | None:
         """(n,) torques that hold it still [N m]; None where nobody knows what it weighs."""
-        return self._posture()[1]
+        return self._posture()[1] if self._loads else None
 
     @property
     def margins(self) -> Margins:
-        """How near it is to what it cannot pass."""
+        """How near it is to what it cannot pass. Raises InputError where there are only joints."""
         return self._posture()[0]
 
     def _posture(self) -> tuple[Margins, FloatArray | None]:
         """Worked out once for everybody who asks, and anew when something has changed."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
         state = self.state
         world, x = self._session.world_at(state), np.append(state.q, state.gripper)
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
-            chain = self.model.arm.chain_to(state.tool)
+            chain = self.robot.arm.chain_to(state.tool)
             holding = holding_torques(chain, state.q, self._loads) if self._loads else None
             self._measured = (key, (margins(chain, world, x), holding))
         return self._measured[1]
 
     def choices(self) -> tuple[Choice, ...]:
-        """The branches there are to choose from."""
+        """The branches there are to choose from. Raises InputError where there are none."""
         return self._session.choices(self.state)
 
     def put(self, command: cmd.Command) -> int:
         """Any command; its ticket. Raises InputError for one that cannot be."""
-        return self._navigator.put(command)
+        return self._sink.put(command)
 
     @property
     def state(self) -> State:
@@ -129,7 +148,7 @@ class Motion:
     @property
     def busy(self) -> bool:
         """Whether a way is being worked out that the arm will then go."""
-        return self._navigator.busy
+        return self._navigator is not None and self._navigator.busy
 
     def beat(self) -> None:
         """Tell the arm that somebody watches over it."""
@@ -137,12 +156,12 @@ class Motion:
 
     def stop(self) -> None:
         """Rest as fast as the arm can; it obeys nothing until it is released."""
-        self._navigator.put(cmd.Stop())
+        self._sink.put(cmd.Stop())
         self._let_go()
 
     def release(self) -> None:
         """After a stop: obey again. Nothing moves by this."""
-        self._navigator.put(cmd.Release())
+        self._sink.put(cmd.Release())
 
     def hold(self) -> None:
         """Come to rest and forget every target; no hand holds a handle any more."""
@@ -150,7 +169,9 @@ class Motion:
         self._put(cmd.Reset())
 
     def jog(self, rates: Rates, frame: JogFrame) -> None:
-        """Go with these rates for a moment."""
+        """Go with these rates for a moment. Raises InputError where there are only joints."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
         self._put(cmd.Jog(np.array(rates), frame))
 
     def limit(self, share: float) -> None:
@@ -159,7 +180,7 @@ class Motion:
 
     def _put(self, command: cmd.Command) -> None:
         try:
-            self._navigator.put(command)
+            self._sink.put(command)
         except InputError:
             # The mailbox is full: what is asked again and again is, and a stop always has room.
             return

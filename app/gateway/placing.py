@@ -54,7 +54,7 @@ class Placing:
             )
         T = np.array(asked.T)
         if asked.frame is requests.Frame.SHOULDER:
-            T = arm.model.T_base_shoulder @ T
+            T = arm.robot.T_base_shoulder @ T
         if thing.fixed:
             x = np.append(arm.state.q, arm.state.gripper)
             T = arm.surroundings.into_hand(se3.validated(T), x)
@@ -119,7 +119,7 @@ class Placing:
     def _out_of_the_hand(self, name: str) -> Thing | None:
         """The thing of that name, if there is one. Raises InputError when it is held."""
         arm = self._hub.present()
-        if any(part.name == name for part in arm.model.bodies) or name == "table":
+        if any(part.name == name for part in arm.robot.bodies) or name == "table":
             raise InputError(f"{name!r} is no thing that can be put elsewhere.")
         known = next((each for each in arm.state.things if each.name == name), None)
         if known is not None and known.held:

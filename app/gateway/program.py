@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from typing import Any
 
+import msgspec
 from starlette.websockets import WebSocket
 
 from app.api import answers, requests
@@ -19,7 +20,7 @@ from app.gateway import tell
 from app.gateway.bucket import Bucket
 from app.gateway.conversation import NONSENSE, Conversation, GoneError, Line, SocketLine
 from app.gateway.door import NOT_YOU, Door, Visitor
-from app.gateway.hub import Hub, Window
+from app.gateway.hub import Arm, Hub, Window
 
 log = logging.getLogger(__name__)
 
@@ -47,9 +48,14 @@ class Program(Conversation):
         super().__init__(hub, line, often=Bucket(RATE, BURST, t), bad=Bucket(FORGIVEN, MISTAKES, t))
         self._period: float | None = None
         self._due = 0.0
+        self._watched: tuple[requests.Named, ...] = ()
 
     def answer(self, window: Window, request: requests.AnyRequest) -> None:
         if isinstance(request, requests.Watch):
+            if request.fields:
+                arm = self.hub.present()
+                arm.nodes.read(arm.state, request.fields)
+            self._watched = request.fields
             self._period = 1.0 / request.hz if request.hz > 0.0 else None
             self._due = self.hub.clock()
         super().answer(window, request)
@@ -62,7 +68,16 @@ class Program(Conversation):
         if t < self._due:
             return None, self._due - t
         self._due = max(self._due + self._period, t)
-        return tell.state(self.hub), self._due - t
+        return self._state(self.hub.arm), self._due - t
+
+    def _state(self, arm: Arm) -> answers.State:
+        """With the fields that are watched; those of a thing that is gone are left out."""
+        now = tell.state(self.hub)
+        values: list[answers.Value] = []
+        for each in self._watched:
+            with suppress(InputError):
+                values += arm.nodes.read(arm.state, (each,))
+        return msgspec.structs.replace(now, fields=tuple(values))
 
     def greet(self, window: Window) -> None:
         """Say who they are here."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from app.api import answers
@@ -11,6 +13,7 @@ from app.control.grip import touching
 from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.solid import Colour
+from app.exchange.machine import Machine
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
@@ -41,8 +44,7 @@ def state(hub: Hub) -> answers.State:
     arm = hub.present()
     snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
     now = snapshot.state
-    chain = arm.model.arm.chain_to(now.tool)
-    five = ToolTarget.at(chain, now.q)
+    tool = None if isinstance(arm.model, Machine) else _Tool.of(arm.model, now)
     return answers.State(
         t=now.t,
         told=hub.clock(),
@@ -53,17 +55,17 @@ def state(hub: Hub) -> answers.State:
         goal=now.goal.tolist(),
         gripper=now.gripper,
         gripper_goal=now.gripper_goal,
-        tool=now.tool,
-        T=forward(chain, now.q).tolist(),
-        pitch=five.pitch,
-        roll=five.roll,
-        tool_speed=tool_speed(chain, now.setpoint, now.motion.qd),
-        margins=margins(arm.margins),
+        tool=None if tool is None else now.tool,
+        T=None if tool is None else tool.T,
+        pitch=None if tool is None else tool.pitch,
+        roll=None if tool is None else tool.roll,
+        tool_speed=None if tool is None else tool.speed,
+        margins=None if tool is None else margins(arm.margins),
         holding=None if arm.holding is None else arm.holding.tolist(),
         touching=list(touching(arm.surroundings.hand, now)),
         held=next((thing.name for thing in now.things if thing.held), None),
-        branch=(now.branch.shoulder, now.branch.elbow),
-        reading=now.reading.value,
+        branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
+        reading=None if tool is None else now.reading.value,
         status=now.status.value,
         moving=now.moving or arm.busy,
         why=sentence(now),
@@ -89,6 +91,22 @@ def margins(found: Margins) -> answers.Margins:
     )
 
 
+class _Tool(NamedTuple):
+    """Where the tool of an arm is: T (4, 4) in {S}, pitch and roll [rad]; and how fast [m/s]."""
+
+    T: list[answers.Numbers]
+    pitch: float
+    roll: float
+    speed: float
+
+    @classmethod
+    def of(cls, model: RobotModel, now: control.State) -> _Tool:
+        chain = model.arm.chain_to(now.tool)
+        five = ToolTarget.at(chain, now.q)
+        speed = tool_speed(chain, now.setpoint, now.motion.qd)
+        return cls(forward(chain, now.q).tolist(), five.pitch, five.roll, speed)
+
+
 def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
     """Where it is."""
     if pouring is None or now.poured is None:
@@ -103,8 +121,10 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
     )
 
 
-def arm(model: RobotModel, ready: list[float]) -> answers.Arm:
+def arm(model: RobotModel | Machine, ready: list[float]) -> answers.Arm:
     """``ready``: the posture that Home drives to."""
+    if isinstance(model, Machine):
+        return _joints(model, ready)
     chain, limits, gripper = model.arm.chain, model.arm.limits, model.arm.gripper
     return answers.Arm(
         name=model.name,
@@ -119,6 +139,29 @@ def arm(model: RobotModel, ready: list[float]) -> answers.Arm:
         default_tool=model.arm.default_tool,
         gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
         T_base_shoulder=model.T_base_shoulder.tolist(),
+        slides=[False] * chain.n,
+        joints_only="",
+    )
+
+
+def _joints(machine: Machine, ready: list[float]) -> answers.Arm:
+    joints = machine.joints
+    limits = joints.limits
+    return answers.Arm(
+        name=machine.mechanism.name,
+        joints=list(joints.names),
+        lower=limits.lower.tolist(),
+        upper=limits.upper.tolist(),
+        speed=limits.speed.tolist(),
+        acceleration=limits.acceleration.tolist(),
+        jerk=limits.jerk.tolist(),
+        ready=ready,
+        tools={},
+        default_tool=None,
+        gripper=None,
+        T_base_shoulder=None,
+        slides=list(joints.slides),
+        joints_only=joints.why,
     )
 
 

@@ -246,13 +246,17 @@ class Limiter:
         )
         if beside > STRAIGHT:
             return None
-        with np.errstate(divide="ignore"):
+        # A joint that hardly takes part bounds nothing.
+        with np.errstate(divide="ignore", over="ignore"):
             of_axis = 1.0 / np.abs(d)
+            speed, acceleration, jerk = (
+                float(np.min(each * of_axis))
+                for each in (limits.speed, limits.acceleration, limits.jerk)
+            )
         line.current_position, line.target_position = [0.0], [length]
         line.current_velocity, line.current_acceleration = [v], [a]
-        line.max_velocity = [max(share, LEAST_SHARE) * float(np.min(limits.speed * of_axis))]
-        line.max_acceleration = [float(np.min(limits.acceleration * of_axis))]
-        line.max_jerk = [float(np.min(limits.jerk * of_axis))]
+        line.max_velocity = [max(share, LEAST_SHARE) * speed]
+        line.max_acceleration, line.max_jerk = [acceleration], [jerk]
         return np.asarray(d)
 
     def _on_line(self, now: Motion, line: FloatArray, dt: float) -> Motion:

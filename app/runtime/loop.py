@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Iterable
+from typing import Protocol
 
+from app.control.commands import Command
 from app.control.ledger import news
-from app.control.session import Session
 from app.control.state import State
 from app.drivers.driver import Driver
+from app.geometry.arrays import FloatArray
 from app.runtime.board import Board, Snapshot
 from app.runtime.clock import Clock
 from app.runtime.lateness import Lateness, Punctuality
@@ -17,11 +20,23 @@ from app.runtime.mailbox import Mailbox
 log = logging.getLogger(__name__)
 
 
+class Rules(Protocol):
+    """What decides; a ``Session`` is one."""
+
+    def begin(self, q: FloatArray, gripper: float, t: float) -> State: ...
+
+    def step(self, state: State, commands: Iterable[Command], t: float) -> State: ...
+
+    def observe(self, state: State, q: FloatArray, gripper: float) -> State: ...
+
+    def fail(self, state: State) -> State: ...
+
+
 class ControlLoop:
     """Drain, step, send, publish."""
 
     def __init__(
-        self, session: Session, driver: Driver, mailbox: Mailbox, clock: Clock, rate: float
+        self, session: Rules, driver: Driver, mailbox: Mailbox, clock: Clock, rate: float
     ) -> None:
         """``rate``: ticks a second [Hz]."""
         self._session = session
@@ -97,4 +112,5 @@ def _differs(a: State, b: State) -> bool:
         or a.findings != b.findings
         or a.things is not b.things
         or a.poured is not b.poured
+        or a.looks is not b.looks
     )

@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 REST_SECONDS = 5.0
 """[s] In which an arm that is to set out from rest has come to it."""
 
-PASSIVE = (cmd.SpeedScale, cmd.Place, cmd.Remove, cmd.Attach, cmd.Furnish, cmd.Fill, cmd.SetGripper)
+PASSIVE = (cmd.SpeedScale, cmd.SetGripper, *cmd.THINGS)
 """Commands that leave a way under work as it is."""
 
 
@@ -49,7 +49,8 @@ class Navigator:
 
     def put(self, command: cmd.Command) -> int:
         """See ``CommandSink``; the command that follows a way found later has no ticket."""
-        if not isinstance(command, PASSIVE):
+        said = command.commands if isinstance(command, cmd.Together) else (command,)
+        if not all(isinstance(each, PASSIVE) for each in said):
             self.cancel()
         if isinstance(command, cmd.TakeBranch):
             self._set_out(command)

@@ -47,13 +47,7 @@ def add_views(gui: viser.GuiApi, shows: Shows) -> None:
 
 def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
     """The rest of them."""
-    themes = gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")
-
-    @themes.on_click
-    def _(event: viser.GuiEvent[Any]) -> None:
-        if event.client is not None:
-            give(event.client, THEMES[themes.value])
-
+    add_themes(gui)
     box = gui.add_checkbox(
         "Velocity ellipsoid",
         initial_value=False,
@@ -73,3 +67,13 @@ def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
             "Reachability", names, initial_value=Cut.HIDDEN.value, hint=cloud.legend
         )
         cuts.on_update(lambda _: cloud.show(Cut(cuts.value)))
+
+
+def add_themes(gui: viser.GuiApi) -> None:
+    """Light or dark, each for the browser it is clicked in."""
+    themes = gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")
+
+    @themes.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            give(event.client, THEMES[themes.value])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import viser
@@ -12,7 +11,6 @@ import viser
 from app.control import commands as cmd
 from app.control.ledger import Entry
 from app.control.state import State
-from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
@@ -20,37 +18,20 @@ from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList, Find
+from app.view.controls import add_motion, listener, set_slider
+from app.view.follower import READOUT_INTERVAL
 from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
 from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees
-
-ANGLE_WORTH_SENDING = 2e-6
-"""[deg] Rounding on the way to radians and back is less."""
-
-READOUT_INTERVAL = 0.1
-"""[s] People cannot read numbers that change faster, nor need sliders that do."""
 
 FARTHEST = 1000.0
 """[mm] Beyond any tool point of the arm: what a typed position may hold."""
 
 
-Clickable = (
-    viser.GuiInputHandle[Any]
-    | viser.GuiButtonHandle
-    | viser.GuiButtonGroupHandle
-    | viser.MeshHandle
-)
-"""What a person changes or clicks."""
-
 GESTURES: dict[str, cmd.Command] = {
     "Home": cmd.Home(),
     "Stretch": cmd.Stretch(),
     "Hold": cmd.Reset(),
-}
-
-ORDERS: dict[str, cmd.Command] = {
-    "Pause": cmd.Pause(),
-    "Resume": cmd.Resume(),
 }
 
 
@@ -68,7 +49,7 @@ class Panel:
     ) -> None:
         """``put`` takes a command; ``state`` is what the panel shows first."""
         self._model = model
-        self._put = put
+        self._on_person = listener(put)
         self._gui = server.gui
         self._told_at = -math.inf
         self._told = ""
@@ -86,21 +67,7 @@ class Panel:
             "Hold: stop here and forget the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
-        self._orders = self._gui.add_button_group(
-            "Motion",
-            tuple(ORDERS),
-            hint="Pause: rest on the way, until Resume. STOP is above, and on Space and Esc",
-        )
-        self._on_person(self._orders, lambda: ORDERS[self._orders.value])
-        self._speed = self._gui.add_slider(
-            "Speed",
-            min=1.0,
-            max=100.0,
-            step=1.0,
-            initial_value=round(100.0 * state.speed),
-            hint="Percent of the greatest speed, also of a motion under way",
-        )
-        self._on_person(self._speed, lambda: cmd.SpeedScale(self._speed.value / 100.0))
+        self._speed = add_motion(self._gui, self._on_person, state)
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
         with self._gui.add_folder("Branches", expand_by_default=False):
@@ -133,10 +100,10 @@ class Panel:
 
     def _set_controls(self, state: State) -> None:
         for slider, angle in zip(self._sliders, state.goal, strict=True):
-            _set(slider, math.degrees(angle))
+            set_slider(slider, math.degrees(angle))
         if self._gripper is not None:
-            _set(self._gripper, self._opening(state.gripper_goal))
-        _set(self._speed, 100.0 * state.speed)
+            set_slider(self._gripper, self._opening(state.gripper_goal))
+        set_slider(self._speed, 100.0 * state.speed)
         if self._tool.value != state.tool:
             self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
         if self._reading.value != READINGS[state.reading]:
@@ -213,27 +180,6 @@ class Panel:
 
         self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
 
-    def _on_person(
-        self,
-        handle: Clickable,
-        say: Callable[[], cmd.Command],
-    ) -> None:
-        """Send what ``say`` makes when a person, not this program, changes ``handle``."""
-
-        async def changed(event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any]) -> None:
-            if event.client_id is None:
-                return
-            try:
-                self._put(say())
-            except InputError as error:
-                if event.client is not None:
-                    event.client.add_notification("Not done", str(error), color="red")
-
-        if isinstance(handle, viser.GuiInputHandle):
-            handle.on_update(changed)
-        else:
-            handle.on_click(changed)
-
     def _opening(self, angle: float) -> float:
         fingers = self._model.arm.gripper
         return 100.0 * (angle - fingers.lower) / (fingers.upper - fingers.lower)
@@ -253,10 +199,3 @@ def typed_pose(
 
 def _reading(name: str) -> Reading:
     return next(reading for reading, text in READINGS.items() if text == name)
-
-
-def _set(slider: viser.GuiSliderHandle[float], value: float) -> None:
-    # Rounded off where nobody can see it, so that no slider shows "-0.00".
-    value = min(max(round(value, 6) + 0.0, slider.min), slider.max)
-    if abs(slider.value - value) > ANGLE_WORTH_SENDING:
-        slider.value = value  # type: ignore[misc]  # viser declares it read-only

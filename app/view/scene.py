@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from app.exchange.mechanism import Shape
+from app.exchange.urdf_mechanism import shapes_of
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.robot.model import RobotModel
@@ -85,21 +87,35 @@ class ArmNodes(FrameTree):
 
     def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
         super().__init__(server, "/arm", model)
-        for body in model.bodies:
-            for number, visual in enumerate(body.visuals):
-                name = f"{self.path[body.name]}/shape{number}"
-                if visual.glb is not None:
-                    server.scene.add_glb(
-                        name,
-                        visual.glb.read_bytes(),
-                        wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
-                        position=visual.T_body_visual[:3, 3],
-                    )
-                else:
-                    mesh = visual.mesh
-                    server.scene.add_mesh_simple(
-                        name, mesh.vertices, mesh.faces, color=visual.colour, flat_shading=True
-                    )
+        self.shapes = {
+            body.name: [
+                _as_made(server, f"{self.path[body.name]}/shape{number}", visual)
+                for number, visual in enumerate(body.visuals)
+            ]
+            for body in model.bodies
+        }
+        """Of each link, as they are made."""
+        self._visuals = {body.name: body.visuals for body in model.bodies}
+
+    def surfaces(self, link: str) -> list[Shape]:
+        """What its shapes are, one a material."""
+        return [shape for visual in self._visuals[link] for shape in shapes_of(visual)]
+
+
+def _as_made(
+    server: viser.ViserServer, name: str, visual: Visual
+) -> viser.GlbHandle | viser.MeshHandle:
+    if visual.glb is None:
+        mesh = visual.mesh
+        return server.scene.add_mesh_simple(
+            name, mesh.vertices, mesh.faces, color=visual.colour, flat_shading=True
+        )
+    return server.scene.add_glb(
+        name,
+        visual.glb.read_bytes(),
+        wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
+        position=visual.T_body_visual[:3, 3],
+    )
 
 
 COAT = 1e-3
@@ -196,3 +212,19 @@ def coarse(
     left = left[(left != np.roll(left, 1, axis=1)).all(axis=1)]
     _, first = np.unique(np.sort(left, axis=1), axis=0, return_index=True)
     return merged, left[np.sort(first)]
+
+
+def add_shape(
+    server: viser.ViserServer, name: str, shape: Shape, colour: tuple[float, float, float]
+) -> viser.MeshHandle:
+    """A shape in one colour, sRGB 0..1."""
+    faces = shape.faces.astype(np.uint32)
+    return server.scene.add_mesh_simple(
+        name, shape.vertices.astype(np.float32), faces, color=of_255(colour)
+    )
+
+
+def of_255(colour: tuple[float, float, float]) -> Colour:
+    """As viser counts colours."""
+    red, green, blue = (round(255.0 * part) for part in colour)
+    return red, green, blue

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import logging
-import threading
 import time
 from dataclasses import dataclass, field
 
@@ -27,18 +23,18 @@ from app.runtime.board import Board, Snapshot
 from app.runtime.mailbox import CommandSink
 from app.view.cameras import Cameras, Preset
 from app.view.ellipsoid import Ellipsoid
+from app.view.follower import Follower
 from app.view.gizmo import Gizmo
 from app.view.looks import Shows
 from app.view.objects import ObjectsPanel
-from app.view.panel import READOUT_INTERVAL, Panel
+from app.view.paint import PaintNodes
+from app.view.panel import Panel
 from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
 from app.view.scene import Colour, Gap, GhostNodes
 from app.view.scenery import Scenery
 from app.view.tint import Tint
 from app.view.traces import Traces
-
-log = logging.getLogger(__name__)
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
@@ -69,7 +65,7 @@ class Besides:
     meshes: Meshes = field(default_factory=Meshes)
 
 
-class View:
+class View(Follower):
     """Shows each new snapshot to every browser; hands what people do to the mailbox."""
 
     def __init__(
@@ -87,19 +83,14 @@ class View:
 
         Raises ConfigurationError for the map of another arm.
         """
+        super().__init__(server, board, frame_rate)
         besides = Besides() if besides is None else besides
-        self._server = server
         self._model = model
-        self._board = board
         self._mailbox = mailbox
-        self._interval = 1.0 / frame_rate
-        self._stopping = threading.Event()
-        self.failed = threading.Event()
-        """Set when it shows nothing any more."""
-        self._thread = threading.Thread(target=self._run, name="view", daemon=True)
         props = load_props()
         self._scenery = Scenery(server, model, session, props, self._put_from_gizmo, besides.meshes)
         state = board.snapshot.state
+        self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, model, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
@@ -128,19 +119,6 @@ class View:
             )
         self.show(board.snapshot)
 
-    def start(self) -> None:
-        """Follow the control loop in a thread of the view's own."""
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Stop following, and close the server."""
-        self._stopping.set()
-        if self._thread.is_alive():
-            self._thread.join()
-        # viser would say goodbye in its own words.
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
-
     def let_go(self) -> None:
         """Take the handle out of every hand: what is dragged on with it moves nothing."""
         self._gizmo.let_go()
@@ -159,31 +137,12 @@ class View:
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
         self._cameras.give(client, preset, self._board.snapshot.state)
 
-    def _run(self) -> None:
-        try:
-            self._follow()
-        except Exception:
-            log.exception("The view met an error.")
-            self.failed.set()
-
-    def _follow(self) -> None:
-        seen = self._board.snapshot
-        settled = True
-        while not self._stopping.is_set():
-            # After the last change the read-out still owes its final numbers.
-            snapshot = self._board.wait_for_change(seen, 0.5 if settled else READOUT_INTERVAL)
-            settled = snapshot is seen
-            seen = snapshot
-            due = time.perf_counter() + self._interval
-            self.show(snapshot)
-            # Motion is shown at the frame rate, what a person does at once.
-            self._board.wait_for_command(snapshot, due - time.perf_counter())
-
     def show(self, snapshot: Snapshot) -> None:
         """Send every browser what has changed."""
         state = snapshot.state
         with self._server.atomic():
             self._scenery.show(state)
+            self._paint.follow(state)
             self._tint.follow(state)
             self._show_goal(state)
             self._ellipsoid.follow(state)

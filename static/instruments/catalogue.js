@@ -1,4 +1,5 @@
 // Every instrument there is for an arm: what it is called, how it is made, what it shows of a state.
+import { readings } from "./channels.js";
 import { Command } from "./command.js";
 import { Bars, Gauge } from "./gauge.js";
 import { Knob } from "./knob.js";
@@ -15,7 +16,7 @@ const BIG = ["broad", "large", "wide"];
 
 // [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}]
 export function instruments(arm, gripper, { say, history, groups, view }) {
-  return [...knobs(arm, gripper, say), ...gauges(arm), ...plots(gripper, history, groups, view)];
+  return [...knobs(arm, gripper, say), ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
 }
 
 function knobs(arm, gripper, say) {
@@ -24,15 +25,21 @@ function knobs(arm, gripper, say) {
     const draw = (state) => knob.take(state, ...of(state));
     return { id, title, sizes: ONE, shown: true, element: knob.element, draw, knob };
   };
-  const angle = (value) => `${signed(value, 1)}°`;
+  const read = readings(arm);
   const percent = (value) => `${signed(value, 0)} %`;
   const joints = arm.joints.map((_, i) =>
     made(
       `axis-${i + 1}`,
-      `${i + 1} ${AXES[i] ?? ""}`.trim(),
-      { low: arm.lower[i] * DEGREES, high: arm.upper[i] * DEGREES, step: 1, full: 1, text: angle },
-      (value) => ({ do: "joint", axis: i + 1, value: value / DEGREES }),
-      ({ goal, q }) => [goal[i] * DEGREES, q[i] * DEGREES],
+      `${i + 1} ${arm.joints_only ? arm.joints[i] : (AXES[i] ?? "")}`.trim(),
+      {
+        low: arm.lower[i] * read[i].of,
+        high: arm.upper[i] * read[i].of,
+        step: 1,
+        full: 1,
+        text: (value) => `${signed(value, 1)}${read[i].mark}`,
+      },
+      (value) => ({ do: "joint", axis: i + 1, value: value / read[i].of }),
+      ({ goal, q }) => [goal[i] * read[i].of, q[i] * read[i].of],
     ),
   );
   const fingers = gripper && made(
@@ -59,8 +66,25 @@ function gauges(arm) {
     return { id, title, sizes: ONE, shown: true, element: made.element, draw };
   };
   const one = (value) => signed(value, 1);
-  const rows = arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, limit: arm.speed[i] * DEGREES }));
-  const bars = new Bars({ title: "Joint speeds", rows, text: one, unit: "°/s" });
+  const read = readings(arm);
+  const rows = arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, limit: arm.speed[i] * read[i].of }));
+  const units = [...new Set(read.map(({ mark }) => `${mark.trim()}/s`))];
+  const bars = new Bars({ title: "Joint speeds", rows, text: one, unit: units.join(", ") });
+  const rates = {
+    id: "rates", title: "Joint speeds", sizes: ROW, shown: true, element: bars.element,
+    draw: ({ qd }) => bars.show(qd.map((rate, i) => rate * read[i].of)),
+  };
+  const late = gauge(
+    "late",
+    "Loop lateness",
+    {
+      low: 0, high: 5, unit: "ms, 99 %", text: (value) => signed(value, 2),
+      zones: [{ above: 4, tone: "bad" }, { above: 2, tone: "warn" }],
+    },
+    (_, loop) => (loop ? [loop.late_p99 * MS, `${loop.lost} lost`] : [null]),
+  );
+  // The others are of a tool, which a mechanism of joints alone has not.
+  if (arm.joints_only) return [rates, late];
   return [
     gauge(
       "clearance",
@@ -72,10 +96,7 @@ function gauges(arm) {
       ({ margins: { clearance, parts } }) =>
         parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not looked at"],
     ),
-    {
-      id: "rates", title: "Joint speeds", sizes: ROW, shown: true, element: bars.element,
-      draw: ({ qd }) => bars.show(qd.map((rate) => rate * DEGREES)),
-    },
+    rates,
     gauge(
       "tool-speed",
       "Tool speed",
@@ -112,29 +133,27 @@ function gauges(arm) {
       { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },
       ({ touching, held }) => [touching.length, held === null ? "empty hand" : `holds ${spoken(held)}`],
     ),
-    gauge(
-      "late",
-      "Loop lateness",
-      {
-        low: 0, high: 5, unit: "ms, 99 %", text: (value) => signed(value, 2),
-        zones: [{ above: 4, tone: "bad" }, { above: 2, tone: "warn" }],
-      },
-      (_, loop) => (loop ? [loop.late_p99 * MS, `${loop.lost} lost`] : [null]),
-    ),
+    late,
   ];
 }
 
-function plots(gripper, history, groups, view) {
+function plots(arm, gripper, history, groups, view) {
   const plot = (id, title, group, least, decimals, shown) => {
     const made = new Plot({ id, title, history, channels: groups[group], view, least, decimals });
     return { id, title, sizes: BIG, shown, element: made.element, draw: () => made.draw(), plot: made };
   };
+  const unit = [...new Set(readings(arm).map(({ mark }) => mark.trim()))].join(", ");
+  const joints = [
+    plot("joint-angles", `Joint ${arm.joints_only ? "values" : "angles"} [${unit}]`, "angles", 2, 1, true),
+    plot("joint-speeds", `Joint speeds [${unit}/s]`, "speeds", 2, 1, true),
+    plot("tracking", `Tracking error [${unit}]`, "errors", 0.01, 3, true),
+  ];
+  if (arm.joints_only) return joints;
   return [
-    plot("joint-angles", "Joint angles [°]", "angles", 2, 1, true),
-    plot("joint-speeds", "Joint speeds [°/s]", "speeds", 2, 1, true),
+    ...joints.slice(0, 2),
     plot("tool-point", "Tool point in {S} [mm]", "tool", 2, 1, true),
     plot("joint-loads", "Weight on the joints [N m]", "loads", 1, 2, true),
-    plot("tracking", "Tracking error [°]", "errors", 0.01, 3, true),
+    ...joints.slice(2),
     ...(gripper ? [plot("gripper-opening", "Gripper [%]", "gripper", 2, 1, false)] : []),
     plot("clearances", "Clearance [mm]", "clearance", 2, 1, false),
     plot("tool-speeds", "Tool speed [mm/s]", "speed", 2, 1, false),

@@ -2,6 +2,11 @@
 const DEGREES = 180 / Math.PI;
 const MM = 1000;
 
+// How each joint's numbers are read: {of, unit, mark}.
+export function readings(arm) {
+  return arm.slides.map((slides) => (slides ? { of: MM, unit: "mm", mark: " mm" } : { of: DEGREES, unit: "deg", mark: "°" }));
+}
+
 // {channels, groups}: each group is a list of numbers of channels. gripper: {percent(angle)} or null.
 export function channelsOf(arm, gripper) {
   const channels = [];
@@ -9,11 +14,14 @@ export function channelsOf(arm, gripper) {
   const group = (name, ...more) => {
     groups[name] = more.map((channel) => channels.push(channel) - 1);
   };
-  const axes = (unit, of) => arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, short: `${i + 1}`, unit, of: of(i) }));
-  group("angles", ...axes("deg", (i) => ({ q }) => q[i] * DEGREES));
-  group("speeds", ...axes("deg/s", (i) => ({ qd }) => qd[i] * DEGREES));
-  group("errors", ...axes("deg", (i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * DEGREES));
-  group("loads", ...axes("N m", (i) => ({ holding }) => holding?.[i]));
+  const read = readings(arm);
+  const axes = (unit, of) =>
+    arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, short: `${i + 1}`, unit: unit(read[i].unit), of: of(i) }));
+  group("angles", ...axes((unit) => unit, (i) => ({ q }) => q[i] * read[i].of));
+  group("speeds", ...axes((unit) => `${unit}/s`, (i) => ({ qd }) => qd[i] * read[i].of));
+  group("errors", ...axes((unit) => unit, (i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * read[i].of));
+  if (arm.joints_only) return { channels, groups };
+  group("loads", ...axes(() => "N m", (i) => ({ holding }) => holding?.[i]));
   group("tool", ...["x", "y", "z"].map((label, i) => ({ label, unit: "mm", of: ({ T }) => T[i][3] * MM })));
   group("clearance", { label: "Nearest", unit: "mm", of: ({ margins }) => (margins.clearance ?? NaN) * MM });
   group("speed", { label: "Tool", unit: "mm/s", of: ({ tool_speed: speed }) => speed * MM });

@@ -2,7 +2,7 @@
 const CAPACITY = 18_000; // ten minutes at 30 Hz
 const AT_REST = 0.1; // s after which a state is no late one, but that of an arm that rests
 const ANEW = 1.0; // s that no clock goes back unless its server was started anew
-export const GAP = 0.5; // s without a sample that a line does not bridge
+export const GAP = 1.0; // s without a sample that a line does not bridge
 
 export class History {
   #times = new Float64Array(CAPACITY);

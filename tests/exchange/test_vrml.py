@@ -43,6 +43,8 @@ def values(kind: Type, nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Valu
     match kind:
         case Type.BOOL:
             return st.booleans()
+        case Type.INT:
+            return st.integers(-(2**31), 2**31 - 1)
         case Type.STRING:
             return texts
         case Type.STRING_LIST:
@@ -97,7 +99,7 @@ def placed_points(world: World) -> Iterator[tuple[str, Matrix]]:
     """Name of the nearest named node above, and points (n, 3), of every face set, as they stand."""
 
     def visit(node: Node, T: Matrix, name: str) -> Iterator[tuple[str, Matrix]]:
-        name = node.name if node.name is not None and node.kind != "Appearance" else name
+        name = node.name if node.name is not None and node.kind in ("Transform", "Group") else name
         if node.kind == "Transform":
             # ISO/IEC 14772-1, 6.52: P' = T C R -C P.
             centre, moved = (field(node, key, (0.0, 0.0, 0.0)) for key in ("center", "translation"))
@@ -205,7 +207,8 @@ def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Mech
     for joint in katana.joints:
         assert f'<Transform DEF="{joint}"' in converted
     assert converted.count("<ROUTE") == 2 * len(katana.joints)
-    assert converted.count("<IndexedFaceSet") == sum(len(link.shapes) for link in katana.links)
+    assert converted.count("<IndexedFaceSet DEF") == sum(len(link.shapes) for link in katana.links)
+    assert converted.count("<Switch") == sum(bool(link.shapes) for link in katana.links)
 
 
 @needs("tovrmlx3d")

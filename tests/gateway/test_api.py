@@ -111,7 +111,9 @@ def test_a_program_drives_the_joints_and_knows_when_they_are_there(
     assert there.status == "ok"
     assert there.why == ""
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(there.T, forward(model.arm.chain, THERE), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        np.array(there.T), forward(model.arm.chain, THERE), rtol=0, atol=1e-12
+    )
     assert there.holder == arm.welcome.name == "Test"
     described = arm.look(answers.Arm)
     assert described.joints == list(model.arm.chain.names)
@@ -126,10 +128,11 @@ def test_a_pose_may_be_in_either_frame(
     T = forward(model.arm.chain, THERE)
     asked = T if frame is requests.Frame.SHOULDER else model.T_base_shoulder @ T
     there = arm.go(requests.Pose(T=asked.tolist(), frame=frame))
-    np.testing.assert_allclose(there.T, T, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=1e-9)
     p = asked[:3, 3] + [0.0, 0.0, 0.02]
     there = arm.go(requests.Position(p=tuple(p), frame=frame))
     np.testing.assert_allclose(np.array(there.T)[:3, 3], T[:3, 3] + [0, 0, 0.02], rtol=0, atol=1e-9)
+    assert there.pitch is not None
     there = arm.go(requests.Turn(pitch=there.pitch, roll=0.25))
     assert there.roll == pytest.approx(0.25, abs=1e-12)
 
@@ -182,13 +185,14 @@ def test_a_state_tells_what_follows_from_the_posture(arm: Client, model: RobotMo
     assert (state.touching, state.held) == ([], None)
     assert state.holding == pytest.approx(holding_torques(model.arm.chain, q, loads_of(model)))
     distances = limit_distances(model.arm.chain, q)
+    assert state.margins is not None
     assert state.margins.limit == pytest.approx(distances.min())
     assert state.margins.axis == distances.argmin() + 1
     assert state.margins.clearance is not None
     assert state.margins.clearance > 0.005
     arm.tell(requests.Joints(q=THERE.tolist()))
     deadline = time.monotonic() + 5.0
-    while arm.look(answers.State).tool_speed < 0.05:
+    while (arm.look(answers.State).tool_speed or 0.0) < 0.05:
         assert time.monotonic() < deadline
 
 

@@ -19,9 +19,11 @@ from app.control.session import Session
 from app.control.state import Finding, Halt, Reason, State
 from app.control.things import Surroundings
 from app.errors import LeaseError
+from app.exchange.machine import Machine
 from app.gateway import tell
 from app.gateway.door import Visitor
 from app.gateway.hub import TICK, Hub, Window, key_of
+from app.gateway.nodes import Nodes
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
 from app.programs.bench import Rig
@@ -37,7 +39,9 @@ class FakeArm:
     """Remembers what it was told; moves when the test says so."""
 
     # What a hub does not ask for.
-    model: RobotModel
+    model: RobotModel | Machine
+    robot: RobotModel
+    nodes: Nodes
     snapshot: Snapshot
     ready: FloatArray
     lateness: Lateness

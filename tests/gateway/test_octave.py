@@ -6,6 +6,8 @@ import json
 import math
 import re
 import subprocess
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,31 +21,57 @@ from tests.gateway import octave
 OCTAVE = octave.find()
 
 
-@pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
-def test_octave_goes_round_the_papers_circle(model: RobotModel) -> None:
-    assert OCTAVE is not None
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
     with AppServer((*APP, "--lines", "0")) as server:
-        found = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
-        assert found is not None
-        command = [OCTAVE, "--quiet", "--path", str(ROOT / "examples" / "octave")]
-        done = subprocess.run(
-            [*command, "--eval", f"port = {found[1]}; circle"],
-            capture_output=True,
-            text=True,
-            timeout=90,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout.splitlines()[0])
-    # Where both have the tip at the start, each by its own kinematics.
-    assert told["start_error_mm"] < 1e-11
+        yield server
+
+
+def told_by(server: AppServer, script: str) -> dict[str, Any]:
+    """What a script of examples/octave prints."""
+    assert OCTAVE is not None
+    found = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
+    assert found is not None
+    command = [OCTAVE, "--quiet", "--path", str(ROOT / "examples" / "octave")]
+    done = subprocess.run(
+        [*command, "--eval", f"port = {found[1]}; {script}"],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    told: dict[str, Any] = json.loads(done.stdout.splitlines()[0])
+    return told
+
+
+def check_kinematics(model: RobotModel, angles: list[float], asked: list[list[float]]) -> None:
+    """Octave's joint angles on the circle against ours."""
     chain = model.arm.chain_to("tcp")
-    for angle, asked in zip(told["angles"], told["asked"], strict=True):
+    for angle, q in zip(angles, asked, strict=True):
         p = np.array((0.150, 0.100 * math.sin(angle), -0.110 + 0.100 * math.cos(angle)))
         target = ToolTarget(p, math.radians(75.0 - 13.0 * math.cos(angle)), 0.0)
         T = target.pose(chain, math.atan2(p[1], p[0]))
-        nearest = min(np.abs(each.q - asked).max() for each in inverse(chain, T))
-        assert nearest < 1e-9
+        assert min(np.abs(each.q - q).max() for each in inverse(chain, T)) < 1e-9
+
+
+@pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
+def test_octave_goes_round_the_papers_circle(model: RobotModel, server: AppServer) -> None:
+    told = told_by(server, "circle")
+    # Where both have the tip at the start, each by its own kinematics.
+    assert told["start_error_mm"] < 1e-11
+    check_kinematics(model, told["angles"], told["asked"])
     # How many states there are, and how far the arm lags behind the stream, is the machine's.
     assert told["states"] > 20
     assert told["largest_error_mm"] < 100.0
+
+
+@pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
+def test_octave_turns_the_vrml_world_by_name_and_reads_it_back(
+    model: RobotModel, server: AppServer
+) -> None:
+    told = told_by(server, "places = 6; circle_by_name")
+    assert len(told["angles"]) == 6
+    check_kinematics(model, told["angles"], told["asked"])
+    np.testing.assert_allclose(told["heard"], told["asked"], rtol=0, atol=1e-9)
+    assert told["colour"] == [0.1, 0.5, 0.9]

@@ -1,0 +1,201 @@
+"""The session of a mechanism that is driven joint by joint: no tool of it can be brought anywhere.
+
+The rules are those of ``session``, as far as they are about joints: what is wished is kept apart
+from the goal, setpoints have mass, a stop is a state.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import NoReturn
+
+import numpy as np
+
+from app import tolerances
+from app.control import commands as cmd
+from app.control.aims import dressed, gone, turned, without
+from app.control.choices import Choice
+from app.control.joints import Joints
+from app.control.pouring import Pouring
+from app.control.session import LONGEST_STEP, SEEN
+from app.control.state import Finding, Halt, JointTarget, Reason, Servoing, State
+from app.control.things import Surroundings
+from app.errors import InputError
+from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.branch import BRANCHES
+from app.motion.limiter import Limiter, Motion
+
+MOTIONS = (cmd.SetJoint, cmd.SetAxes, cmd.SetJoints, cmd.Servo, cmd.Home, cmd.Stretch, cmd.Settle)
+
+STOPS = (cmd.Stop, cmd.Release, cmd.Pause, cmd.Resume, cmd.Reset)
+
+SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Dress, cmd.Together)
+"""What counts while a stop holds the joints."""
+
+NO_BRANCH = BRANCHES[0]
+"""Said where there is none: without a tool nobody reads it."""
+
+
+class JointSession:
+    """The rules of one mechanism. Holds no state of its own: ``step`` is a pure function."""
+
+    def __init__(self, joints: Joints, way: Callable[[FloatArray, FloatArray], float]) -> None:
+        """``way``: how far its links go between two joint vectors (n,) [m]."""
+        self.joints = joints
+        self.ready = joints.ready
+        self.surroundings = Surroundings(None, None)
+        self.pouring: Pouring | None = None
+        self._way = way
+        self._limiter = Limiter(joints.limits)
+
+    def begin(self, q: FloatArray, gripper: float, t: float) -> State:
+        """The state of joints that stand at ``q`` (n,) and hold."""
+        q = frozen(q)
+        return State(
+            t=t,
+            q=q,
+            gripper=gripper,
+            motion=Motion.rest(q),
+            gripper_setpoint=gripper,
+            goal=q,
+            gripper_goal=gripper,
+            tool="",
+            target=JointTarget(q),
+            branch=NO_BRANCH,
+        )
+
+    def check(self, command: cmd.Command) -> None:
+        """Refuse, with an InputError for the sender, what cannot even be asked."""
+        joints = self.joints
+        match command:
+            case cmd.SetJoint(axis=axis) if axis >= joints.n:
+                raise InputError(f"There is no axis {axis + 1}: this mechanism has {joints.n}.")
+            case cmd.SetAxes(values=values):
+                for axis, value in values:
+                    self.check(cmd.SetJoint(axis, value))
+            case cmd.SetJoints(q=q) | cmd.Servo(q=q):
+                joints.check(q)
+            case cmd.Together(commands=commands):
+                for each in commands:
+                    self.check(each)
+            case _ if not isinstance(command, (*MOTIONS, *STOPS, *SAFE)):
+                self.refuse()
+
+    def refuse(self) -> NoReturn:
+        """Say that there is no tool, and why."""
+        raise InputError(f"Only its joints can be driven. {self.joints.why}")
+
+    def choices(self, _state: State) -> tuple[Choice, ...]:
+        """There are no branches: InputError says why."""
+        self.refuse()
+
+    def step(self, state: State, commands: Iterable[cmd.Command], t: float) -> State:
+        """Take the commands in order, then move the setpoints on by the time that has passed.
+
+        t: now [s], on the clock of ``state.t``.
+        """
+        for command in commands:
+            self.check(command)
+            state = self._take(state, command)
+        if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
+            state = self._aim(state, self._limiter.halt(state.motion))
+        dt = min(t - state.t, LONGEST_STEP)
+        state = replace(state, t=max(t, state.t))
+        if dt <= 0.0 or not state.under_way:
+            return state
+        return replace(state, motion=self._ahead(state, dt))
+
+    @staticmethod
+    def observe(state: State, q: FloatArray, gripper: float) -> State:
+        """Where the driver says the joints really are."""
+        return replace(state, q=q, gripper=gripper)
+
+    @staticmethod
+    def fail(state: State) -> State:
+        """Hold after an error of our own: no target survives it."""
+        here = state.setpoint
+        held = replace(state, motion=Motion.rest(here), goal=here, target=JointTarget(here))
+        return replace(held, servo=None, findings=(Finding(Reason.INTERNAL),))
+
+    def _ahead(self, state: State, dt: float) -> Motion:
+        limiter, motion, servo = self._limiter, state.motion, state.servo
+        if state.halted is not None:
+            return limiter.stop(motion, dt)
+        if state.paused:
+            return limiter.pause(motion, state.goal, dt)
+        if servo is None:
+            return limiter.towards(motion, state.goal, dt, state.speed)
+        late = min(state.t - servo.t, cmd.JOG_TIME)
+        return limiter.beside(
+            motion, self.joints.clamp(servo.q + late * servo.qd), servo.qd, dt, state.speed
+        )
+
+    def _take(self, state: State, command: cmd.Command) -> State:
+        if state.halted is not None and not isinstance(command, SAFE):
+            return state
+        match command:
+            case cmd.Stop():
+                return self._halt(state)
+            case cmd.Release():
+                free = self._aim(replace(state, halted=None), self._limiter.halt(state.motion))
+                return without(free, Reason.HALTED)
+            case cmd.Pause():
+                told = without(state, Reason.PAUSED).findings
+                return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
+            case cmd.Resume():
+                return without(replace(state, paused=False), Reason.PAUSED)
+            case cmd.Reset():
+                return self._aim(state, self._limiter.halt(state.motion))
+            case cmd.SpeedScale(value=value):
+                return replace(state, speed=value)
+            case cmd.SetJoint() | cmd.SetAxes():
+                return self._aim(state, turned(state, command).q)
+            case cmd.SetJoints(q=q):
+                return self._aim(state, q)
+            case cmd.Servo(q=q, qd=qd):
+                return self._keep_up(state, q, qd)
+            case cmd.Home() | cmd.Stretch():
+                return self._aim(state, self.ready)
+            case cmd.Dress():
+                return dressed(state, command)
+            case cmd.Together(commands=commands):
+                return functools.reduce(self._take, commands, state)
+        return state
+
+    def _aim(self, state: State, q: FloatArray) -> State:
+        """With ``q`` (n,) wished, and the nearest inside the limits as the goal."""
+        joints, q = self.joints, frozen(q)
+        goal = joints.clamp(q)
+        findings = tuple(
+            Finding(
+                Reason.SLIDE_LIMIT if joints.slides[axis] else Reason.AXIS_LIMIT,
+                float(goal[axis]),
+                axis,
+            )
+            for axis in np.flatnonzero(np.abs(goal - q) > tolerances.LIMIT_SLACK).tolist()
+        )
+        return gone(state, JointTarget(q), goal, findings)
+
+    def _keep_up(self, state: State, q: FloatArray, qd: FloatArray | None) -> State:
+        """Take ``q`` (n,) for the newest of a stream, and ``qd`` (n,) for how fast it changes."""
+        before, speed = state.servo, self.joints.speed
+        aimed = self._aim(state, q)
+        if qd is None:
+            qd = np.zeros(self.joints.n) if before is None else before.qd
+            if before is not None and state.t > before.t:
+                dt = state.t - before.t
+                qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
+        return replace(
+            aimed, servo=Servoing(aimed.goal, frozen(np.clip(qd, -speed, speed)), state.t)
+        )
+
+    def _halt(self, state: State) -> State:
+        """Brake, and forget every wish."""
+        if state.halted is not None:
+            return state
+        goal = frozen(self.joints.clamp(self._limiter.halt(state.motion)))
+        way, time = self._way(state.setpoint, goal), self._limiter.time_to_halt(state.motion)
+        halted = replace(self._aim(state, goal), halted=Halt(way, time), paused=False, goal=goal)
+        return replace(halted, findings=(Finding(Reason.HALTED, way, time=time),))

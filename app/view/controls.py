@@ -1,0 +1,80 @@
+"""What every panel is made of: controls that send commands, and are written with what is new."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from app.control import commands as cmd
+from app.control.state import State
+from app.errors import InputError
+
+WORTH_SENDING = 2e-6
+"""[deg, mm] Rounding on the way to radians and back is less."""
+
+Clickable = (
+    viser.GuiInputHandle[Any]
+    | viser.GuiButtonHandle
+    | viser.GuiButtonGroupHandle
+    | viser.MeshHandle
+)
+"""What a person changes or clicks."""
+
+Listen = Callable[[Clickable, Callable[[], cmd.Command]], None]
+"""Sends what the function makes when a person, not this program, changes the handle."""
+
+ORDERS: dict[str, cmd.Command] = {
+    "Pause": cmd.Pause(),
+    "Resume": cmd.Resume(),
+}
+
+
+def listener(put: Callable[[cmd.Command], int]) -> Listen:
+    """One that gives commands to ``put``, and tells a person what that refuses."""
+
+    def listen(handle: Clickable, say: Callable[[], cmd.Command]) -> None:
+        async def changed(event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            try:
+                put(say())
+            except InputError as error:
+                if event.client is not None:
+                    event.client.add_notification("Not done", str(error), color="red")
+
+        if isinstance(handle, viser.GuiInputHandle):
+            handle.on_update(changed)
+        else:
+            handle.on_click(changed)
+
+    return listen
+
+
+def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSliderHandle[float]:
+    """Pause, Resume, and how fast; the slider of that."""
+    orders = gui.add_button_group(
+        "Motion",
+        tuple(ORDERS),
+        hint="Pause: rest on the way, until Resume. STOP is above, and on Space and Esc",
+    )
+    listen(orders, lambda: ORDERS[orders.value])
+    speed = gui.add_slider(
+        "Speed",
+        min=1.0,
+        max=100.0,
+        step=1.0,
+        initial_value=round(100.0 * state.speed),
+        hint="Percent of the greatest speed, also of a motion under way",
+    )
+    listen(speed, lambda: cmd.SpeedScale(speed.value / 100.0))
+    return speed
+
+
+def set_slider(slider: viser.GuiSliderHandle[float], value: float) -> None:
+    """Show ``value``, if it is another."""
+    # Rounded off where nobody can see it, so that no slider shows "-0.00".
+    value = min(max(round(value, 6) + 0.0, slider.min), slider.max)
+    if abs(slider.value - value) > WORTH_SENDING:
+        slider.value = value  # type: ignore[misc]  # viser declares it read-only

@@ -1,0 +1,39 @@
+% The circle of the 2013 paper as its Simulink model drives it: rotations of the VRML world's
+% Transforms are set by their DEF names, and read back.
+%
+%   katana450 serve --lines 5560
+%   octave-cli --path examples/octave --eval "port = 5560; circle_by_name"
+%
+% The angles come from kinematics in m-code. The world is no drawing: setting a rotation tells the arm
+% to go there, under its limits, and what is read back is where it is.
+if ! exist ("port", "var")
+  port = 5560;
+end
+if ! exist ("places", "var")
+  places = 8;
+end
+tip = 0.3028;
+axes = {"axis_1", "axis_2", "axis_3", "axis_4", "axis_5"};
+about = [0, 0, 1; 0, 1, 0; 0, 1, 0; 0, 1, 0; 1, 0, 0];
+angles = 2 * pi * (0:places - 1)' / places;
+
+arm = katana_open (port, "VR Sink");
+katana_set (arm, {"upper_arm_link_paint"}, "diffuseColor", [0.1, 0.5, 0.9]);
+asked = zeros (places, 5);
+heard = zeros (places, 5);
+for k = 1:places
+  on_circle = [0.150, 0.100 * sin(angles(k)), -0.110 + 0.100 * cos(angles(k))];
+  asked(k, :) = katana_ik (on_circle, deg2rad (75 - 13 * cos (angles(k))), 0, tip);
+  katana_rest (arm, katana_set (arm, axes, "rotation", [about, asked(k, :)']));
+  rotations = katana_get (arm, axes, "rotation");
+  heard(k, :) = rotations(:, 4)';
+end
+colour = katana_get (arm, {"upper_arm_link_paint"}, "diffuseColor");
+katana_set (arm, {"upper_arm_link_look"}, "whichChoice", 0);
+katana_say (arm, struct ("do", "release", "id", 2));
+katana_hear (arm, "done");
+clear arm
+
+result = struct ("angles", angles, "asked", asked, "heard", heard, "colour", colour, ...
+                 "largest_difference_rad", max (abs (asked(:) - heard(:))));
+printf ("%s\n", jsonencode (result));

@@ -1,0 +1,192 @@
+"""A mechanism driven joint by joint: limits, stops and streams by the rules of an arm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.control import commands as cmd
+from app.control.joint_session import JointSession
+from app.control.joints import Joints
+from app.control.looks import Choice, Trait
+from app.control.session import LONGEST_STEP
+from app.control.state import Reason, State, Status
+from app.errors import InputError
+
+DT = 0.01
+
+JOINTS = Joints(
+    names=("rail", "turn", "grip"),
+    slides=(True, False, False),
+    lower=np.array((0.05, -math.pi, -0.4)),
+    upper=np.array((0.4, math.pi, 0.3)),
+    speed=np.array((0.3, 2.0, 1.0)),
+    why="It is a gantry.",
+)
+
+
+@pytest.fixture
+def session() -> JointSession:
+    return JointSession(JOINTS, lambda a, b: float(np.abs(a - b).max()))
+
+
+@pytest.fixture
+def state(session: JointSession) -> State:
+    return session.begin(JOINTS.ready, 0.0, 0.0)
+
+
+def after(session: JointSession, state: State, seconds: float, *first: cmd.Command) -> State:
+    *_, last = ticks(session, state, seconds, *first)
+    return last
+
+
+def ticks(
+    session: JointSession, state: State, seconds: float, *first: cmd.Command
+) -> Iterator[State]:
+    t, end = state.t, state.t + seconds
+    while t < end - DT / 2:
+        t += DT
+        state = session.step(state, first, t)
+        state = session.observe(state, state.setpoint, 0.0)
+        first = ()
+        yield state
+        if not state.moving and state.servo is None:
+            return
+
+
+def test_it_begins_as_near_to_zero_as_its_limits_let_it(state: State) -> None:
+    np.testing.assert_array_equal(state.q, (0.05, 0.0, 0.0))
+    assert (state.status, state.moving, state.tool) == (Status.OK, False, "")
+
+
+joint_vectors = st.tuples(st.floats(-0.5, 0.9), st.floats(-4.0, 4.0), st.floats(-1.0, 1.0))
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    st.lists(st.tuples(joint_vectors, st.floats(0.02, 0.6)), min_size=1, max_size=4),
+    st.sampled_from([1.0, 0.3]),
+)
+def test_no_wish_breaks_a_limit_and_the_last_is_reached(
+    wishes: list[tuple[tuple[float, float, float], float]], share: float
+) -> None:
+    rules = JointSession(JOINTS, lambda _a, _b: 0.0)
+    state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.SpeedScale(share))
+    limits, seen = JOINTS.limits, [state]
+    for wish, seconds in wishes:
+        seen += ticks(rules, state, seconds, cmd.SetJoints(np.array(wish)))
+        state = seen[-1]
+    state = after(rules, state, 20.0)
+    goal = np.clip(wishes[-1][0], limits.lower, limits.upper)
+    np.testing.assert_array_equal(state.q, goal)
+    for before, now in pairwise(seen):
+        motion = now.motion
+        assert ((motion.q >= limits.lower) & (motion.q <= limits.upper)).all()
+        assert (np.abs(motion.qd) <= share * limits.speed * (1.0 + 1e-6)).all()
+        assert (np.abs(motion.qdd) <= limits.acceleration * (1.0 + 1e-6)).all()
+        jump = np.abs(motion.qdd - before.motion.qdd) / DT
+        assert (jump <= limits.jerk * (1.0 + 1e-3) + 1e-6).all()
+
+
+def test_what_is_cut_is_told_in_its_own_unit(session: JointSession, state: State) -> None:
+    there = after(session, state, DT, cmd.SetAxes(((0, 9.0), (1, 9.0), (2, 0.1))))
+    told = [(f.reason, f.axis, f.amount) for f in there.findings]
+    assert told == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
+    assert there.status is Status.LIMITED
+    assert after(session, there, 10.0, cmd.SetAxes(((0, 0.1), (1, 0.0)))).findings == ()
+
+
+def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
+    session: JointSession, state: State
+) -> None:
+    moving = after(session, state, 0.8, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
+    stopped = after(session, moving, DT, cmd.Stop())
+    assert stopped.halted is not None
+    rest = after(session, stopped, stopped.halted.time)
+    assert rest.motion.at_rest
+    np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
+    far = np.abs(moving.setpoint - rest.q).max()
+    assert stopped.halted.way == pytest.approx(far, abs=1e-9)
+    ignored = after(session, rest, 0.5, cmd.Home(), cmd.Dress("a", Trait.CHOICE, -1))
+    np.testing.assert_array_equal(ignored.q, rest.q)
+    assert ignored.looks.of("a").choice is Choice.HIDDEN
+    free = after(session, ignored, 0.5, cmd.Release())
+    assert (free.halted, free.findings, free.moving) == (None, (), False)
+    home = after(session, free, 10.0, cmd.Home())
+    np.testing.assert_array_equal(home.q, JOINTS.ready)
+
+
+def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: JointSession, state: State) -> None:
+    goal = np.array((0.3, 2.0, 0.1))
+    moving = after(session, state, 0.8, cmd.SetJoints(goal))
+    paused = after(session, moving, 3.0, cmd.Pause())
+    assert paused.status is Status.PAUSED
+    assert not paused.moving
+    share = (paused.q - state.q) / (goal - state.q)
+    np.testing.assert_allclose(share, share[0], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(after(session, paused, 10.0, cmd.Resume()).q, goal)
+    held = after(session, moving, 3.0, cmd.Reset())
+    assert not held.moving
+    assert not np.allclose(held.q, goal)
+
+
+def test_a_stream_is_followed_and_its_end_is_a_rest(session: JointSession, state: State) -> None:
+    q = np.array(JOINTS.ready)
+    for _ in range(200):
+        q = q + np.array((0.1, 0.5, 0.0)) * DT
+        state = after(session, state, DT, cmd.Servo(q))
+    # A tick ahead of what it heard, as the stream will be by then.
+    np.testing.assert_allclose(state.q, q, rtol=0, atol=0.5 * DT * 2.1)
+    over = after(session, state, 2.0)
+    assert over.servo is None
+    assert not over.moving
+    assert 0.0 < float(over.q[1] - state.q[1]) < 0.5
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        cmd.SetPose(np.eye(4)), cmd.MoveTool(np.zeros(3)), cmd.TurnTool(0.0, 0.0), cmd.Fill(1e-4),
+        cmd.SetTool("tcp"), cmd.SetGripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.ones(5)),
+        cmd.Remove("cup"), cmd.Together((cmd.Home(), cmd.SetGripper(0.0))),
+    ],
+)  # fmt: skip
+def test_what_wants_a_tool_is_refused_with_the_reason(
+    session: JointSession, state: State, command: cmd.Command
+) -> None:
+    with pytest.raises(InputError, match=r"Only its joints can be driven\. It is a gantry"):
+        session.step(state, [command], DT)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (cmd.SetJoint(3, 0.0), "axis 4: this mechanism has 3"),
+        (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
+        (cmd.SetJoints(np.zeros(5)), "3 driven joints, the command 5"),
+        (cmd.Servo(np.zeros(2)), "3 driven joints, the command 2"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    session: JointSession, command: cmd.Command, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        session.check(command)
+
+
+def test_a_late_tick_is_no_leap_and_an_error_of_ours_holds(
+    session: JointSession, state: State
+) -> None:
+    moving = after(session, state, 0.5, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
+    late = session.step(moving, (), moving.t + 5.0)
+    on_time = session.step(moving, (), moving.t + LONGEST_STEP)
+    np.testing.assert_array_equal(late.setpoint, on_time.setpoint)
+    failed = session.fail(moving)
+    assert failed.status is Status.FAULT
+    np.testing.assert_array_equal(after(session, failed, 1.0).q, moving.setpoint)

@@ -1,0 +1,120 @@
+"""Mechanisms made ready to be driven: limits that followers keep too, and what cannot be driven."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli.assembly import Described, Jointed, recognised
+from app.control import commands as cmd
+from app.errors import InputError, RobotDescriptionError
+from app.exchange.c_source import c_files
+from app.exchange.glb import glb_files
+from app.exchange.machine import load_machine
+from app.exchange.urdf_package import package_files
+from app.exchange.vrml import vrml_files
+from app.exchange.vrml_text import read_world
+from app.settings import Settings
+from tests.exchange.conftest import GANTRY
+from tests.exchange.trees import tree
+
+ARMS = Path(__file__).parents[1] / "robot" / "arms"
+
+
+def test_what_follows_binds_what_it_follows() -> None:
+    machine = load_machine(GANTRY, "why")
+    joints = machine.joints
+    assert joints.names == ("rail", "turn", "grip")
+    assert joints.slides == (True, False, False)
+    # Of "grip too" = 0.1 - grip in (-2, 2) and "out" = -0.04 + ... nothing is nearer than its own.
+    np.testing.assert_allclose(joints.lower, (-0.4, -math.pi, -1.0))
+    np.testing.assert_allclose(joints.upper, (0.4, math.pi, 0.5))
+    assert joints.speed[1] == 1.0
+    assert any("'turn' has no speed of its own: 1 rad/s" in note for note in machine.notes)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_posture_inside_the_limits_takes_any_joint_beyond_its_own(
+    tmp_path: Path, seed: int
+) -> None:
+    path = tmp_path / "tree.urdf"
+    path.write_text(tree(seed, 6 + seed))
+    machine = load_machine(path, "why")
+    joints, random = machine.joints, np.random.default_rng(seed)
+    for share in (0.0, 1.0, random.uniform(size=joints.n)):
+        values = machine.values(joints.lower + share * (joints.upper - joints.lower))
+        for name, value in values.items():
+            joint = machine.mechanism.joints[name]
+            assert joint.lower - 1e-12 <= value <= joint.upper + 1e-12
+
+
+def test_a_way_is_that_of_the_link_that_goes_farthest() -> None:
+    machine = load_machine(GANTRY, "why")
+    q = np.zeros(3)
+    assert machine.way(q, q) == 0.0
+    assert machine.way(q, np.array((0.25, 0.0, 0.0))) == pytest.approx(0.25)
+
+
+LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
+<joint name="j" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
+<limit lower="0.1" upper="0.1" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('<robot name="r"><link name="a"/></robot>', "r has no joint that could be driven"),
+        (LOCKED, "'j' of r cannot be driven.*from 0.1 to 0.1"),
+        ("<robot", "no robot description|not a robot description"),
+    ],
+)
+def test_what_cannot_be_driven_is_told(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "r.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotDescriptionError, match=said):
+        load_machine(path, "why")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_can_be_driven_can_be_exported(tmp_path: Path, seed: int) -> None:
+    path = tmp_path / "tree.urdf"
+    path.write_text(tree(seed))
+    machine = load_machine(path, "why")
+    mechanism, values = machine.mechanism, machine.values(machine.joints.upper)
+    made = (
+        vrml_files(mechanism, values),
+        c_files(mechanism, values),
+        glb_files(mechanism, values, None),
+        package_files(path),
+    )
+    for files in made:
+        assert files
+        assert all(files.values())
+    world = read_world(made[0]["tree.wrl"].decode())
+    assert set(machine.joints.names) <= set(world.named())
+
+
+def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_path: Path) -> None:
+    whole = (ARMS / "pincherx_150.urdf").read_text()
+    elbow = whole.index('<joint name="elbow"')
+    before, after = whole[:elbow], whole[elbow:]
+    tilt = math.radians(12.0)
+    skewed = f'<axis xyz="{math.sin(tilt)} {math.cos(tilt)} 0"/>'
+    path = tmp_path / "skewed.urdf"
+    path.write_text(before + re.sub(r'<axis xyz="[^"]*"/>', skewed, after, count=1))
+    found = recognised(Settings(), path, None)
+    assert isinstance(found, Jointed)
+    why = found.machine.joints.why
+    assert "axis 3 must be parallel to axis 2 and is 12 deg off" in why
+    assert f"Joints only. {why}" in found.notes
+    with pytest.raises(InputError, match="12 deg off"):
+        found.session.check(cmd.SetPose(np.eye(4)))
+    straight = recognised(Settings(), ARMS / "pincherx_150.urdf", None)
+    assert isinstance(straight, Described)
+    # Whoever names a tool wants to send it somewhere.
+    with pytest.raises(RobotDescriptionError, match="12 deg off"):
+        recognised(Settings(), path, found.machine.mechanism.links[-1].name)

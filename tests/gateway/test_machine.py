@@ -1,0 +1,203 @@
+"""A mechanism that is no arm of the family, live on a real server: joint by joint, and no tool."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from app.api import answers, requests
+from app.cli.main import main
+from app.client import Client, RefusedError, connect
+from app.exchange.machine import Machine, load_machine
+from tests.browser.server import AppServer
+from tests.exchange.trees import tree
+from tests.gateway.client import ask, opened
+
+SEED = 5
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("tree") / "tree.urdf"
+    file.write_text(tree(SEED))
+    return file
+
+
+@pytest.fixture(scope="module")
+def machine(path: Path) -> Machine:
+    return load_machine(path, "why")
+
+
+@pytest.fixture(scope="module")
+def server(path: Path) -> Iterator[AppServer]:
+    command = (sys.executable, "-m", "app", "serve", "--port", "{port}", "--silence", "1.5")
+    with AppServer((*command, "--urdf", str(path))) as server:
+        yield server
+
+
+@pytest.fixture
+def arm(server: AppServer) -> Iterator[Client]:
+    with connect(server.url, "Test") as arm:
+        arm.ask(requests.Reset())
+        arm.ask(requests.Speed(value=1.0))
+        yield arm
+        arm.ask(requests.Reset())
+        arm.go(requests.Home())
+        arm.ask(requests.Release())
+
+
+def somewhere(machine: Machine, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    joints = machine.joints
+    return np.random.default_rng(seed).uniform(0.9 * joints.lower, 0.9 * joints.upper)
+
+
+def test_it_has_what_the_test_is_about(machine: Machine) -> None:
+    mechanism, joints = machine.mechanism, machine.joints
+    assert any(joints.slides)
+    assert not all(joints.slides)
+    assert len(mechanism.joints) > joints.n
+    assert any(len(mechanism.children(link)) > 1 for link in mechanism.links)
+
+
+def test_every_link_is_where_another_program_has_it(
+    arm: Client, machine: Machine, path: Path
+) -> None:
+    urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
+    for seed in range(3):
+        q = somewhere(machine, seed)
+        there = arm.joints(q)
+        np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
+        # It is told driven joints alone, and works out by itself what follows them.
+        urdf.update_cfg(dict(zip(machine.joints.names, q.tolist(), strict=True)))
+        told = {link.name: link.T for link in arm.look(answers.Links).links}
+        assert set(told) == set(urdf.link_map)
+        for name, T in told.items():
+            np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
+
+
+def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
+    server: AppServer, arm: Client, machine: Machine
+) -> None:
+    told = arm.look(answers.Arm)
+    assert told.joints == list(machine.joints.names)
+    assert told.slides == list(machine.joints.slides)
+    assert (told.tools, told.default_tool, told.gripper, told.T_base_shoulder) == (
+        {},
+        None,
+        None,
+        None,
+    )
+    assert "no link that hangs on five turning joints" in told.joints_only
+    state = arm.look(answers.State)
+    assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
+    eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
+    cartesian: list[requests.Request] = [
+        requests.Pose(T=eye), requests.Position(p=(0.1, 0, 0)), requests.Turn(pitch=0, roll=0),
+        requests.Jog(rates=(0.1, 0, 0, 0, 0)), requests.Branch(shoulder="front", elbow="up"),
+        requests.Gripper(angle=0.1), requests.Tool(name="tcp"), requests.Fill(ml=1.0),
+        requests.Program(text="steps: []"), requests.Remove(name="cup"),
+        requests.Place(name="a", T=eye, form=requests.Form.SPHERE, size=[0.1]),
+    ]  # fmt: skip
+    for request in cartesian:
+        with pytest.raises(RefusedError, match=r"Only its joints can be driven\. .*five turning"):
+            arm.ask(request)
+    status, _, body = ask(f"{server.url}/api/v1/branches")
+    assert status == 409
+    assert "Only its joints" in json.loads(body)["why"]
+    with pytest.raises(RefusedError, match=f"axis {machine.joints.n + 1}: this mechanism has"):
+        arm.ask(requests.Joint(axis=machine.joints.n + 1, value=0.0))
+    with pytest.raises(RefusedError, match="driven joints, the command 2"):
+        arm.ask(requests.Joints(q=[0.0, 0.0]))
+    assert "Joints only." in server.output
+
+
+def test_what_is_beyond_a_limit_is_cut_and_told_in_its_own_unit(
+    arm: Client, machine: Machine
+) -> None:
+    slide = machine.joints.slides.index(True)
+    there = arm.go(requests.Joint(axis=slide + 1, value=2.0))
+    assert there.q[slide] == machine.joints.upper[slide]
+    (finding,) = there.findings
+    assert (finding.reason, finding.unit, finding.axis) == ("slide limit", "m", slide + 1)
+    assert finding.amount == machine.joints.upper[slide]
+    assert there.why.endswith(" mm.")
+
+
+def test_stop_pause_and_lease_are_those_of_an_arm(
+    server: AppServer, arm: Client, machine: Machine
+) -> None:
+    arm.ask(requests.Speed(value=0.05))
+    far = np.where(np.arange(machine.joints.n) == 0, machine.joints.lower, 0.0)
+    arm.ask(requests.Joints(q=far.tolist()))
+    with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
+        other.ask(requests.Home())
+    arm.ask(requests.Pause())
+    while (now := arm.look(answers.State)).moving:
+        time.sleep(0.02)
+    assert now.status == "paused"
+    assert now.q[0] != far[0]
+    arm.ask(requests.Resume())
+    with connect(server.url, "Other") as other:
+        other.ask(requests.Stop())
+    while (now := arm.look(answers.State)).moving:
+        time.sleep(0.02)
+    assert now.status == "halted"
+    assert now.stopped == "Other pressed STOP."
+    assert now.q[0] != far[0]
+    with pytest.raises(RefusedError, match="reset it first"):
+        arm.joints(far)
+
+
+def test_its_world_is_named_too(arm: Client, machine: Machine) -> None:
+    slide = machine.joints.names[machine.joints.slides.index(True)]
+    axis = machine.mechanism.axis(machine.mechanism.joints[slide])
+    arm.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
+    assert arm.look(answers.State).q[machine.joints.names.index(slide)] == pytest.approx(0.05)
+    arm.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
+    world = {node.node: node for node in arm.look(answers.World).nodes}
+    assert world["link1_look"].fields[0].value == 1.0
+    arm.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
+
+
+def test_a_slider_moves_it_in_its_own_unit(server: AppServer, machine: Machine) -> None:
+    async def act() -> None:
+        async with opened(server.url) as (peer, control):
+            name = machine.joints.names[machine.joints.slides.index(True)]
+            index = machine.joints.names.index(name)
+            label = f"{index + 1}. {name}"
+            props = peer.controls[label]["props"]
+            assert props["max"] == pytest.approx(1e3 * machine.joints.upper[index], abs=0.01)
+            assert "mm" in props["hint"]
+            assert "Go to pose" not in peer.controls
+            await peer.set(label, value=60.0)
+            async with asyncio.timeout(5.0):
+                while True:
+                    _, _, body = ask(f"{server.url}/api/v1/state")
+                    if abs(json.loads(body)["q"][index] - 0.06) < 1e-9:
+                        break
+                    await asyncio.sleep(0.05)
+            await control.say("home")
+            await control.wait(mood="ok")
+            await control.say("release")
+
+    asyncio.run(act())
+
+
+def test_what_cannot_be_driven_is_refused_when_it_is_served(
+    tmp_path: Path, path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    locked = tmp_path / "locked.urdf"
+    locked.write_text(path.read_text().replace('type="prismatic"', 'type="planar"'))
+    assert main(["serve", "--port", "0", "--urdf", str(locked)]) == 1
+    assert "is planar" in capfd.readouterr().err
+    assert main(["serve", "--port", "0", "--urdf", str(path), "--tool", "link3"]) == 1
+    assert "link3" in capfd.readouterr().err

@@ -1,0 +1,357 @@
+"""The VRML world by name: what is told of it, and what setting it comes to, over every line."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.api import answers, requests
+from app.client import Client, RefusedError, connect
+from app.control import commands as cmd
+from app.control.looks import Trait
+from app.control.session import Session
+from app.control.state import State
+from app.control.things import Form, Thing
+from app.errors import InputError
+from app.exchange.mechanism import Mechanism
+from app.exchange.urdf_mechanism import load_mechanism
+from app.exchange.vrml import world_of
+from app.exchange.vrml_node import FIELDS
+from app.gateway.nodes import Body, Nodes, body_of
+from app.geometry import so3
+from app.robot.bare import bare
+from app.robot.model import RobotModel
+from app.settings import Settings
+from robot_description import URDF_PATH
+from tests.browser.server import APP, AppServer
+from tests.exchange.conftest import GANTRY
+from tests.gateway.client import ask
+from tests.gateway.test_api import Lines, post, speaking
+
+THERE = {"axis_1": 0.4, "axis_2": -1.0, "axis_3": 1.3, "axis_4": 0.3, "axis_5": -0.5}
+AXES = {"axis_1": (0, 0, 1), "axis_5": (1, 0, 0)}
+"""Those of the joints that do not turn about y."""
+
+
+@pytest.fixture(scope="module")
+def katana() -> Mechanism:
+    return load_mechanism(URDF_PATH)[0]
+
+
+@pytest.fixture(scope="module")
+def rules(model: RobotModel) -> Session:
+    return Session(model.arm, np.array(Settings().ready))
+
+
+@pytest.fixture(scope="module")
+def nodes(model: RobotModel, katana: Mechanism, rules: Session) -> Nodes:
+    return Nodes(katana, body_of(model, katana), rules.surroundings)
+
+
+@pytest.fixture(scope="module")
+def state(rules: Session) -> State:
+    cube = Thing("left/cube", Form.BOX, (0.1, 0.1, 0.1), np.eye(4))
+    begun = rules.begin(rules.ready, 0.2, 0.0)
+    return replace(begun, things=(cube, replace(cube, name="pan link look")))
+
+
+def setting(node: str, field: str, value: Any) -> requests.Setting:
+    return requests.Setting(node=node, field=field, value=value)
+
+
+def rotation(joint: str, angle: float) -> list[float]:
+    return [*AXES.get(joint, (0, 1, 0)), angle]
+
+
+def get(nodes: Nodes, state: State, node: str, field: str) -> Any:
+    (value,) = nodes.read(state, [requests.Named(node=node, field=field)])
+    return value.value
+
+
+def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
+    nodes: Nodes, state: State, katana: Mechanism, model: RobotModel
+) -> None:
+    angles = model.joint_angles(state.q, state.gripper)
+    file = world_of(katana, angles).named()
+    told = {node.node: node for node in nodes.world(state).nodes}
+    things = {name for name, node in told.items() if node.of.startswith("thing")}
+    assert told.keys() - things <= file.keys()
+    assert not things & file.keys()
+    for name in told.keys() - things:
+        assert told[name].kind == file[name].kind
+        for field in told[name].fields:
+            assert FIELDS[file[name].kind][field.field].value == field.type
+            shown: Any = file[name].get(field.field)
+            np.testing.assert_allclose(np.array(field.value), shown, rtol=0, atol=5e-5)
+    # Whatever joint and look the file has, the server has.
+    dressed = ("Switch", "Material")
+    assert {name for name, node in file.items() if node.kind in dressed} == {
+        name for name, node in told.items() if node.kind in dressed
+    } - things
+    assert set(katana.joints) <= told.keys()
+    # Names that are no identifiers, or taken, are made so.
+    assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= things
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.dictionaries(st.sampled_from(sorted(THERE)), st.floats(-2.0, 2.0), min_size=1))
+def test_joints_are_told_to_go_and_never_put(
+    nodes: Nodes, state: State, wanted: dict[str, float]
+) -> None:
+    said = nodes.command(
+        state,
+        [setting(each, "rotation", rotation(each, angle)) for each, angle in wanted.items()],
+    )
+    assert isinstance(said, cmd.SetAxes)
+    assert dict(said.values) == {int(each[-1]) - 1: angle for each, angle in wanted.items()}
+    # However long the axis is told.
+    huge = [setting(n, "rotation", [1e200 * x for x in rotation(n, 0)[:3]] + [a])
+            for n, a in wanted.items()]  # fmt: skip
+    assert nodes.command(state, huge) == said
+    # The other way round about the axis turned round, and an axis of any length, is the same.
+    turned = [setting(n, "rotation", [-2.0 * x for x in rotation(n, 0)[:3]] + [-a])
+              for n, a in wanted.items()]  # fmt: skip
+    again = nodes.command(state, turned)
+    assert isinstance(again, cmd.SetAxes)
+    assert dict(again.values) == dict(said.values)
+
+
+def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
+    said = nodes.command(
+        state,
+        [
+            setting("axis_1", "rotation", [0, 0, 1, 0.1]),
+            setting("left_cube", "translation", [0.3, 0.1, 0.0]),
+            setting("left_cube", "rotation", [0, 0, 2, 0.5]),
+            setting("axis_2", "rotation", [0, 1, 0, -1.0]),
+            setting("pan_link_paint", "diffuseColor", [1, 0, 0]),
+            setting("finger_right_joint", "rotation", [0, 0, 1, 0.3]),
+        ],
+    )
+    assert isinstance(said, cmd.Together)
+    turned, moved, spun, painted, gripped = said.commands
+    assert turned == cmd.SetAxes(((0, 0.1), (1, -1.0)))
+    assert isinstance(moved, cmd.Shift)
+    assert moved.R is None
+    assert isinstance(spun, cmd.Shift)
+    assert spun.R is not None
+    np.testing.assert_allclose(spun.R, so3.rotation_z(0.5), rtol=0, atol=1e-15)
+    assert painted == cmd.Dress("pan_link", Trait.COLOUR, (1.0, 0.0, 0.0))
+    assert gripped == cmd.SetGripper(0.3)
+    shown = replace(state, looks=state.looks.having("pan_link", Trait.COLOUR, (1.0, 0.0, 0.0)))
+    assert get(nodes, shown, "pan_link_paint", "diffuseColor") == [1.0, 0.0, 0.0]
+    assert get(nodes, shown, "pan_link_look", "whichChoice") == 1.0
+
+
+@pytest.mark.parametrize(
+    ("node", "field", "value", "said"),
+    [
+        ("axis_9", "rotation", [0, 1, 0, 0.1], "no node 'axis_9'"),
+        ("axis_2", "scale", [1, 1, 1], "is a Transform with rotation, center"),
+        ("axis_2", "center", [0, 0, 0], "can be read and not set"),
+        (
+            "axis_2",
+            "rotation",
+            [1, 0, 0, 0.1],
+            "axis_2 turns about 0 1 0, and cannot turn about 1 0 0",
+        ),
+        ("axis_2", "rotation", [0, 0, 0, 0.1], "cannot turn about 0 0 0"),
+        ("axis_2", "rotation", [1e300, 1e300, 0, 0.1], "cannot turn about 1e"),
+        ("axis_2", "rotation", [0, 1, 0], "SFRotation, which is 4 numbers"),
+        ("axis_2", "rotation", 0.1, "SFRotation, which is 4 numbers"),
+        ("axis_2", "rotation", [0, 1, 0, math.inf], "finite"),
+        ("axis_2", "rotation", None, "no value of its own"),
+        ("finger_left_joint", "rotation", [0, 0, -1, 0.1], "follows finger_right_joint: set that"),
+        ("left_cube", "translation", [0, 0, 5], "more than 2 m"),
+        ("left_cube", "translation", None, "no place of its own"),
+        ("left_cube", "rotation", [0, 0, 0, 1], "without a direction"),
+        ("pan_link_look", "whichChoice", [1, 0], "a number"),
+        ("pan_link_look", "whichChoice", 7, "-1 for hidden"),
+        ("pan_link_paint", "diffuseColor", [1, 0, 2], "0 to 1"),
+        ("pan_link_paint", "transparency", [0.5], "a number"),
+    ],
+)
+def test_what_cannot_be_set_is_refused_with_all_that_came_with_it(
+    nodes: Nodes, state: State, node: str, field: str, value: Any, said: str
+) -> None:
+    fine = setting("axis_1", "rotation", [0, 0, 1, 0.1])
+    with pytest.raises(InputError, match=said):
+        nodes.command(state, [fine, setting(node, field, value)])
+
+
+names = st.sampled_from(
+    ["axis_1", "axis_5", "finger_right_joint", "finger_left_joint", "left_cube", "pan_link_look",
+     "pan_link_paint", "left_cube_paint", "base_link_look", "axis", ""]
+)  # fmt: skip
+fields = st.sampled_from(
+    ["rotation", "translation", "center", "whichChoice", "diffuseColor", "transparency", "x"]
+)
+numbers = st.floats() | st.sampled_from([0.0, 1.0, -1.0, 0.5])
+anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
+def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
+    nodes: Nodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
+) -> None:
+    try:
+        command = nodes.command(state, [setting(*each) for each in said])
+    except InputError:
+        return
+    rules.check(command)
+    after = rules.step(state, [command], 0.01)
+    for node in nodes.world(after).nodes:
+        for each in node.fields:
+            assert np.isfinite(np.array(each.value)).all()
+
+
+def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
+    held = replace(state, things=(replace(state.things[0], held=True),))
+    with pytest.raises(InputError, match="open the gripper first"):
+        nodes.command(held, [setting("left_cube", "translation", [0, 0, 0])])
+
+
+def test_a_bare_arm_has_no_names_for_the_gripper(model: RobotModel, katana: Mechanism) -> None:
+    stripped = bare(model)
+    session = Session(stripped.arm, stripped.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
+    nodes = Nodes(katana, body_of(stripped, katana), session.surroundings)
+    told = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
+    assert "axis_5" in told
+    assert not {name for name in told if "finger" in name or "gripper" in name}
+
+
+def test_what_slides_has_a_translation_along_its_axis(session: Session) -> None:
+    gantry = load_mechanism(GANTRY)[0]
+    body = Body({"rail": 0}, None, lambda _: {"rail": 0.2}, frozenset(["cart", "mast"]))
+    nodes = Nodes(gantry, body, session.surroundings)
+    state = session.begin(session.ready, 0.0, 0.0)
+    along = np.array((math.cos(0.3), math.sin(0.3), 0.0))
+    np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)
+    said = nodes.command(state, [setting("rail", "translation", (-0.1 * along).tolist())])
+    assert isinstance(said, cmd.SetAxes)
+    np.testing.assert_allclose(said.values, ((0, -0.1),), rtol=0, atol=1e-15)
+    with pytest.raises(InputError, match=r"rail slides along 0\.955336 0\.29552 0"):
+        nodes.command(state, [setting("rail", "translation", [0.1, 0.1, 0.1])])
+    with pytest.raises(InputError, match="stays at zero"):
+        nodes.command(
+            state, [setting("turn", "rotation", [*gantry.axis(gantry.joints["turn"]), 1])]
+        )
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer((*APP, "--lines", "0")) as server:
+        yield server
+
+
+def arrived(lines: Lines, ticket: int) -> None:
+    """Once the arm is at rest with that order in it."""
+    while (now := lines.answer(do="look"))["ticket"] < ticket or now["moving"]:
+        time.sleep(0.02)
+
+
+def all_joints(q: dict[str, float]) -> dict[str, Any]:
+    (node, angle), *rest = q.items()
+    more = [{"node": n, "field": "rotation", "value": rotation(n, a)} for n, a in rest]
+    return {"node": node, "field": "rotation", "value": rotation(node, angle), "more": more}
+
+
+def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
+    with speaking(server, "VR Sink") as lines:
+        before = lines.answer(do="look")["q"]
+        done = lines.answer(do="set", **all_joints(THERE))
+        assert done["is"] == "done"
+        soon = lines.answer(do="get", node="axis_1", field="rotation")["values"][0]["value"][3]
+        # On its way under the arm's own limits, not there.
+        assert abs(soon - before[0]) < 0.1
+        arrived(lines, done["ticket"])
+        more = [{"node": name, "field": "rotation"} for name in THERE]
+        said = lines.answer(do="get", node="axis_2", field="center", more=more)["values"]
+        assert [each["node"] for each in said] == ["axis_2", *THERE]
+        for each, (name, angle) in zip(said[1:], THERE.items(), strict=True):
+            np.testing.assert_allclose(each["value"], rotation(name, angle), rtol=0, atol=1e-9)
+        # All or none.
+        bad = all_joints({**THERE, "axis_1": 0.0})
+        bad["more"][-1]["value"] = [0, 1, 0, 0.1]
+        refused = lines.answer(do="set", **bad)
+        assert refused["is"] == "refused"
+        assert "axis_5 turns about 1 0 0" in refused["why"]
+        assert lines.answer(do="look")["goal"][0] == THERE["axis_1"]
+        # STOP is stronger than any name.
+        lines.answer(do="stop")
+        stopped = lines.answer(do="set", node="axis_1", field="rotation", value=[0, 0, 1, 0])
+        assert "reset it first" in stopped["why"]
+        assert lines.answer(do="reset")["is"] == "done"
+        arrived(lines, lines.answer(do="home")["ticket"])
+        lines.answer(do="release")
+
+
+def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
+    with speaking(server, "Painter") as lines:
+        lines.answer(
+            do="set", node="cup", field="translation", value=[0.3, 0.2, 0.0],
+            more=[{"node": "cup_paint", "field": "diffuseColor", "value": [1, 0, 0]},
+                  {"node": "pan_link_look", "field": "whichChoice", "value": -1}],
+        )  # fmt: skip
+        lines.say(
+            do="watch", hz=20,
+            fields=[{"node": "cup", "field": "translation"},
+                    {"node": "cup_paint", "field": "diffuseColor"},
+                    {"node": "pan_link_look", "field": "whichChoice"},
+                    {"node": "axis_2", "field": "rotation"}],
+        )  # fmt: skip
+        wanted: list[Any] = [[0.3, 0.2, 0.0], [1.0, 0.0, 0.0], -1.0]
+        told: list[Any] = []
+        while told[:3] != wanted:
+            state = lines.hear()
+            told = [each["value"] for each in state.get("fields", ())]
+        assert told[3] == [0.0, 1.0, 0.0, state["q"][1]]
+        lines.say(do="watch", hz=0)
+        nothing = lines.answer(do="watch", hz=5, fields=[{"node": "cups", "field": "translation"}])
+        assert "no node 'cups'" in nothing["why"]
+        for node, field in (("cup_paint", "diffuseColor"), ("pan_link_look", "whichChoice")):
+            assert lines.answer(do="set", node=node, field=field, value=None)["is"] == "done"
+        with connect(server.url, "Watcher") as watcher:
+            with pytest.raises(RefusedError, match="Painter holds"):
+                watcher.ask(requests.Set(node="pan_link_look", field="whichChoice", value=-1))
+            assert not_painted(watcher)
+        lines.answer(do="release")
+
+
+def not_painted(client: Client) -> bool:
+    world = client.look(answers.World)
+    return all(
+        field.value == 0.0
+        for node in world.nodes
+        for field in node.fields
+        if field.field == "whichChoice"
+    )
+
+
+def test_it_is_the_same_over_http(server: AppServer) -> None:
+    status, _, body = ask(f"{server.url}/api/v1/world")
+    assert status == 200
+    told = {node["node"]: node for node in json.loads(body)["nodes"]}
+    assert {"axis_1", "pan_link_look", "pan_link_paint", "cup", "basin_paint"} <= told.keys()
+    assert told["axis_2"]["fields"][0] == {
+        "field": "rotation", "type": "SFRotation", "settable": True,
+        "value": told["axis_2"]["fields"][0]["value"],
+    }  # fmt: skip
+    status, said = post(server, do="set", node="axis_5", field="rotation", value=[1, 0, 0, 0.2])
+    assert (status, said["is"]) == (200, "done")
+    status, said = post(server, do="get", node="axis_5", field="rotation")
+    assert (status, said["is"]) == (200, "values")
+    status, said = post(server, do="set", node="axis_5", field="rotation", value="round")
+    assert (status, said["is"]) == (422, "refused")
+    status, said = post(server, do="release")
+    assert status == 200

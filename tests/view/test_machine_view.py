@@ -1,0 +1,98 @@
+"""A mechanism without a tool in viser's scene, and its panel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from app.control.joint_session import JointSession
+from app.control.looks import Looks, Trait
+from app.control.state import State
+from app.exchange.machine import Machine, load_machine
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.view.looks import PERSONAL
+from app.view.machine_nodes import MachineNodes
+from app.view.machine_panel import MachinePanel, page
+from app.view.paint import PaintNodes
+from app.view.programs import STEERING
+from tests.exchange.conftest import GANTRY
+from tests.exchange.trees import tree
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    path = tmp_path / "tree.urdf"
+    path.write_text(tree(3, 10))
+    return load_machine(path, "It is <b>no</b> arm.")
+
+
+def standing(machine: Machine) -> State:
+    session = JointSession(machine.joints, machine.way)
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+def shown(server: viser.ViserServer, path: str) -> FloatArray:
+    """(4, 4) of a node in the world, as the messages to a browser have it."""
+    T, name = np.eye(4), ""
+    for part in path.split("/")[1:]:
+        name += f"/{part}"
+        node: Any = server.scene._handle_from_node_name[name]
+        T = T @ se3.from_rotation_translation(so3.from_quaternion(node.wxyz), node.position)
+    return T
+
+
+def test_every_link_is_shown_where_it_is(server: viser.ViserServer, machine: Machine) -> None:
+    nodes = MachineNodes(server, machine.mechanism)
+    joints, random = machine.joints, np.random.default_rng(1)
+    for _ in range(3):
+        values = machine.values(random.uniform(joints.lower, joints.upper))
+        nodes.move(values)
+        for name, T in machine.mechanism.frames(values).items():
+            np.testing.assert_allclose(shown(server, nodes.path[name]), T, rtol=0, atol=1e-9)
+
+
+def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
+    machine = load_machine(GANTRY, "why")
+    nodes = MachineNodes(server, machine.mechanism)
+    blue = Looks().having("cart", Trait.COLOUR, (0.0, 0.0, 1.0))
+    PaintNodes(server, nodes).follow(replace(standing(machine), looks=blue))
+    assert not nodes.shapes["cart"][0].visible
+    coat: Any = server.scene._handle_from_node_name[f"{nodes.path['cart']}/paint0"]
+    assert tuple(coat.color) == (0, 0, 255)
+
+
+def test_the_panel_has_a_slider_a_joint_and_says_why(
+    server: viser.ViserServer, machine: Machine
+) -> None:
+    said: list[Any] = []
+
+    def put(command: Any) -> int:
+        said.append(command)
+        return len(said)
+
+    state = standing(machine)
+    MachinePanel(server.gui, machine.joints, put, state)
+    controls = {
+        handle.label: handle for handle in server.gui._gui_input_handle_from_uuid.values()
+        if isinstance(handle, viser.GuiSliderHandle)
+    }  # fmt: skip
+    joints = machine.joints
+    labels = [f"{axis + 1}. {name}" for axis, name in enumerate(joints.names)]
+    assert set(controls) == {*labels, "Speed"}
+    for axis, label in enumerate(labels):
+        unit = 1e3 if joints.slides[axis] else float(np.degrees(1.0))
+        assert controls[label].min == pytest.approx(unit * joints.lower[axis], abs=0.01)
+        assert controls[label].min >= unit * joints.lower[axis] - 1e-9
+        assert controls[label].max <= unit * joints.upper[axis] + 1e-9
+        # A joint may be called anything, and is nobody's alone for that.
+        assert label not in (*PERSONAL, *STEERING)
+    assert "mm" in page(joints, state)
+    root: Any = server.gui._container_handle_from_uuid["root"]
+    texts = [h.content for h in root._children.values() if isinstance(h, viser.GuiHtmlHandle)]
+    assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)

@@ -1,0 +1,75 @@
+"""Parts that are hidden or painted, as viser's scene has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import viser
+
+from app.control.looks import Looks, Trait
+from app.control.session import Session
+from app.control.state import State
+from app.exchange.urdf_mechanism import load_mechanism
+from app.robot.model import RobotModel
+from app.view.paint import PaintNodes
+from app.view.scene import ArmNodes
+from robot_description import URDF_PATH
+
+
+class Shown:
+    """A scene of arm and paint."""
+
+    def __init__(self, server: viser.ViserServer, model: RobotModel, session: Session) -> None:
+        self.server = server
+        self.arm = ArmNodes(server, model)
+        self.paint = PaintNodes(server, self.arm)
+        self.state = session.begin(session.ready, 0.0, 0.0)
+        self.show()
+
+    def show(self, **changes: object) -> State:
+        self.state = replace(self.state, **changes)  # type: ignore[arg-type]
+        self.paint.follow(self.state)
+        return self.state
+
+    def painted(self) -> dict[str, tuple[int, int, int]]:
+        nodes = self.server.scene._handle_from_node_name
+        return {
+            name: node.color
+            for name, node in nodes.items()
+            if isinstance(node, viser.MeshHandle) and "paint" in name and node.visible
+        }
+
+
+@pytest.fixture
+def shown(server: viser.ViserServer, model: RobotModel, session: Session) -> Shown:
+    return Shown(server, model, session)
+
+
+def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
+    made = [shape.visible for shape in shown.arm.shapes["pan_link"]]
+    assert made
+    assert all(made)
+    red = Looks().having("pan_link", Trait.COLOUR, (1.0, 0.0, 0.2))
+    shown.show(looks=red)
+    painted = shown.painted()
+    assert set(painted.values()) == {(255, 0, 51)}
+    assert all("/pan_link/paint" in name for name in painted)
+    assert not any(shape.visible for shape in shown.arm.shapes["pan_link"])
+    glass = Looks().having("pan_link", Trait.TRANSPARENCY, 0.75)
+    shown.show(looks=glass)
+    # Of a paint that nobody mixed: the colour of most of what the link is made of.
+    mechanism, _ = load_mechanism(URDF_PATH)
+    (link,) = (link for link in mechanism.links if link.name == "pan_link")
+    assert set(shown.painted().values()) == {tuple(round(255.0 * part) for part in link.colour)}
+    node = shown.server.scene._handle_from_node_name[
+        "/".join((shown.arm.path["pan_link"], "paint0"))
+    ]
+    assert isinstance(node, viser.MeshHandle)
+    assert node.opacity == 0.25
+    shown.show(looks=Looks().having("pan_link", Trait.CHOICE, -1))
+    assert shown.painted() == {}
+    assert not any(shape.visible for shape in shown.arm.shapes["pan_link"])
+    shown.show(looks=Looks())
+    assert [shape.visible for shape in shown.arm.shapes["pan_link"]] == made
+    assert shown.painted() == {}
