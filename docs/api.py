@@ -130,7 +130,7 @@ def _json(value: Any) -> str:
 
 def _shape(schema: dict[str, Any]) -> str:
     if "$ref" in schema:
-        name = schema["$ref"].rpartition("/")[2]
+        name: str = schema["$ref"].rpartition("/")[2]
         kind = getattr(requests, name, None) or getattr(answers, name, None)
         if kind is not None and hasattr(kind, "__members__"):
             return " or ".join(f'`"{each.value}"`' for each in kind)

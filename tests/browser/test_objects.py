@@ -55,20 +55,18 @@ def test_an_object_is_brought_moved_changed_and_removed(
         moved = place_of(page)
         np.testing.assert_allclose(moved, (0.36, 0.12, 0.0), atol=0.01)
 
-        # The unit that was guessed is put right: the same object, as large as it then is.
+        # Another unit than the guessed one: the same object, as large as it then is.
         page.page.select_option("#unit", "cm")
         page.wait_until(lambda: "1040 × 1040 × 240 mm" in said(page), "the other unit")
-        page.page.select_option("#unit", "mm")
-        page.wait_until(lambda: "104 × 104 × 24 mm" in said(page), "the first again")
         page.wait_until(
-            lambda: len(page.messages("MeshMessage", node=SHAPE)) == 3, "each of them in the scene"
+            lambda: len(page.messages("MeshMessage", node=SHAPE)) == 2, "it in the scene"
         )
         np.testing.assert_allclose(place_of(page), moved, atol=1e-9)
 
-        page.type_number("Scale", 1.5)
+        page.type_number("Scale", 0.15)
         page.wait_until(
             lambda: any(
-                each.body["updates"].get("scale") == 1.5
+                each.body["updates"].get("scale") == 0.15
                 for each in page.messages("SceneNodeUpdateMessage", node=SHAPE)
             ),
             "the scale",

@@ -13,6 +13,7 @@ from app.cli.assembly import described
 from app.collision.clearance import STOP
 from app.collision.outer import outer
 from app.control import commands as cmd
+from app.control.room import free_place, girth
 from app.control.session import Session
 from app.control.solid import Look, Solid
 from app.control.state import Reason, State
@@ -245,3 +246,20 @@ def test_what_cannot_be_is_refused(session: Session) -> None:
     ):
         with pytest.raises(InputError, match="not looked at"):
             blind.check(asked)
+
+
+def test_new_things_stand_in_reach_and_beside_each_other() -> None:
+    things: list[Thing] = []
+    for number in range(12):
+        new = knot(np.eye(4), f"{number}", scale=0.6)
+        things.append(replace(new, T=free_place(new, things)))
+    places = np.array([thing.T[:2, 3] for thing in things])
+    np.testing.assert_array_equal(places[0], (0.36, 0.0))
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + np.eye(12)
+    assert apart.min() >= 2.0 * girth(things[0])
+    assert np.linalg.norm(places, axis=1).max() <= 0.6
+    # What the hand carries takes no place, and neither does the thing itself.
+    carried = [replace(things[0], fixed=True), *things[1:]]
+    np.testing.assert_array_equal(
+        free_place(knot(np.eye(4), "new", scale=0.6), carried)[:2, 3], places[0]
+    )
