@@ -10,7 +10,8 @@ install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 long    := tests/browser/test_x_ite.py tests/exchange/test_c_source.py tests/exchange/test_vrml.py \
-           tests/cli/test_export.py tests/cli/test_demo.py tests/gateway/test_programs.py
+           tests/cli/test_export.py tests/cli/test_demo.py tests/cli/test_films.py tests/gateway/test_programs.py \
+           tests/browser/test_recording.py tests/browser/test_demos.py
 heavy   := tests/control tests/kinematics tests/robot_description
 short   := $(long:%=--ignore=%)
 patient := nice -n 5 $(bin)/python -m pytest
