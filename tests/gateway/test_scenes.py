@@ -136,6 +136,7 @@ def test_a_mesh_is_placed_fixed_to_the_hand_and_met(
     until(lambda: not things(arm)["it"].fixed)
     assert things(arm)["it"].T[2][3] == 0.0
     arm.ask(requests.Remove(name="it"))
+    until(lambda: "it" not in things(arm))
     for wrong in (
         requests.Place(name="it", form=form),
         requests.Place(name="it", form=form, mesh="0" * 32),
