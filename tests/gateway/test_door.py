@@ -261,7 +261,9 @@ def test_a_press_of_stop_that_is_told_both_ways_counts_once() -> None:
             cookie = enter(server.url)
 
             def post(query: str = "") -> None:
-                answer = ask(f"{server.url}/stop{query}", data=b"", Cookie=cookie)
+                answer = ask(
+                    f"{server.url}/stop{query}", data=b"", Cookie=cookie, Origin=server.url
+                )
                 assert answer[0] == 204
 
             async with controlling(server.url, cookie) as control:
