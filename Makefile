@@ -9,11 +9,7 @@ dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
-long    := tests/browser/test_x_ite.py tests/exchange/test_c_source.py tests/exchange/test_vrml.py \
-           tests/cli/test_export.py tests/cli/test_demo.py tests/cli/test_films.py tests/gateway/test_programs.py \
-           tests/browser/test_recording.py tests/browser/test_demos.py
 heavy   := tests/control tests/kinematics tests/robot_description
-short   := $(long:%=--ignore=%)
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
@@ -49,11 +45,11 @@ exchange: $(dev_ok)           ## find the programs that read our exports, or ins
 # Two at once, as many as there are cores: those that drive a browser, and beside them those that run
 # servers; after each of them a share of those that only compute, which give way to the others.
 tests: $(dev_ok)
-	@( $(bin)/python -m pytest $(servers) $(short) > $(VENV)/servers.log 2>&1; status=$$?; \
-	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) $(short) \
+	@( $(bin)/python -m pytest $(servers) > $(VENV)/servers.log 2>&1; status=$$?; \
+	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \
 	      > $(VENV)/computed.log 2>&1 || status=1; \
 	    exit $$status ) & beside=$$!; \
-	  $(bin)/python -m pytest $(browser) $(short); status=$$?; \
+	  $(bin)/python -m pytest $(browser); status=$$?; \
 	  $(patient) $(heavy) || status=1; \
 	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
 	  exit $$status

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 
 import numpy as np
@@ -12,10 +13,25 @@ from app.control.session import Session
 from app.robot.model import RobotModel, load
 from app.settings import Settings
 
+LONG = "KATANA450_LONG" in os.environ
+
 
 def pytest_configure() -> None:
     """A shell has what it runs in the background ignore Ctrl-C, and so would all it starts."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_report_header() -> str:
+    """Say what is not run."""
+    return "every test with all its cases" if LONG else "without what is left to `make test-long`"
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what takes long, where not all is asked for."""
+    left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
 
 
 @pytest.fixture(scope="session")

@@ -317,6 +317,7 @@ def come_back(robot: Robot, server: AppServer) -> None:
     robot.settle()
 
 
+@pytest.mark.long
 def test_killed_in_mid_drag_the_app_comes_back_whole_and_at_rest(
     open_page: OpenPage, model: RobotModel
 ) -> None:

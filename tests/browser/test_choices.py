@@ -96,6 +96,7 @@ def test_a_person_clicks_the_ghost_of_a_branch(page: ViserPage, artefacts: Path)
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_a_map_of_the_workspace_is_looked_into(
     open_page: OpenPage, tmp_path: Path, artefacts: Path
 ) -> None:
@@ -126,6 +127,7 @@ def test_a_map_of_the_workspace_is_looked_into(
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_the_map_of_another_arm_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.npz"
     options = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--out", str(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +16,8 @@ from app.robot.model import RobotModel
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+
+pytestmark = pytest.mark.long
 
 MOVE = "/target/move"
 CIRCLE, POUR = "Circle with gripper", "Pour"
@@ -172,7 +173,6 @@ def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -
     assert program(stage.arm.look(answers.State)).status == "stopped"
 
 
-@pytest.mark.skipif("KATANA450_LONG" not in os.environ, reason="it takes half a minute")
 def test_the_whole_pour(open_page: OpenPage, artefacts: Path) -> None:
     with AppServer() as server, connect(server.url, "Test") as arm:
         stage = Stage(open_page(server.url, nodes=("/arm", MOVE)), arm)

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import math
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -421,9 +420,7 @@ def test_it_fits(page: ViserPage, artefacts: Path, size: str) -> None:
     page.page.emulate_media(color_scheme="light")
 
 
-@pytest.mark.skipif(
-    "KATANA450_LONG" not in os.environ, reason="a window with viser: make test-long"
-)
+@pytest.mark.long
 def test_sliders_and_theme_of_visers_page_go_with_it(
     server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:

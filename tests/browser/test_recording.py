@@ -13,6 +13,8 @@ from playwright.sync_api import Browser, Page
 from app.cli.main import main
 from tests.browser.page import SCRIPTS
 
+pytestmark = pytest.mark.long
+
 PAN = "/arm/base_link/arm_base_link/pan_link"
 
 SECONDS, TURN = 4.0, 1.2

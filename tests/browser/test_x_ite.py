@@ -15,6 +15,8 @@ from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import X_ITE, x_ite
 
+pytestmark = pytest.mark.long
+
 SCRIPT = x_ite()
 
 HOST = "http://exports.test"

@@ -19,6 +19,8 @@ from app.programs.circle import CircleDemo
 from app.programs.script import parse
 from app.robot.model import load
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -10,6 +10,8 @@ import pytest
 from app.cli.main import main
 from tests.exchange.conftest import GANTRY
 
+pytestmark = pytest.mark.long
+
 LONGEST = 3.0
 """[s] Of processor for one export."""
 

@@ -10,10 +10,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 
 from app.cli.main import main
+
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -20,6 +20,8 @@ from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import SCREEN, VIEWER, needs, run
 
+pytestmark = pytest.mark.long
+
 BUILD = 20.0
 """[s] Of processor that a build may take."""
 

@@ -24,6 +24,8 @@ from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import SCREEN, needs, run
 
+pytestmark = pytest.mark.long
+
 MOST = 2_500_000
 """Bytes of the arm's world."""
 

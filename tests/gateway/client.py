@@ -23,6 +23,9 @@ from app.control.lease import BEAT
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
+LEARNT = 30.0
+"""[s] In which a scene has come."""
+
 QUIET = 0.4
 """[s] Long enough for the server to have sent whatever a message makes it send."""
 
@@ -173,7 +176,12 @@ class Peer:
             look_at=[0.0, 0.0, 0.0],
             up_direction=[0.0, 0.0, 1.0],
         )
-        for message in await self.listen():
+        told: list[dict[str, Any]] = []
+        async with asyncio.timeout(LEARNT):
+            # On a busy machine the scene comes with breaks.
+            while not any(message["type"] == "ReplayDoneMessage" for message in told):
+                told += await self.listen()
+        for message in told:
             label = message.get("props", {}).get("label")
             if message["type"].startswith("Gui") and label:
                 self.controls[label] = message

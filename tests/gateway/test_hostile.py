@@ -473,6 +473,7 @@ def test_a_driver_whose_page_hangs_stops_the_arm_in_time() -> None:
     assert min(took) < Settings.silence + 0.2
 
 
+@pytest.mark.long
 def test_there_is_room_for_many_and_no_more() -> None:
     async def crowd(server: AppServer) -> None:
         async with opened(server.url) as (good, _), AsyncExitStack() as stack:

@@ -22,6 +22,8 @@ from tests.browser.server import AppServer
 from tests.exchange.trees import tree
 from tests.gateway.client import ask, opened
 
+pytestmark = pytest.mark.long
+
 SEED = 5
 
 

@@ -18,6 +18,8 @@ from app.api.requests import Order
 from app.client import Client, RefusedError, connect
 from tests.browser.server import AppServer
 
+pytestmark = pytest.mark.long
+
 ROOT = Path(__file__).resolve().parents[2]
 READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
 

@@ -32,6 +32,8 @@ from tests.browser.server import APP, AppServer
 from tests.gateway import client
 from tests.gateway.client import ask
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory: pytest.TempPathFactory) -> Path:
