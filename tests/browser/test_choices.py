@@ -84,6 +84,8 @@ def test_a_person_looks_at_the_branches_and_takes_one(
 
 def test_a_person_clicks_the_ghost_of_a_branch(page: ViserPage, artefacts: Path) -> None:
     page.click_button("Home")
+    page.wait_until(lambda: page.slider_value("Axis 3") > 0.0, "the sliders at home")
+    # Told together with the sliders: by now it does not say so of the posture before.
     page.wait_until(lambda: "On target" in page.panel_text(), "the arm at home", seconds=20.0)
     page.frame.get_by_text("Ghosts of the others", exact=True).click()
     elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
