@@ -45,6 +45,8 @@ exchange: $(dev_ok)           ## find the programs that read our exports, or ins
 # Two at once, as many as there are cores: those that drive a browser, and beside them those that run
 # servers; after each of them a share of those that only compute, which give way to the others.
 tests: $(dev_ok)
+	@# Once, for the hundreds of processes that are started.
+	@$(bin)/python -m compileall -q app robot_description
 	@( $(bin)/python -m pytest $(servers) > $(VENV)/servers.log 2>&1; status=$$?; \
 	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \
 	      > $(VENV)/computed.log 2>&1 || status=1; \
