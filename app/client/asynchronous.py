@@ -176,7 +176,7 @@ def _plain(value: Any) -> Any:
     """Numbers and arrays of numpy's, as JSON has them."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    raise NotImplementedError
+    raise TypeError(f"{type(value).__name__} is nothing that can be sent: {value!r}")
 
 
 @asynccontextmanager

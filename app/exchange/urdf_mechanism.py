@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
-import yourdfpy
 
 from app.errors import RobotDescriptionError
 from app.exchange.mechanism import Joint, Link, Material, Mechanism, Shape
@@ -35,6 +33,8 @@ def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     """
     if not path.is_file():
         raise RobotDescriptionError(f"There is no robot description at {path}.")
+    import yourdfpy
+
     try:
         urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False)
         joints = {joint.child: joint for joint in urdf.robot.joints}
@@ -156,6 +156,8 @@ def shapes_of(visual: Visual) -> Sequence[Shape]:
     )
     if not isinstance(visual.source, Path):
         return [_shape(_edged(visual.mesh), np.eye(4), plain)]
+    import trimesh
+
     bare = visual.source.suffix.lower() == ".stl"
     T = visual.T_body_visual @ np.diag([*visual.scale, 1.0])
     try:
@@ -174,6 +176,8 @@ def shapes_of(visual: Visual) -> Sequence[Shape]:
 
 def _edged(mesh: Any) -> Any:
     """A mesh that brings no normals of its own, with those of a smooth surface up to an edge."""
+    import trimesh
+
     return trimesh.graph.smooth_shade(mesh, angle=EDGE)
 
 

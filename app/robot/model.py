@@ -7,10 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yourdfpy
 
 from app.control.arm import NO_GRIPPER, Arm, Gripper
 from app.errors import RobotDescriptionError
@@ -22,6 +21,9 @@ from app.kinematics.turns import in_limits_turn
 from app.robot.conduit import Hinge, Stretch, read_stretches
 from app.robot.visual import Visual, rods, visuals_of
 from robot_description import URDF_PATH
+
+if TYPE_CHECKING:
+    import yourdfpy
 
 SHOULDER_FRAME = "shoulder_frame"
 """The link that is the paper's frame {S}."""
@@ -125,6 +127,8 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     """
     if not path.is_file():
         raise RobotDescriptionError(f"There is no robot description at {path}.")
+    import yourdfpy
+
     try:
         urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
         frames = {link: np.asarray(urdf.get_transform(link)) for link in urdf.link_map}

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from app.errors import RobotDescriptionError
 from app.geometry.arrays import FloatArray, frozen
@@ -51,6 +50,8 @@ class Visual:
     @cached_property
     def mesh(self) -> Any:
         """A trimesh of it in the body's own frame [m]; RobotDescriptionError if it is none."""
+        import trimesh
+
         if isinstance(self.source, Path):
             try:
                 mesh = trimesh.load_scene(self.source).to_mesh()
@@ -93,6 +94,8 @@ def visuals_of(
 
 def rods(ends: Sequence[npt.NDArray[Any]]) -> tuple[Visual, ...]:
     """Thin cylinders from a link's origin to each of ``ends`` (3,) [m] in its frame."""
+    import trimesh
+
     return tuple(
         Visual(
             frozen(np.eye(4)),
@@ -105,6 +108,8 @@ def rods(ends: Sequence[npt.NDArray[Any]]) -> tuple[Visual, ...]:
 
 
 def _primitive(geometry: Any) -> Any:
+    import trimesh
+
     if geometry.box is not None:
         return trimesh.creation.box(extents=geometry.box.size)
     if geometry.cylinder is not None:
