@@ -20,7 +20,7 @@ from typing import Self
 ROOT = Path(__file__).resolve().parents[2]
 # A machine that runs tests and draws their pictures without a graphics card starves its browsers;
 # what they have to say of being alive comes late then.
-APP = (sys.executable, "-m", "app", "serve", "--port", "{port}", "--silence", "2.8")
+APP = (sys.executable, "-m", "app", "serve", "--port", "{port}", "--silence", "2.0")
 ATTENTIVE_APP = APP[:-2]
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
