@@ -78,7 +78,7 @@ def test_a_person_looks_at_the_branches_and_takes_one(
     ).scroll_into_view_if_needed()
     page.keep(artefacts / "app-branches.png")
     page.click_button("Take front-down")
-    page.wait_until(lambda: page.slider_value("Axis 3") < 0.0, "the other elbow")
+    page.wait_until(lambda: page.slider_value("Axis 3") < 0.0, "the other elbow", seconds=30.0)
     assert page.errors == []
 
 
@@ -93,7 +93,9 @@ def test_a_person_clicks_the_ghost_of_a_branch(page: ViserPage, artefacts: Path)
     page.keep(artefacts / "app-ghosts.png")
     before = page.slider_value("Axis 3")
     page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
-    page.wait_until(lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow")
+    page.wait_until(
+        lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow", seconds=30.0
+    )
     page.wait_until(lambda: "Moving" not in page.panel_text(), "the arm to arrive")
     assert page.errors == []
 
