@@ -10,6 +10,7 @@ install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
 servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
 heavy   := tests/control tests/kinematics tests/robot_description
+lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
@@ -43,17 +44,20 @@ exchange: $(dev_ok)           ## find the programs that read our exports, or ins
 	$(bin)/python tests/exchange/tools.py
 
 # Two at once, as many as there are cores: those that drive a browser, and beside them those that run
-# servers; after each of them a share of those that only compute, which give way to the others.
+# servers; after each of them a share of those that only compute, which give way to the others. A
+# browser or server that was starved of time meanwhile is tried once more when nothing else runs.
 tests: $(dev_ok)
 	@# Once, for the hundreds of processes that are started.
 	@$(bin)/python -m compileall -q app robot_description
-	@( $(bin)/python -m pytest $(servers) > $(VENV)/servers.log 2>&1; status=$$?; \
+	@rm -rf $(VENV)/again*
+	@( $(lane)-servers $(servers) > $(VENV)/servers.log 2>&1 || echo servers >> $(VENV)/again; \
 	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \
-	      > $(VENV)/computed.log 2>&1 || status=1; \
-	    exit $$status ) & beside=$$!; \
-	  $(bin)/python -m pytest $(browser); status=$$?; \
-	  $(patient) $(heavy) || status=1; \
+	      > $(VENV)/computed.log 2>&1 ) & beside=$$!; \
+	  $(lane)-browser $(browser) || echo browser >> $(VENV)/again; \
+	  $(patient) $(heavy); status=$$?; \
 	  wait $$beside || status=1; cat $(VENV)/servers.log $(VENV)/computed.log; \
+	  for which in $$(cat $(VENV)/again 2> $(VENV)/again-none); do \
+	    $(lane)-$$which --last-failed --last-failed-no-failures none || status=1; done; \
 	  exit $$status
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
