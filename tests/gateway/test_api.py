@@ -42,18 +42,6 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
-@pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
-    """A program that holds the arm; what it was told to do is forgotten afterwards."""
-    with connect(server.url, "Test") as arm:
-        arm.ask(requests.Reset())
-        arm.ask(requests.Speed(value=1.0))
-        yield arm
-        arm.ask(requests.Reset())
-        arm.go(requests.Home())
-        arm.ask(requests.Release())
-
-
 class Lines:
     """A program on the TCP port."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +17,7 @@ from app.api import answers, requests
 from app.cli.main import main
 from app.client import Client, RefusedError, connect
 from app.exchange.machine import Machine, load_machine
-from tests.browser.server import AppServer
+from tests.browser.server import APP, AppServer
 from tests.exchange.trees import tree
 from tests.gateway.client import ask, opened
 
@@ -41,20 +40,8 @@ def machine(path: Path) -> Machine:
 
 @pytest.fixture(scope="module")
 def server(path: Path) -> Iterator[AppServer]:
-    command = (sys.executable, "-m", "app", "serve", "--port", "{port}", "--silence", "1.5")
-    with AppServer((*command, "--urdf", str(path))) as server:
+    with AppServer((*APP, "--urdf", str(path))) as server:
         yield server
-
-
-@pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Test") as arm:
-        arm.ask(requests.Reset())
-        arm.ask(requests.Speed(value=1.0))
-        yield arm
-        arm.ask(requests.Reset())
-        arm.go(requests.Home())
-        arm.ask(requests.Release())
 
 
 def somewhere(machine: Machine, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
