@@ -12,12 +12,12 @@ from tests.browser.server import AppServer
 
 
 @pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
+def program(server: AppServer) -> Iterator[Client]:
     """A program that holds the arm; what it was told to do is forgotten afterwards."""
-    with connect(server.url, "Test") as arm:
-        arm.ask(requests.Reset())
-        arm.ask(requests.Speed(value=1.0))
-        yield arm
-        arm.ask(requests.Reset())
-        arm.go(requests.Home())
-        arm.ask(requests.Release())
+    with connect(server.url, "Test") as program:
+        program.ask(requests.Reset())
+        program.ask(requests.Speed(value=1.0))
+        yield program
+        program.ask(requests.Reset())
+        program.go(requests.Home())
+        program.ask(requests.Release())

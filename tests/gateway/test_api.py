@@ -93,17 +93,17 @@ def post(server: AppServer, program: str = "a-test-that-posts", **request: Any) 
 
 
 def test_a_program_drives_the_joints_and_knows_when_they_are_there(
-    arm: Client, model: RobotModel
+    program: Client, model: RobotModel
 ) -> None:
-    there = arm.joints(THERE)
+    there = program.joints(THERE)
     assert there.status == "ok"
     assert there.why == ""
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
     np.testing.assert_allclose(
         np.array(there.T), forward(model.arm.chain, THERE), rtol=0, atol=1e-12
     )
-    assert there.holder == arm.welcome.name == "Test"
-    described = arm.look(answers.Arm)
+    assert there.holder == program.welcome.name == "Test"
+    described = program.look(answers.Arm)
     assert described.joints == list(model.arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
     np.testing.assert_array_equal(described.T_base_shoulder, model.T_base_shoulder)
@@ -111,22 +111,22 @@ def test_a_program_drives_the_joints_and_knows_when_they_are_there(
 
 @pytest.mark.parametrize("frame", list(requests.Frame))
 def test_a_pose_may_be_in_either_frame(
-    arm: Client, model: RobotModel, frame: requests.Frame
+    program: Client, model: RobotModel, frame: requests.Frame
 ) -> None:
     T = forward(model.arm.chain, THERE)
     asked = T if frame is requests.Frame.SHOULDER else model.T_base_shoulder @ T
-    there = arm.go(requests.Pose(T=asked.tolist(), frame=frame))
+    there = program.go(requests.Pose(T=asked.tolist(), frame=frame))
     np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=1e-9)
     p = asked[:3, 3] + [0.0, 0.0, 0.02]
-    there = arm.go(requests.Position(p=tuple(p), frame=frame))
+    there = program.go(requests.Position(p=tuple(p), frame=frame))
     np.testing.assert_allclose(np.array(there.T)[:3, 3], T[:3, 3] + [0, 0, 0.02], rtol=0, atol=1e-9)
     assert there.pitch is not None
-    there = arm.go(requests.Turn(pitch=there.pitch, roll=0.25))
+    there = program.go(requests.Turn(pitch=there.pitch, roll=0.25))
     assert there.roll == pytest.approx(0.25, abs=1e-12)
 
 
-def test_what_the_arm_cannot_do_comes_with_its_reason(arm: Client) -> None:
-    there = arm.go(requests.Position(p=(0.9, 0.0, 0.0)))
+def test_what_the_arm_cannot_do_comes_with_its_reason(program: Client) -> None:
+    there = program.go(requests.Position(p=(0.9, 0.0, 0.0)))
     assert there.status == "limited"
     assert there.findings[0].reason == "out of reach"
     assert there.findings[0].unit == "m"
@@ -134,15 +134,15 @@ def test_what_the_arm_cannot_do_comes_with_its_reason(arm: Client) -> None:
         0.9 - math.hypot(*np.array(there.T)[:3, 3]), abs=0.02
     )
     with pytest.raises(RefusedError, match="There is no tool 'spoon'; this arm has"):
-        arm.ask(requests.Tool(name="spoon"))
+        program.ask(requests.Tool(name="spoon"))
     with pytest.raises(RefusedError, match="5 joints, the command 3"):
-        arm.ask(requests.Joints(q=[0.0, 0.0, 0.0]))
+        program.ask(requests.Joints(q=[0.0, 0.0, 0.0]))
     skewed = ((1.0, 0.0, 0.0, 0.3), (0.0, 1.0, 0.5, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
     with pytest.raises(RefusedError, match=r"[Rr]otation"):
-        arm.ask(requests.Pose(T=skewed))
+        program.ask(requests.Pose(T=skewed))
 
 
-def test_everything_there_is_to_ask_for_has_an_answer(arm: Client) -> None:
+def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
     asked: list[requests.Request] = [
         requests.Beat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),
         requests.Tool(name="tcp"), requests.Joint(axis=5, value=0.1), requests.Pause(),
@@ -153,21 +153,21 @@ def test_everything_there_is_to_ask_for_has_an_answer(arm: Client) -> None:
         *(requests.Read(reading=each) for each in reversed(Reading)),
     ]  # fmt: skip
     for request in asked:
-        answer = arm.ask(request)
+        answer = program.ask(request)
         assert not isinstance(answer, answers.Refused), request
     for kind in (answers.State, answers.Arm, answers.Ledger, answers.Branches, answers.Loop):
-        assert isinstance(arm.look(kind), kind)
+        assert isinstance(program.look(kind), kind)
     refusals = (requests.Acquire(), requests.Take(), requests.Ask(), requests.Withdraw())
     for request in refusals:
         with pytest.raises(RefusedError):
-            arm.ask(request)
+            program.ask(request)
 
 
-def test_a_state_tells_what_follows_from_the_posture(arm: Client, model: RobotModel) -> None:
+def test_a_state_tells_what_follows_from_the_posture(program: Client, model: RobotModel) -> None:
     q = THERE + np.array((0.3, 0.0, 0.0, 0.0, 0.0))
-    arm.joints(q)
+    program.joints(q)
     time.sleep(0.3)
-    state = arm.look(answers.State)
+    state = program.look(answers.State)
     assert state.told > state.t + 0.2
     assert (state.setpoint, state.tool_speed) == (state.q, 0.0)
     assert (state.touching, state.held) == ([], None)
@@ -178,33 +178,33 @@ def test_a_state_tells_what_follows_from_the_posture(arm: Client, model: RobotMo
     assert state.margins.axis == distances.argmin() + 1
     assert state.margins.clearance is not None
     assert state.margins.clearance > 0.005
-    arm.tell(requests.Joints(q=THERE.tolist()))
+    program.tell(requests.Joints(q=THERE.tolist()))
     deadline = time.monotonic() + 5.0
-    while (arm.look(answers.State).tool_speed or 0.0) < 0.05:
+    while (program.look(answers.State).tool_speed or 0.0) < 0.05:
         assert time.monotonic() < deadline
 
 
-def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(arm: Client) -> None:
+def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(program: Client) -> None:
     began = time.monotonic()
     while (t := time.monotonic() - began) < 1.5:
         wave = READY + math.sin(2.0 * t) * np.array((0.2, 0.0, 0.0, 0.0, 0.4))
-        arm.tell(requests.Servo(q=wave.tolist()))
+        program.tell(requests.Servo(q=wave.tolist()))
         time.sleep(0.02)
-    moving = arm.look(answers.State)
+    moving = program.look(answers.State)
     assert abs(np.array(moving.qd)[0]) > 0.05
     time.sleep(1.2)
-    rest = arm.look(answers.State)
+    rest = program.look(answers.State)
     assert not rest.moving
     # It braked at once and did not go on to where the stream had wanted it.
     assert abs(rest.q[0] - 0.2 * math.sin(2.0 * 1.5)) < 0.2
     # A target of another kind stays until it is reached.
-    there = arm.joints(THERE)
+    there = program.joints(THERE)
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
 
 
-def test_states_come_as_often_as_they_are_wanted(arm: Client) -> None:
+def test_states_come_as_often_as_they_are_wanted(program: Client) -> None:
     times = []
-    for state in arm.states(hz=50.0):
+    for state in program.states(hz=50.0):
         times.append(time.monotonic())
         assert len(state.q) == 5
         if len(times) == 60:
@@ -213,22 +213,22 @@ def test_states_come_as_often_as_they_are_wanted(arm: Client) -> None:
     assert 0.019 < np.mean(np.diff(times)) < 0.04
 
 
-def test_stop_is_anybodys_and_ends_what_a_program_does(server: AppServer, arm: Client) -> None:
-    arm.ask(requests.Speed(value=0.2))
-    arm.ask(requests.Joints(q=THERE.tolist()))
+def test_stop_is_anybodys_and_ends_what_a_program_does(server: AppServer, program: Client) -> None:
+    program.ask(requests.Speed(value=0.2))
+    program.ask(requests.Joints(q=THERE.tolist()))
     with connect(server.url, "Watcher") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
     status, _, _ = ask(f"{server.url}/api/v1/stop", data=b"", X_Program="bystander")
     assert status == 204
-    assert arm.look(answers.State).stopped == "bystander pressed STOP."
+    assert program.look(answers.State).stopped == "bystander pressed STOP."
     with pytest.raises(RefusedError, match="reset it first"):
-        arm.joints(READY)
-    while (rest := arm.look(answers.State)).moving:
+        program.joints(READY)
+    while (rest := program.look(answers.State)).moving:
         time.sleep(0.02)
-    arm.ask(requests.Reset())
+    program.ask(requests.Reset())
     time.sleep(0.3)
-    assert arm.look(answers.State).q == rest.q
-    ledger = arm.look(answers.Ledger)
+    assert program.look(answers.State).q == rest.q
+    ledger = program.look(answers.Ledger)
     assert any(line.who == "bystander" and line.began for line in ledger.lines)
 
 
@@ -297,8 +297,8 @@ def test_who_does_not_say_hello_on_the_tcp_port_is_sent_away(
         with suppress(ConnectionError):
             lines.raw(first)
         assert lines.ends()
-    with connect(server.url) as arm:
-        assert arm.look(answers.State).stopped is None
+    with connect(server.url) as program:
+        assert program.look(answers.State).stopped is None
 
 
 def test_requests_that_are_none_change_nothing_and_end_the_line_after_a_while(
@@ -398,24 +398,24 @@ def _rows(T: npt.ArrayLike) -> requests.Matrix4:
     return rows
 
 
-def test_things_are_put_elsewhere_and_met_and_taken_away(arm: Client) -> None:
-    known = {each.name: each for each in arm.look(answers.Things).things}
+def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> None:
+    known = {each.name: each for each in program.look(answers.Things).things}
     assert set(known) == {"cup", "basin"}
     T = np.array(known["cup"].T)
     T[:2, 3] = (0.1, -0.45)
-    arm.ask(requests.Place(name="cup", T=_rows(T)))
+    program.ask(requests.Place(name="cup", T=_rows(T)))
     wall = np.eye(4)
     wall[:3, 3] = (0.25, 0.3, 0.0)
-    arm.ask(
+    program.ask(
         requests.Place(name="wall", T=_rows(wall), form=requests.Form.BOX, size=[0.05, 0.3, 0.5])
     )
-    met = arm.go(requests.Joint(axis=1, value=1.2))
+    met = program.go(requests.Joint(axis=1, value=1.2))
     assert met.status == "blocked"
     assert "wall" in (met.findings[0].parts or ())
     assert "wall" in met.why
-    arm.ask(requests.Remove(name="wall"))
-    assert arm.go(requests.Joint(axis=1, value=1.2)).status == "ok"
-    now = {each.name: each for each in arm.look(answers.Things).things}
+    program.ask(requests.Remove(name="wall"))
+    assert program.go(requests.Joint(axis=1, value=1.2)).status == "ok"
+    now = {each.name: each for each in program.look(answers.Things).things}
     assert set(now) == {"cup", "basin"}
     np.testing.assert_array_equal(now["cup"].T, T)
     for wrong in (
@@ -426,22 +426,22 @@ def test_things_are_put_elsewhere_and_met_and_taken_away(arm: Client) -> None:
         requests.Place(name="cup", T=_rows(np.zeros((4, 4)))),
     ):
         with pytest.raises(RefusedError):
-            arm.ask(wrong)
-    arm.ask(requests.Place(name="cup", T=_rows(known["cup"].T)))
+            program.ask(wrong)
+    program.ask(requests.Place(name="cup", T=_rows(known["cup"].T)))
 
 
-def test_another_branch_is_taken_on_a_way_that_is_clear(arm: Client) -> None:
-    arm.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
-    there = arm.go(requests.Branch(shoulder="front", elbow="down"))
+def test_another_branch_is_taken_on_a_way_that_is_clear(program: Client) -> None:
+    program.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
+    there = program.go(requests.Branch(shoulder="front", elbow="down"))
     assert there.branch == ("front", "down")
     assert there.status == "ok"
-    back = arm.go(requests.Branch(shoulder="front", elbow="up"))
+    back = program.go(requests.Branch(shoulder="front", elbow="up"))
     assert back.branch == ("front", "up")
     # A STOP while the way is being worked out ends that too.
-    arm.ask(requests.Branch(shoulder="front", elbow="down"))
-    arm.ask(requests.Stop())
-    arm.ask(requests.Reset())
+    program.ask(requests.Branch(shoulder="front", elbow="down"))
+    program.ask(requests.Stop())
+    program.ask(requests.Reset())
     time.sleep(2.0)
-    rest = arm.look(answers.State)
+    rest = program.look(answers.State)
     assert not rest.moving
     assert rest.q == back.q

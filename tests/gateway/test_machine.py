@@ -58,25 +58,25 @@ def test_it_has_what_the_test_is_about(machine: Machine) -> None:
 
 
 def test_every_link_is_where_another_program_has_it(
-    arm: Client, machine: Machine, path: Path
+    program: Client, machine: Machine, path: Path
 ) -> None:
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
     for seed in range(3):
         q = somewhere(machine, seed)
-        there = arm.joints(q)
+        there = program.joints(q)
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
         # It is told driven joints alone, and works out by itself what follows them.
         urdf.update_cfg(dict(zip(machine.joints.names, q.tolist(), strict=True)))
-        told = {link.name: link.T for link in arm.look(answers.Links).links}
+        told = {link.name: link.T for link in program.look(answers.Links).links}
         assert set(told) == set(urdf.link_map)
         for name, T in told.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
 
 
 def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
-    server: AppServer, arm: Client, machine: Machine
+    server: AppServer, program: Client, machine: Machine
 ) -> None:
-    told = arm.look(answers.Arm)
+    told = program.look(answers.Arm)
     assert told.joints == list(machine.joints.names)
     assert told.slides == list(machine.joints.slides)
     assert (told.tools, told.default_tool, told.gripper, told.T_base_shoulder) == (
@@ -86,7 +86,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         None,
     )
     assert "no link that hangs on five turning joints" in told.joints_only
-    state = arm.look(answers.State)
+    state = program.look(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
     cartesian: list[requests.Request] = [
@@ -98,22 +98,22 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
     ]  # fmt: skip
     for request in cartesian:
         with pytest.raises(RefusedError, match=r"Only its joints can be driven\. .*five turning"):
-            arm.ask(request)
+            program.ask(request)
     status, _, body = ask(f"{server.url}/api/v1/branches")
     assert status == 409
     assert "Only its joints" in json.loads(body)["why"]
     with pytest.raises(RefusedError, match=f"axis {machine.joints.n + 1}: this mechanism has"):
-        arm.ask(requests.Joint(axis=machine.joints.n + 1, value=0.0))
+        program.ask(requests.Joint(axis=machine.joints.n + 1, value=0.0))
     with pytest.raises(RefusedError, match="driven joints, the command 2"):
-        arm.ask(requests.Joints(q=[0.0, 0.0]))
+        program.ask(requests.Joints(q=[0.0, 0.0]))
     assert "Joints only." in server.output
 
 
 def test_what_is_beyond_a_limit_is_cut_and_told_in_its_own_unit(
-    arm: Client, machine: Machine
+    program: Client, machine: Machine
 ) -> None:
     slide = machine.joints.slides.index(True)
-    there = arm.go(requests.Joint(axis=slide + 1, value=2.0))
+    there = program.go(requests.Joint(axis=slide + 1, value=2.0))
     assert there.q[slide] == machine.joints.upper[slide]
     (finding,) = there.findings
     assert (finding.reason, finding.unit, finding.axis) == ("slide limit", "m", slide + 1)
@@ -122,39 +122,39 @@ def test_what_is_beyond_a_limit_is_cut_and_told_in_its_own_unit(
 
 
 def test_stop_pause_and_lease_are_those_of_an_arm(
-    server: AppServer, arm: Client, machine: Machine
+    server: AppServer, program: Client, machine: Machine
 ) -> None:
-    arm.ask(requests.Speed(value=0.05))
+    program.ask(requests.Speed(value=0.05))
     far = np.where(np.arange(machine.joints.n) == 0, machine.joints.lower, 0.0)
-    arm.ask(requests.Joints(q=far.tolist()))
+    program.ask(requests.Joints(q=far.tolist()))
     with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
-    arm.ask(requests.Pause())
-    while (now := arm.look(answers.State)).moving:
+    program.ask(requests.Pause())
+    while (now := program.look(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "paused"
     assert now.q[0] != far[0]
-    arm.ask(requests.Resume())
+    program.ask(requests.Resume())
     with connect(server.url, "Other") as other:
         other.ask(requests.Stop())
-    while (now := arm.look(answers.State)).moving:
+    while (now := program.look(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "halted"
     assert now.stopped == "Other pressed STOP."
     assert now.q[0] != far[0]
     with pytest.raises(RefusedError, match="reset it first"):
-        arm.joints(far)
+        program.joints(far)
 
 
-def test_its_world_is_named_too(arm: Client, machine: Machine) -> None:
+def test_its_world_is_named_too(program: Client, machine: Machine) -> None:
     slide = machine.joints.names[machine.joints.slides.index(True)]
     axis = machine.mechanism.axis(machine.mechanism.joints[slide])
-    arm.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert arm.look(answers.State).q[machine.joints.names.index(slide)] == pytest.approx(0.05)
-    arm.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
-    world = {node.node: node for node in arm.look(answers.World).nodes}
+    program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
+    assert program.look(answers.State).q[machine.joints.names.index(slide)] == pytest.approx(0.05)
+    program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
+    world = {node.node: node for node in program.look(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
-    arm.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
+    program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
 
 def test_a_slider_moves_it_in_its_own_unit(server: AppServer, machine: Machine) -> None:
