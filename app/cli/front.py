@@ -3,6 +3,7 @@ arm is in another, and stops meanwhile."""
 
 from __future__ import annotations
 
+import gc
 import logging
 import multiprocessing
 import os
@@ -152,6 +153,9 @@ def _serve(
         link, view = attached(gateway, settings, robot, workspace, kept, pipe)
         link.start()
         view.start()
+        # What is there by now stays: looking through it for garbage would keep STOP waiting.
+        gc.collect()
+        gc.freeze()
         telling.send(READY)
         while not link.cut.wait(AWAKE):
             if view.failed.is_set():

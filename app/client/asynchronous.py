@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import quote
@@ -86,7 +86,9 @@ class AsyncClient:
         finally:
             self._states.remove(queue)
             if self._lost is None and not self._states:
-                await self.tell(requests.Watch(hz=0.0))
+                # A client that is closed meanwhile has nothing left to say.
+                with suppress(LostError):
+                    await self.tell(requests.Watch(hz=0.0))
 
     async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
         """Ask for a motion and wait until the arm is at rest; how it stands then.

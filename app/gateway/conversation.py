@@ -117,6 +117,8 @@ class Conversation(ABC):
 
     async def _receive(self, window: Window) -> None:
         while True:
+            # One request a turn of the loop: who has sent a thousand keeps nobody else waiting.
+            await asyncio.sleep(0)
             text = await self._line.receive()
             try:
                 request = requests.decoded(text)

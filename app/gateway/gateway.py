@@ -38,6 +38,10 @@ log = logging.getLogger(__name__)
 UNSENT = 16_384
 """Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
 
+UNREAD = 4_096
+"""Bytes that the machine may hold of what a browser sends: what is read at once is taken apart at
+once, and everybody waits for it."""
+
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
 
@@ -147,13 +151,16 @@ class Gateway:
 
 
 class _BrowserSocket(WebSocketsSansIOProtocol):
-    """A websocket in whose buffers little can wait, so that what is sent is new."""
+    """A websocket in whose buffers little can wait, neither of what is sent nor of what comes."""
 
     def connection_made(self, transport: BaseTransport) -> None:
         super().connection_made(transport)
         cast(Transport, transport).set_write_buffer_limits(high=UNSENT)
         line = transport.get_extra_info("socket")
-        if line is not None and hasattr(socket, "TCP_NOTSENT_LOWAT"):
+        if line is None:
+            return
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, UNREAD)
+        if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
 
 

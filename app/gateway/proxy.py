@@ -179,6 +179,8 @@ class _Line:
     async def _up(self) -> None:
         """What the firewall lets pass."""
         while True:
+            # One message a turn of the loop, as in a conversation.
+            await asyncio.sleep(0)
             message = await self._browser.receive()
             if message["type"] == "websocket.disconnect":
                 return

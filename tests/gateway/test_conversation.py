@@ -1,0 +1,52 @@
+"""Who asks a lot, beside others who have a turn too."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from itertools import pairwise
+
+from app.control.lease import Role
+from app.gateway.conversation import GoneError
+from app.gateway.door import Visitor
+from app.gateway.hub import Hub
+from app.gateway.program import Program
+
+ASKED = 200
+
+
+class Torrent:
+    """A line on which everything has arrived already."""
+
+    def __init__(self) -> None:
+        self.left = ASKED
+
+    async def receive(self) -> str:
+        if not self.left:
+            await asyncio.Event().wait()
+        self.left -= 1
+        return '{"do": "beat"}'
+
+    async def send(self, _text: str) -> None:
+        return
+
+    async def close(self, _code: int, _why: str, /) -> None:
+        raise GoneError
+
+
+def test_who_has_asked_two_hundred_times_keeps_nobody_waiting() -> None:
+    async def ask() -> list[int]:
+        hub, torrent = Hub(time.monotonic), Torrent()
+        program = Program(hub, torrent)
+        window = hub.join(Visitor("session", "Torrent", Role.OPERATOR), "a-page", program.tell)
+        asking = asyncio.create_task(program.run(window))
+        taken = [torrent.left]
+        while torrent.left:
+            await asyncio.sleep(0)
+            taken.append(torrent.left)
+        asking.cancel()
+        return taken
+
+    taken = asyncio.run(ask())
+    assert taken[-1] == 0
+    assert max(before - after for before, after in pairwise(taken)) == 1
