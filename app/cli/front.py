@@ -164,6 +164,8 @@ def _serve(
         view.stop()
     finally:
         gateway.stop()
+        # So that Python, as it ends, puts away what hangs together in circles.
+        gc.unfreeze()
 
 
 def start_log() -> None:
