@@ -190,6 +190,30 @@ class State:
     poured: Poured | None = None
     looks: Looks = ALL_AS_MADE
 
+    @staticmethod
+    def standing(
+        q: FloatArray,
+        gripper: float,
+        t: float,
+        tool: str,
+        branch: Branch,
+        things: tuple[Thing, ...] = (),
+    ) -> State:
+        """Joints that stand at ``q`` (n,) and hold, with nothing asked of them yet."""
+        return State(
+            t=t,
+            q=q,
+            gripper=gripper,
+            motion=Motion.rest(q),
+            gripper_setpoint=gripper,
+            goal=q,
+            gripper_goal=gripper,
+            tool=tool,
+            target=JointTarget(q),
+            branch=branch,
+            things=things,
+        )
+
     @property
     def status(self) -> Status:
         """What the findings come to."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from app.api import answers, requests
 from app.control import commands as cmd
-from app.control.aims import look_of
+from app.control.arrangement import look_of
 from app.control.looks import Colour, Trait
 from app.control.state import State
 from app.control.things import Surroundings, Thing
