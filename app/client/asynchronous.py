@@ -17,6 +17,7 @@ from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.api import answers, requests
+from app.api.fields import Id
 from app.client.files import LostError, RefusedError, Site
 
 SOCKET = f"/api/v{requests.VERSION}/socket"
@@ -38,7 +39,7 @@ class AsyncClient:
         self._site = site
         self.welcome = welcome
         self._asked = 0
-        self._waiting: dict[requests.Id, asyncio.Future[answers.Answer]] = {}
+        self._waiting: dict[Id, asyncio.Future[answers.Answer]] = {}
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]

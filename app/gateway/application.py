@@ -14,7 +14,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
-from app.api.requests import LONGEST_PRESS
+from app.api.fields import LONGEST_PRESS
 from app.gateway import control_socket, files, headers, viser_page
 from app.gateway.api import Api
 from app.gateway.bucket import Bucket

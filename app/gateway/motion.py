@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.api.requests import Rates
+from app.api.fields import Rates
 from app.collision.world import World
 from app.control import commands as cmd
 from app.control.choices import Choice

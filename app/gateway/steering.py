@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from app.api import answers
-from app.api.requests import Order
+from app.api.fields import Order
 from app.errors import LeaseError
 from app.gateway.performer import Performer
 from app.programs.program import Program

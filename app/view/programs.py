@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import viser
 
 from app.api.answers import Progress as Told
-from app.api.requests import Order
+from app.api.fields import Order
 from app.control.state import State
 from app.errors import InputError, KatanaError
 from app.exchange.scripts import Scripts

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import pytest
 
 from app.api import answers, requests, schema
+from app.api.fields import Matrix4
 from app.cli.main import main
 from app.client import AsyncClient, Client, RefusedError, aconnect, connect
 from app.client.files import LostError
@@ -393,8 +394,8 @@ def test_where_a_link_is_asked_for_a_program_needs_a_token(tmp_path: Path, capsy
             assert lines.hear()["name"] == "operator, x"
 
 
-def _rows(T: npt.ArrayLike) -> requests.Matrix4:
-    rows: requests.Matrix4 = msgspec.convert(np.asarray(T).tolist(), requests.Matrix4)
+def _rows(T: npt.ArrayLike) -> Matrix4:
+    rows: Matrix4 = msgspec.convert(np.asarray(T).tolist(), Matrix4)
     return rows
 
 
