@@ -10,6 +10,9 @@ from msgspec import Meta
 
 VERSION = 1
 
+ROOT = f"/api/v{VERSION}"
+"""Where the API is by HTTP."""
+
 LARGEST = 1024
 """Bytes of a request."""
 

@@ -9,6 +9,7 @@ from typing import Any, get_args
 import msgspec
 
 from app.api import answers, requests
+from app.api.fields import ROOT
 
 TITLE = "katana450"
 
@@ -49,9 +50,8 @@ def openapi_json() -> bytes:
         "401": {"description": "A token is asked for."},
         "503": {"description": "The arm is not there yet."},
     }
-    root = f"/api/v{requests.VERSION}"
     paths: dict[str, Any] = {
-        f"{root}/{path}": {
+        f"{ROOT}/{path}": {
             "get": {
                 "summary": summary(kind),
                 "responses": {
@@ -62,13 +62,13 @@ def openapi_json() -> bytes:
         }
         for path, kind in READABLE.items()
     }
-    paths[f"{root}/stop"] = {
+    paths[f"{ROOT}/stop"] = {
         "post": {
             "summary": summary(requests.Stop),
             "responses": {"204": {"description": "The arm comes to rest."}, **refused},
         }
     }
-    paths[f"{root}/do"] = {
+    paths[f"{ROOT}/do"] = {
         "post": {
             "summary": "Do one request; whoever holds the arm keeps asking, ten times a second.",
             "parameters": [
@@ -96,7 +96,7 @@ def openapi_json() -> bytes:
         "413": {"description": "It is too long."},
         "429": told("Too many at once.", {"$ref": "#/components/schemas/Refused"}),
     }
-    paths[f"{root}/mesh"] = {
+    paths[f"{ROOT}/mesh"] = {
         "post": {
             "summary": "Bring a mesh, to be placed by its key.",
             "parameters": [
@@ -113,7 +113,7 @@ def openapi_json() -> bytes:
             },
         }
     }
-    paths[f"{root}/scene"] = {
+    paths[f"{ROOT}/scene"] = {
         "get": {
             "summary": "What stands around, as a .zip of scene.yaml and its meshes.",
             "responses": {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,10 +17,10 @@ from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.api import answers, requests
-from app.api.fields import Id
+from app.api.fields import ROOT, Id
 from app.client.files import LostError, RefusedError, Site
 
-SOCKET = f"/api/v{requests.VERSION}/socket"
+SOCKET = f"{ROOT}/socket"
 
 ASKED_FOR = 5.0
 """[s] An answer that takes longer does not come."""
@@ -75,7 +75,7 @@ class AsyncClient:
             raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
         return answer
 
-    async def states(self, hz: float = FOLLOWED) -> AsyncIterator[answers.State]:
+    async def states(self, hz: float = FOLLOWED) -> AsyncGenerator[answers.State, None]:
         """The state, so many times a second; the newest, when it is asked for more slowly."""
         queue: asyncio.Queue[answers.State | None] = asyncio.Queue(1)
         self._states.append(queue)

@@ -10,7 +10,7 @@ from app.control import solid
 from app.control.looks import Choice, Look
 from app.control.state import State
 from app.control.thing_commands import Dress, Shift
-from app.control.things import Thing
+from app.control.things import Thing, named
 
 
 def removed(state: State, name: str) -> State:
@@ -37,7 +37,7 @@ def shifted(state: State, shift: Shift) -> State:
 
 def look_of(state: State, name: str) -> Look:
     """How the link or thing of that name is shown."""
-    thing = next((each for each in state.things if each.name == name), None)
+    thing = named(state.things, name)
     return state.looks.of(name) if thing is None else _as_link(thing.look)
 
 

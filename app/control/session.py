@@ -144,7 +144,7 @@ class Session:
         state = self._mover(state).step(replace(state, t=max(t, state.t)), dt)
         state = gripped(self.surroundings, self.world_at(state), state)
         if self.pouring is not None and state.poured is not None:
-            x = np.append(state.setpoint, state.gripper_setpoint)
+            x = state.x_setpoint
             state = replace(state, poured=self.pouring.step(state.poured, state.things, x, dt))
         return state if state.jogging is None else self._jogged(state)
 
@@ -241,7 +241,7 @@ class Session:
             case cmd.Together(commands=commands):
                 return functools.reduce(self._take, commands, state)
             case cmd.Attach(name=name, to=to):
-                x = np.append(state.setpoint, state.gripper_setpoint)
+                x = state.x_setpoint
                 mounted = tuple(
                     self.surroundings.mounted(each, to, x) if each.name == name else each
                     for each in state.things
@@ -259,7 +259,7 @@ class Session:
         if volume is None:
             return replace(state, poured=None)
         assert self.pouring is not None
-        x = np.append(state.setpoint, state.gripper_setpoint)
+        x = state.x_setpoint
         return replace(state, poured=self.pouring.fill(volume, state.things, x))
 
     def _aim(self, state: State, target: JointTarget | PoseTarget) -> State:

@@ -114,7 +114,7 @@ class Motion:
         if isinstance(self._session, JointSession):
             self._session.refuse()
         state = self.state
-        world, x = self._session.world_at(state), np.append(state.q, state.gripper)
+        world, x = self._session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
             chain = self.robot.arm.chain_to(state.tool)

@@ -58,4 +58,7 @@ class Steering:
                 future.set_result(None)
 
         loop.call_soon_threadsafe(done)
-        future.result(PATIENCE)
+        try:
+            future.result(PATIENCE)
+        except TimeoutError as error:
+            raise LeaseError("The server does not answer. See how the program stands.") from error
