@@ -102,7 +102,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"katana450 {version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-
     add_serve_options(commands.add_parser("serve", help="start the app and print its address"))
     for name, what in (
         ("fk", 'joints to poses: {"q": [5 angles, rad], "tool": "tcp"} a line'),

@@ -24,14 +24,14 @@ SEEN = 0.06
 def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]) -> State:
     """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
     kept = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
-    paused = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
+    pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
     # What the arm brakes for stays the reason, however often it is told anew meanwhile.
     met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
     aimed = replace(
         state,
         target=target,
         goal=goal,
-        findings=paused + met + findings + kept,
+        findings=pause + met + findings + kept,
         since=None,
         let_go=False,
         jogging=None,
