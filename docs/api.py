@@ -19,7 +19,7 @@ PAGE = Path(__file__).with_name("api.md")
 PREFACE = """\
 # The API, version {version}
 
-<!-- Written by `python -m docs.api` from app/api/requests.py and app/api/answers.py. -->
+<!-- Written by `python -m docs.api` from the shapes in app/api. -->
 
 What the page can ask of the arm a program can ask too, by the same rules: one holds the arm at a
 time, everybody may stop it, and whoever holds it gives ten signs of life a second. Each message is a

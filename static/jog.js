@@ -15,11 +15,12 @@ const Jog = (() => {
   };
   const HOLDS = { "pitch+": [3, 1], "pitch-": [3, -1], "roll-": [4, -1], "roll+": [4, 1] };
 
+  const none = () => [0, 0, 0, 0, 0];
   const byId = (id) => document.getElementById(id);
   const keys = new Set();
-  const pads = { plane: [0, 0, 0, 0, 0], lift: [0, 0, 0, 0, 0] };
+  const pads = { plane: none(), lift: none() };
   const holds = new Set();
-  let mouse = { rates: [0, 0, 0, 0, 0], at: 0 };
+  let mouse = { rates: none(), at: 0 };
   let open = false;
   let moving = false;
   let say = () => {};
@@ -91,11 +92,11 @@ const Jog = (() => {
   function gamepad() {
     const found = [...(navigator.getGamepads?.() ?? [])].find((each) => each?.connected);
     byId("gamepad").textContent = found ? "Gamepad: hold LB or RB" : "No gamepad";
-    if (!found) return [0, 0, 0, 0, 0];
+    if (!found) return none();
     const pressed = (n) => found.buttons[n]?.pressed ?? false;
     if (pressed(1) && !stopHeld) stop();
     stopHeld = pressed(1);
-    if (!pressed(4) && !pressed(5)) return [0, 0, 0, 0, 0];
+    if (!pressed(4) && !pressed(5)) return none();
     const [x = 0, y = 0, u = 0, v = 0] = found.axes;
     return [-bent(y), -bent(x), -bent(v), pressed(12) - pressed(13), bent(u)];
   }
@@ -103,7 +104,7 @@ const Jog = (() => {
   function report({ reportId, data }) {
     const number = (at) => (data.byteLength >= at + 2 ? data.getInt16(at, true) / MOUSE_FULL : 0);
     const old = performance.now() - mouse.at > MOUSE_FRESH;
-    const rates = old ? [0, 0, 0, 0, 0] : mouse.rates;
+    const rates = old ? none() : mouse.rates;
     if (reportId === 1) {
       // Its x is to the right, y towards the person, z down.
       [rates[0], rates[1], rates[2]] = [-number(2), -number(0), -number(4)].map(bent);
@@ -129,8 +130,8 @@ const Jog = (() => {
   }
 
   function rates() {
-    if (!open) return [0, 0, 0, 0, 0];
-    const sum = [0, 0, 0, 0, 0];
+    if (!open) return none();
+    const sum = none();
     const add = (other) => other.forEach((value, i) => (sum[i] += value));
     for (const code of keys) sum[KEYS[code][0]] += KEYS[code][1];
     for (const hold of holds) sum[HOLDS[hold][0]] += HOLDS[hold][1];

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import msgspec
 
-from app.api.requests import VERSION, Id
+from app.api.fields import VERSION, Id
 
 Numbers = list[float]
 

@@ -8,97 +8,101 @@ shoulder or in the base frame on the table.
 from __future__ import annotations
 
 import math
-from enum import Enum
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
+from app.api.fields import (
+    FASTEST,
+    FASTEST_ANGULAR,
+    FASTEST_LINEAR,
+    LARGEST,
+    LEAST_SHARE,
+    MOST_JOINTS,
+    MOST_STATES,
+    SLOWEST,
+    VERSION,
+    Form,
+    Frame,
+    Id,
+    Matrix4,
+    Mount,
+    Name,
+    Order,
+    Press,
+    Rates,
+    Request,
+    Vector3,
+)
+from app.api.scene_requests import (
+    Attach,
+    Fill,
+    Get,
+    Load,
+    Named,
+    Place,
+    Remove,
+    Set,
+    Setting,
+)
 from app.errors import InputError
 from app.kinematics.reading import Reading
 from app.kinematics.velocity import JogFrame
 
-VERSION = 1
-
-LARGEST = 1024
-"""Bytes of a request."""
-
-FASTEST_LINEAR = 0.5
-"""[m/s] More than the arm can do; anything beyond is nobody's wish."""
-
-FASTEST_ANGULAR = 3.0
-"""[rad/s] Likewise."""
-
-SLOWEST, FASTEST = 0.05, 1.0
-"""Share of full speed."""
-
-LEAST_SHARE = 0.01
-"""Of its own speed that a program can be run at."""
-
-MOST_STATES = 100
-"""States a second that one can be told: as many as there are."""
-
-MOST_JOINTS = 32
-
-Rates = tuple[float, float, float, float, float]
-"""Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
-
-Vector3 = tuple[float, float, float]
-Row = tuple[float, float, float, float]
-Matrix4 = tuple[Row, Row, Row, Row]
-
-Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
-LONGEST_PRESS = 64
-"""Characters that tell one press of STOP from another."""
-
-Press = Annotated[str, Meta(min_length=1, max_length=LONGEST_PRESS)] | None
-Name = Annotated[str, Meta(min_length=1, max_length=40)]
-FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
-NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
-Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
-
-
-class Frame(Enum):
-    """Whose coordinates a pose is in."""
-
-    SHOULDER = "shoulder"
-    """The paper's frame {S}, where axes 1 and 2 cross."""
-    BASE = "base"
-    """On the table under the control box."""
-
-
-class Form(Enum):
-    """What a thing counts as where contacts are looked for."""
-
-    BOX = "box"
-    CYLINDER = "cylinder"
-    SPHERE = "sphere"
-    MESH = "mesh"
-    """A file that was uploaded; it counts as its convex hull."""
-
-
-class Mount(Enum):
-    """What a thing can be fixed to."""
-
-    HAND = "hand"
-    """It goes with the hand, whatever the fingers do, and counts as a part of it."""
-    WORLD = "world"
-    """It stays where it is."""
-    TABLE = "table"
-    """Likewise, once it is put down upright on the table below."""
-
-
-class Request(
-    msgspec.Struct,
-    frozen=True,
-    forbid_unknown_fields=True,
-    kw_only=True,
-    tag_field="do",
-    tag=str.lower,
-):
-    """Any of them; ``do`` is the name of the class in small letters."""
-
-    id: Id = None
+__all__ = [
+    "LARGEST",
+    "VERSION",
+    "Acquire",
+    "AnyRequest",
+    "Ask",
+    "Attach",
+    "Beat",
+    "Branch",
+    "Fill",
+    "Form",
+    "Frame",
+    "Get",
+    "Give",
+    "Gripper",
+    "Hello",
+    "Hold",
+    "Home",
+    "Jog",
+    "Joint",
+    "Joints",
+    "Load",
+    "Look",
+    "Mount",
+    "Named",
+    "Order",
+    "Pause",
+    "Place",
+    "Pose",
+    "Position",
+    "Program",
+    "Read",
+    "Release",
+    "Remove",
+    "Request",
+    "Reset",
+    "Resume",
+    "Servo",
+    "Set",
+    "Setting",
+    "Settle",
+    "Speed",
+    "Steer",
+    "Stop",
+    "Stretch",
+    "Take",
+    "Tool",
+    "Turn",
+    "Watch",
+    "Withdraw",
+    "decoded",
+    "id_of",
+]
 
 
 class Hello(Request, frozen=True, kw_only=True):
@@ -271,111 +275,6 @@ class Pause(Request, frozen=True):
 
 class Resume(Request, frozen=True):
     """Go on."""
-
-
-class Place(Request, frozen=True, kw_only=True):
-    """Put a thing somewhere: a new one, or one that is there, of which what is not given stays.
-
-    ``form`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
-    cylinder (radius, height) or sphere (radius); of a mesh ``mesh`` is its key, as the upload told
-    it, and the size is the file's. Its frame is in the middle of its underside. A new thing without
-    ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may touch it,
-    and hold it when both do. ``colour``: as "#94a3b8", or "own" for that of the file. ``hidden``:
-    it is not drawn, and counts for contacts even so.
-    """
-
-    name: Name
-    T: Matrix4 | None = None
-    frame: Frame = Frame.BASE
-    form: Form | None = None
-    size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
-    mesh: Key | None = None
-    can_be_held: bool | None = None
-    scale: Annotated[float, Meta(ge=1e-3, le=1e3)] | None = None
-    colour: Annotated[str, Meta(pattern="^(own|#[0-9a-f]{6})$")] | None = None
-    opacity: Annotated[float, Meta(ge=0.05, le=1.0)] | None = None
-    hidden: bool | None = None
-
-
-class Attach(Request, frozen=True, kw_only=True):
-    """Fix a thing to the hand, as a camera or another tool, or to the world again.
-
-    ``T``: where on the hand, in the frame of the arm's default tool; without it, it stays where it
-    is.
-    """
-
-    name: Name
-    to: Mount
-    T: Matrix4 | None = None
-
-
-class Load(Request, frozen=True, kw_only=True):
-    """Have the things of a scene that was uploaded, in place of all there are, and its water.
-
-    The arm stays where it is.
-    """
-
-    scene: Key
-
-
-class Remove(Request, frozen=True, kw_only=True):
-    """Take a thing away."""
-
-    name: Name
-
-
-class Fill(Request, frozen=True, kw_only=True):
-    """Fill the cup with so many ml of water, and wipe up what is elsewhere."""
-
-    ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
-
-
-class Named(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A field of a node of the VRML world, by its DEF name."""
-
-    node: NodeName
-    field: NodeName
-
-
-class Setting(Named, frozen=True, kw_only=True):
-    """What such a field is to be; null for how it is made."""
-
-    value: FieldValue
-
-
-class Set(Request, frozen=True, kw_only=True):
-    """Set a field of the VRML world by the DEF name of its node, as VR Sink does; ``more`` at once.
-
-    Either all are set or, where one cannot be, none. The names are those of `katana450 export
-    vrml`; ``look`` at ``world`` lists them. A joint is never put anywhere: its ``rotation`` is an
-    order to go there, by the rules of ``joints``. ``value`` null: a colour, a transparency or a
-    choice as it is made.
-    """
-
-    node: NodeName
-    field: NodeName
-    value: FieldValue
-    more: tuple[Setting, ...] = ()
-
-
-class Get(Request, frozen=True, kw_only=True):
-    """Tell what a field of the VRML world is now, as VR Source does, and ``more`` of them."""
-
-    node: NodeName
-    field: NodeName
-    more: tuple[Named, ...] = ()
-
-
-class Order(Enum):
-    """What a program can be told."""
-
-    RUN = "run"
-    STEP = "step"
-    """Run one step, then wait."""
-    PAUSE = "pause"
-    RESUME = "resume"
-    HALT = "halt"
-    """Come to rest and end it."""
 
 
 class Program(Request, frozen=True, kw_only=True):

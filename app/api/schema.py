@@ -1,4 +1,4 @@
-"""The API described: as OpenAPI for tools, and as a page for people. Both from the shapes alone."""
+"""The API described from the shapes alone: as OpenAPI for tools, and for the page of docs/api."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, get_args
 import msgspec
 
 from app.api import answers, requests
+from app.api.fields import ROOT
 
 TITLE = "katana450"
 
@@ -41,112 +42,121 @@ def openapi_json() -> bytes:
     (request, answer), components = msgspec.json.schema_components(
         shapes, ref_template="#/components/schemas/{name}"
     )
-
-    def told(what: str, schema: Any) -> dict[str, Any]:
-        return {"description": what, "content": {"application/json": {"schema": schema}}}
-
-    refused = {
-        "401": {"description": "A token is asked for."},
-        "503": {"description": "The arm is not there yet."},
-    }
-    root = f"/api/v{requests.VERSION}"
     paths: dict[str, Any] = {
-        f"{root}/{path}": {
-            "get": {
-                "summary": summary(kind),
-                "responses": {
-                    "200": told("Now.", {"$ref": f"#/components/schemas/{kind.__name__}"}),
-                    **refused,
-                },
-            }
-        }
+        path: {"get": {"summary": summary(kind), "responses": {"200": _told("Now.", kind), **DOOR}}}
         for path, kind in READABLE.items()
     }
-    paths[f"{root}/stop"] = {
+    paths["stop"] = {
         "post": {
             "summary": summary(requests.Stop),
-            "responses": {"204": {"description": "The arm comes to rest."}, **refused},
+            "responses": {"204": {"description": "The arm comes to rest."}, **DOOR},
         }
     }
-    paths[f"{root}/do"] = {
-        "post": {
-            "summary": "Do one request; whoever holds the arm keeps asking, ten times a second.",
-            "parameters": [
-                {
-                    "name": "X-Program",
-                    "in": "header",
-                    "required": True,
-                    "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{8,64}$"},
-                    "description": "Tells programs apart; who knows it speaks for the program.",
-                }
-            ],
-            "requestBody": {
-                "required": True,
-                "content": {"application/json": {"schema": request}},
-            },
-            "responses": {
-                "200": told("Done, or what was asked for.", answer),
-                "409": told("Not now.", {"$ref": "#/components/schemas/Refused"}),
-                "422": told("Not understood.", {"$ref": "#/components/schemas/Refused"}),
-                **refused,
-            },
-        }
-    }
-    too_much = {
-        "413": {"description": "It is too long."},
-        "429": told("Too many at once.", {"$ref": "#/components/schemas/Refused"}),
-    }
-    paths[f"{root}/mesh"] = {
-        "post": {
-            "summary": "Bring a mesh, to be placed by its key.",
-            "parameters": [
-                _query("name", "The file's name, with its ending.", required=True),
-                _query("format", "wrl, stl, obj, ply, glb or gltf, where the name has no ending."),
-                _query("unit", "mm, cm, in or m; without it that is guessed, and said."),
-            ],
-            "requestBody": _file("application/octet-stream"),
-            "responses": {
-                "200": told("It is kept.", {"$ref": "#/components/schemas/Mesh"}),
-                "422": told("It cannot be read.", {"$ref": "#/components/schemas/Refused"}),
-                **too_much,
-                **refused,
-            },
-        }
-    }
-    paths[f"{root}/scene"] = {
-        "get": {
-            "summary": "What stands around, as a .zip of scene.yaml and its meshes.",
-            "responses": {
-                "200": {
-                    "description": "Now.",
-                    "content": {"application/zip": {"schema": {"type": "string"}}},
-                },
-                "409": told("Not now.", {"$ref": "#/components/schemas/Refused"}),
-                **refused,
-            },
-        },
-        "post": {
-            "summary": "Bring a scene, to be loaded by its key.",
-            "requestBody": _file("application/zip"),
-            "responses": {
-                "200": told("It is kept.", {"$ref": "#/components/schemas/Scene"}),
-                "422": told("It cannot be read.", {"$ref": "#/components/schemas/Refused"}),
-                **too_much,
-                **refused,
-            },
-        },
-    }
+    paths["do"] = {"post": _do(request, answer)}
+    paths["mesh"] = {"post": _mesh()}
+    paths["scene"] = {"get": _scene_out(), "post": _scene_in()}
     described = {
         "openapi": "3.1.0",
         "info": {"title": TITLE, "version": str(requests.VERSION)},
         "security": [{}, {"link": []}],
-        "paths": paths,
+        "paths": {f"{ROOT}/{path}": operations for path, operations in paths.items()},
         "components": {
             "schemas": components,
             "securitySchemes": {"link": {"type": "http", "scheme": "bearer"}},
         },
     }
     return msgspec.json.encode(described)
+
+
+DOOR = {
+    "401": {"description": "A token is asked for."},
+    "503": {"description": "The arm is not there yet."},
+}
+"""Answers of every path."""
+
+
+def _do(request: Any, answer: Any) -> dict[str, Any]:
+    """Of single requests, by their shapes and those of their answers."""
+    return {
+        "summary": "Do one request; whoever holds the arm keeps asking, ten times a second.",
+        "parameters": [
+            {
+                "name": "X-Program",
+                "in": "header",
+                "required": True,
+                "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{8,64}$"},
+                "description": "Tells programs apart; who knows it speaks for the program.",
+            }
+        ],
+        "requestBody": {
+            "required": True,
+            "content": {"application/json": {"schema": request}},
+        },
+        "responses": {
+            "200": _shaped("Done, or what was asked for.", answer),
+            "409": _told("Not now.", answers.Refused),
+            "422": _told("Not understood.", answers.Refused),
+            **DOOR,
+        },
+    }
+
+
+def _mesh() -> dict[str, Any]:
+    return {
+        "summary": "Bring a mesh, to be placed by its key.",
+        "parameters": [
+            _query("name", "The file's name, with its ending.", required=True),
+            _query("format", "wrl, stl, obj, ply, glb or gltf, where the name has no ending."),
+            _query("unit", "mm, cm, in or m; without it that is guessed, and said."),
+        ],
+        **_brought("application/octet-stream", answers.Mesh),
+    }
+
+
+def _scene_in() -> dict[str, Any]:
+    return {
+        "summary": "Bring a scene, to be loaded by its key.",
+        **_brought("application/zip", answers.Scene),
+    }
+
+
+def _scene_out() -> dict[str, Any]:
+    return {
+        "summary": "What stands around, as a .zip of scene.yaml and its meshes.",
+        "responses": {
+            "200": {
+                "description": "Now.",
+                "content": {"application/zip": {"schema": {"type": "string"}}},
+            },
+            "409": _told("Not now.", answers.Refused),
+            **DOOR,
+        },
+    }
+
+
+def _brought(media: str, kept: type) -> dict[str, Any]:
+    """Of a file that is sent, and answered as ``kept``."""
+    return {
+        "requestBody": {
+            "required": True,
+            "content": {media: {"schema": {"type": "string", "format": "binary"}}},
+        },
+        "responses": {
+            "200": _told("It is kept.", kept),
+            "422": _told("It cannot be read.", answers.Refused),
+            "413": {"description": "It is too long."},
+            "429": _told("Too many at once.", answers.Refused),
+            **DOOR,
+        },
+    }
+
+
+def _told(what: str, kind: type) -> dict[str, Any]:
+    return _shaped(what, {"$ref": f"#/components/schemas/{kind.__name__}"})
+
+
+def _shaped(what: str, schema: Any) -> dict[str, Any]:
+    return {"description": what, "content": {"application/json": {"schema": schema}}}
 
 
 def _query(name: str, said: str, *, required: bool = False) -> dict[str, Any]:
@@ -157,8 +167,3 @@ def _query(name: str, said: str, *, required: bool = False) -> dict[str, Any]:
         "schema": {"type": "string"},
         "description": said,
     }
-
-
-def _file(kind: str) -> dict[str, Any]:
-    content = {kind: {"schema": {"type": "string", "format": "binary"}}}
-    return {"required": True, "content": content}

@@ -6,10 +6,9 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import BinaryIO
 
 from app.errors import InputError
-from app.exchange.atomic import Writer, write_files
+from app.exchange.atomic import write_files, writer_of
 from app.exchange.c_source import c_files
 from app.exchange.glb import glb_files
 from app.exchange.mechanism import Mechanism
@@ -46,7 +45,7 @@ def export(options: argparse.Namespace) -> int:
             path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{folder} cannot be made: {error.strerror or error}.") from error
-    write_files({folder / name: _writer(content) for name, content in made.items()})
+    write_files({folder / name: writer_of(content) for name, content in made.items()})
     for name, content in made.items():
         print(f"{folder / name}: {len(content)} bytes")
     return 0
@@ -67,10 +66,3 @@ def _made(
         case "glb":
             return glb_files(mechanism, values, motion)
     return package_files(urdf)
-
-
-def _writer(content: bytes) -> Writer:
-    def write(file: BinaryIO) -> None:
-        file.write(content)
-
-    return write

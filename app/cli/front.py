@@ -11,6 +11,7 @@ import signal
 import socket
 import sys
 from contextlib import suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,29 +32,36 @@ OPEN, READY = "open", "ready"
 """What it says of itself: pages load; the arm is there."""
 
 
+@dataclass(frozen=True)
+class Outfit:
+    """What a front is given each time it is started.
+
+    ``urdf``, ``tool``: see ``robot.model.load``. ``listening``: the port for browsers. ``lines``:
+    the one for JSON lines. ``workspace``: file of a reachability map. ``meshes``: those of the
+    things there are at first.
+    """
+
+    settings: Settings
+    urdf: Path
+    tool: str | None
+    listening: socket.socket
+    lines: socket.socket | None
+    workspace: Path | None
+    meshes: tuple[Mesh, ...]
+
+
 class Front:
     """One such process, as the one that started it sees it."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        robot: tuple[Path, str | None],
-        workspace: Path | None,
-        listening: tuple[socket.socket, socket.socket | None],
-        meshes: tuple[Mesh, ...] = (),
-    ) -> None:
-        """Starts it. ``robot``: see ``described``. ``workspace``: file of a reachability map.
-        ``meshes``: that the things there are at first are of.
-
-        ``listening``: the port for browsers, and the one for JSON lines if there is one.
-        """
+    def __init__(self, outfit: Outfit) -> None:
+        """Starts it."""
         spawn = multiprocessing.get_context("spawn")
         self._told, telling = spawn.Pipe(duplex=False)
         self.pipe: Connection
         self.pipe, theirs = spawn.Pipe()
         self._process = spawn.Process(
             target=_run,
-            args=(settings, robot, workspace, listening, meshes, theirs, telling),
+            args=(outfit, theirs, telling),
             name="katana450 front",
             daemon=True,
         )
@@ -105,15 +113,7 @@ class Front:
             self._process.join()
 
 
-def _run(
-    settings: Settings,
-    robot: tuple[Path, str | None],
-    workspace: Path | None,
-    listening: tuple[socket.socket, socket.socket | None],
-    meshes: tuple[Mesh, ...],
-    pipe: Connection,
-    telling: Connection,
-) -> None:
+def _run(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
     """What it does, from its start to its end."""
     # Ctrl-C goes to all processes of a terminal; the arm's says when this one is to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -121,7 +121,7 @@ def _run(
         os.setpriority(os.PRIO_PROCESS, 0, 0)
     start_log()
     try:
-        _serve(settings, robot, workspace, listening, meshes, pipe, telling)
+        _serve(outfit, pipe, telling)
     except KatanaError as error:
         telling.send(error)
     except (EOFError, BrokenPipeError):
@@ -129,28 +129,20 @@ def _run(
         return
 
 
-def _serve(
-    settings: Settings,
-    robot: tuple[Path, str | None],
-    workspace: Path | None,
-    listening: tuple[socket.socket, socket.socket | None],
-    meshes: tuple[Mesh, ...],
-    pipe: Connection,
-    telling: Connection,
-) -> None:
+def _serve(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
     from app.exchange.meshes import Meshes
     from app.gateway.gateway import Gateway
 
     kept = Meshes()
-    kept.put(meshes, ())
-    gateway = Gateway(settings, *listening, kept)
+    kept.put(outfit.meshes, ())
+    gateway = Gateway(outfit.settings, outfit.listening, outfit.lines, kept)
     gateway.start()
     telling.send(OPEN)
     try:
         # The libraries that read the robot take most of a second: the page loads in the meantime.
         from app.cli.parts import attached
 
-        link, view = attached(gateway, settings, robot, workspace, kept, pipe)
+        link, view = attached(gateway, outfit, kept, pipe)
         link.start()
         view.start()
         # What is there by now stays: looking through it for garbage would keep STOP waiting.

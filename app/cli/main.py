@@ -11,14 +11,12 @@ from app.cli.access_options import add_access_options
 from app.cli.export_options import add_export_options
 from app.cli.programs_options import add_demo_options, add_run_options
 from app.cli.render_options import add_render_options
+from app.cli.serve_options import add_serve_options
 from app.cli.version import version
 from app.cli.workspace_options import add_workspace_options
 from app.errors import KatanaError
 from app.settings import Settings
 from robot_description import URDF_PATH
-
-SHORTEST_SILENCE, LONGEST_SILENCE = 0.2, 2.0
-"""[s] Signs of life are 0.1 s apart, and after 3 s the arm is anybody's."""
 
 FRAMES = ("shoulder", "base")
 
@@ -104,81 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"katana450 {version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-
-    serve = commands.add_parser("serve", help="start the app and print its address")
-    serve.add_argument(
-        "--host",
-        default=Settings.host,
-        help="address to listen on; one that other machines can reach asks for --access "
-        "(default: %(default)s)",
-    )
-    serve.add_argument(
-        "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
-    )
-    serve.add_argument(
-        "--workspace",
-        type=Path,
-        metavar="FILE.npz",
-        help="a map written by `katana450 workspace --out`, to be shown in the scene",
-    )
-    serve.add_argument(
-        "--scene",
-        type=Path,
-        metavar="FILE",
-        help="what stands around: a scene.yaml with its meshes beside it, or a .zip of both",
-    )
-    serve.add_argument(
-        "--object",
-        dest="objects",
-        action="append",
-        default=[],
-        metavar="FILE[@x,y,z]",
-        help="an object besides, of a .wrl, .stl, .obj, .ply, .glb or .gltf file; where it stands "
-        "in mm, else in front of the arm; as often as there are",
-    )
-    serve.add_argument(
-        "--silence",
-        type=_silence,
-        default=Settings.silence,
-        metavar="SECONDS",
-        help="without a sign of life of whoever drives until a moving arm is stopped; the page "
-        f"gives ten a second ({SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
-    )
-    serve.add_argument(
-        "--access",
-        type=Path,
-        metavar="FILE",
-        help="let in only people with a link that `katana450 access give` wrote into this file",
-    )
-    serve.add_argument(
-        "--insecure",
-        action="store_true",
-        help="let other machines in without a link: everybody there can drive the arm",
-    )
-    serve.add_argument("--tls-cert", type=Path, metavar="FILE", help="certificate, for https")
-    serve.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key")
-    serve.add_argument(
-        "--public-url",
-        metavar="URL",
-        help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
-    )
-    serve.add_argument(
-        "--programs",
-        type=Path,
-        metavar="DIR",
-        help="a folder of scripts for the panel, where taught ones are saved too",
-    )
-    serve.add_argument(
-        "--bare",
-        action="store_true",
-        help="the arm without its gripper, as in the paper's circle",
-    )
-    serve.add_argument(
-        "--lines",
-        type=_port,
-        metavar="PORT",
-        help="a TCP port of this machine for programs that speak a line of JSON at a time",
-    )
+    add_serve_options(commands.add_parser("serve", help="start the app and print its address"))
     for name, what in (
         ("fk", 'joints to poses: {"q": [5 angles, rad], "tool": "tcp"} a line'),
         ("ik", 'poses to joints: {"T": [[4x4, m]], "tool": "tcp"} a line'),
@@ -235,25 +159,3 @@ def _parser() -> argparse.ArgumentParser:
             "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
         )
     return parser
-
-
-def _silence(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not SHORTEST_SILENCE <= seconds <= LONGEST_SILENCE:
-        raise argparse.ArgumentTypeError(
-            f"a number of seconds from {SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, not {text!r}"
-        )
-    return seconds
-
-
-def _port(text: str) -> int:
-    try:
-        port = int(text)
-    except ValueError:
-        port = -1
-    if not 0 <= port <= 65535:
-        raise argparse.ArgumentTypeError(f"a port is a number from 0 to 65535, not {text!r}")
-    return port

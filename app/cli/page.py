@@ -8,7 +8,7 @@ from pathlib import Path
 from app.cli.performance import chosen
 from app.cli.progress import progress
 from app.errors import InputError
-from app.exchange.atomic import check_writable, write_files
+from app.exchange.atomic import check_writable, write_files, writer_of
 from app.view.recording import recorded
 
 FPS = 25.0
@@ -27,6 +27,6 @@ def write_page(options: argparse.Namespace) -> int:
     page = recorded(
         shown.model, shown.session, progress(states, count, path.name), 1.0 / FPS, path.stem
     ).encode()
-    write_files({path: lambda file: file.write(page)})
+    write_files({path: writer_of(page)})
     print(f"{path}: {len(page)} bytes")
     return 0

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from multiprocessing.connection import Connection
-from pathlib import Path
 
 from app.cli.assembly import Described, Jointed, recognised
+from app.cli.front import Outfit
 from app.errors import ConfigurationError
 from app.exchange.meshes import Meshes
 from app.exchange.reachability_file import load_map
@@ -23,19 +23,14 @@ from app.view.view import Besides, View
 
 
 def attached(
-    gateway: Gateway,
-    settings: Settings,
-    robot: tuple[Path, str | None],
-    workspace: Path | None,
-    meshes: Meshes,
-    pipe: Connection,
+    gateway: Gateway, outfit: Outfit, meshes: Meshes, pipe: Connection
 ) -> tuple[FrontEnd, Follower]:
     """The front's end of ``pipe``, and the view, neither running yet; ``gateway`` has the arm.
 
-    ``robot``: see ``described``. ``workspace``: file of a reachability map. ``meshes``: those that
-    things are of. Raises ConfigurationError, EOFError.
+    ``meshes``: those that things are of. Raises ConfigurationError, EOFError.
     """
-    found = recognised(settings, *robot)
+    settings, workspace = outfit.settings, outfit.workspace
+    found = recognised(settings, outfit.urdf, outfit.tool)
     link = FrontEnd(pipe, found.session.check)
     if isinstance(found, Jointed):
         if workspace is not None:
@@ -45,30 +40,18 @@ def attached(
         return link, _machine(gateway, settings, found, link)
     stored = None if workspace is None else load_map(workspace)
     besides = Besides(stored, (gateway.steering, Scripts(settings.programs)), meshes)
-    return link, _arm(gateway, settings, found, link, robot[0], besides)
+    return link, _arm(gateway, outfit, found, link, besides)
 
 
 def _arm(
-    gateway: Gateway,
-    settings: Settings,
-    found: Described,
-    link: FrontEnd,
-    urdf: Path,
-    besides: Besides,
+    gateway: Gateway, outfit: Outfit, found: Described, link: FrontEnd, besides: Besides
 ) -> View:
     model, session, _ = found
     navigator = Navigator(session, link.board, link)
-    view = View(
-        gateway.viser,
-        model,
-        link.board,
-        navigator,
-        session,
-        settings.frame_rate,
-        besides,
-    )
+    frame_rate = outfit.settings.frame_rate
+    view = View(gateway.viser, model, link.board, navigator, session, frame_rate, besides)
     navigator.tell = gateway.announce
-    mechanism, _ = load_mechanism(urdf)
+    mechanism, _ = load_mechanism(outfit.urdf)
     nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
     gateway.attach(Motion(model, session, link, navigator, nodes, view.let_go))
     return view

@@ -22,7 +22,7 @@ from app.cli.progress import progress
 from app.control.session import Session
 from app.control.state import State
 from app.errors import InputError
-from app.exchange.atomic import check_writable, write_files
+from app.exchange.atomic import check_writable, write_files, writer_of
 from app.render.camera import Camera
 from app.render.film import check_filmable, write_film
 from app.render.picture import MOVING, STILL, picture
@@ -61,7 +61,7 @@ def render(options: argparse.Namespace) -> int:
         state = shown.at(shown.duration if options.at is None else options.at)
         stage = Stage(shown.model, shown.session, load_props())
         content = png(shot.taken(stage, shown.model, state, STILL))
-        write_files({path: lambda file: file.write(content)})
+        write_files({path: writer_of(content)})
     else:
         _film(path, shown, shot, options.fps, options.urdf)
     print(f"{path}: {path.stat().st_size} bytes")

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from app.cli.front import OPEN, READY, Front, start_log
+from app.cli.front import OPEN, READY, Front, Outfit, start_log
 from app.gateway.listen import HERE, listen
 from app.settings import Settings
 from robot_description import URDF_PATH
@@ -67,11 +67,9 @@ def serve(
     port = listening.getsockname()[1]
     url = settings.public_url or f"{scheme}://{_shown(settings.host)}:{port}"
 
-    def front() -> Front:
-        meshes = () if stored is None else stored.meshes
-        return Front(settings, (urdf, tool), workspace, (listening, lines), meshes)
-
-    current = front()
+    meshes = () if stored is None else stored.meshes
+    outfit = Outfit(settings, urdf, tool, listening, lines, workspace, meshes)
+    current = Front(outfit)
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
         from app.cli.assembly import RunningArm, recognised
@@ -103,7 +101,7 @@ def serve(
             ended = 0 if time.monotonic() - began > SETTLED else ended + 1
             stopping.wait(AGAIN[min(ended, len(AGAIN) - 1)])
             current.stop()
-            current, began = front(), time.monotonic()
+            current, began = Front(outfit), time.monotonic()
             arm.attach(current.pipe)
         arm.stop()
     finally:

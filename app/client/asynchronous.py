@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,9 +17,10 @@ from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.api import answers, requests
+from app.api.fields import ROOT, Id
 from app.client.files import LostError, RefusedError, Site
 
-SOCKET = f"/api/v{requests.VERSION}/socket"
+SOCKET = f"{ROOT}/socket"
 
 ASKED_FOR = 5.0
 """[s] An answer that takes longer does not come."""
@@ -38,7 +39,7 @@ class AsyncClient:
         self._site = site
         self.welcome = welcome
         self._asked = 0
-        self._waiting: dict[requests.Id, asyncio.Future[answers.Answer]] = {}
+        self._waiting: dict[Id, asyncio.Future[answers.Answer]] = {}
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
         self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
@@ -74,7 +75,7 @@ class AsyncClient:
             raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
         return answer
 
-    async def states(self, hz: float = FOLLOWED) -> AsyncIterator[answers.State]:
+    async def states(self, hz: float = FOLLOWED) -> AsyncGenerator[answers.State, None]:
         """The state, so many times a second; the newest, when it is asked for more slowly."""
         queue: asyncio.Queue[answers.State | None] = asyncio.Queue(1)
         self._states.append(queue)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Coroutine, Iterator
+from collections.abc import AsyncGenerator, Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -69,7 +69,7 @@ class Client:
             while True:
                 yield self._wait(_next(states))
         finally:
-            self._wait(states.aclose())  # type: ignore[attr-defined]
+            self._wait(states.aclose())
 
     def _wait(self, work: Coroutine[Any, Any, T]) -> T:
         future = asyncio.run_coroutine_threadsafe(work, self._loop)
@@ -81,9 +81,8 @@ class Client:
             raise
 
 
-async def _next(states: Any) -> answers.State:
-    state: answers.State = await anext(states)
-    return state
+async def _next(states: AsyncGenerator[answers.State, None]) -> answers.State:
+    return await anext(states)
 
 
 @contextmanager

@@ -9,10 +9,9 @@ from urllib.parse import urlencode
 
 import msgspec
 
-from app.api import answers, requests
+from app.api import answers
+from app.api.fields import ROOT
 from app.errors import KatanaError
-
-ROOT = f"/api/v{requests.VERSION}"
 
 PATIENCE = 60.0
 """[s]"""

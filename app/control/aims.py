@@ -6,25 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.control import solid
-from app.control.commands import Dress, SetAxes, SetJoint, Shift
-from app.control.looks import Choice, Look
-from app.control.state import Finding, JointTarget, Reason, State, Target
-from app.control.things import Thing
+from app.control.commands import SetAxes, SetJoint
+from app.control.following import Following
+from app.control.state import Finding, JointTarget, Reason, Servoing, State, Target
 from app.geometry.arrays import FloatArray, frozen
+from app.kinematics.branch import branch_of
+from app.kinematics.chain import Chain
+from app.planning.plan import Plan
+
+AT_START = 1e-6
+"""[rad] An arm that is no farther from the start of a plan stands there: no encoder tells it."""
+
+SEEN = 0.06
+"""[s] Over which it is seen how fast a stream changes."""
 
 
 def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]) -> State:
     """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
     kept = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
-    paused = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
+    pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
     # What the arm brakes for stays the reason, however often it is told anew meanwhile.
     met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
     aimed = replace(
         state,
         target=target,
         goal=goal,
-        findings=paused + met + findings + kept,
+        findings=pause + met + findings + kept,
         since=None,
         let_go=False,
         jogging=None,
@@ -55,69 +62,54 @@ def turned(state: State, command: SetJoint | SetAxes) -> JointTarget:
     return JointTarget(frozen(q))
 
 
-def removed(state: State, name: str) -> State:
-    """Without the thing of that name; what is held stays."""
-    things = tuple(each for each in state.things if each.held or each.name != name)
-    return replace(state, things=things)
+def paused(state: State) -> State:
+    """``state`` that comes to rest on its way and keeps its goal."""
+    told = without(state, Reason.PAUSED).findings
+    return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
 
 
-def shifted(state: State, shift: Shift) -> State:
-    """With the thing elsewhere, unless the hand has it."""
-
-    def there(thing: Thing) -> Thing:
-        if thing.name != shift.name or thing.carried:
-            return thing
-        T = np.array(thing.T)
-        if shift.position is not None:
-            T[:3, 3] = shift.position
-        if shift.R is not None:
-            T[:3, :3] = shift.R
-        return replace(thing, T=T)
-
-    return replace(state, things=tuple(map(there, state.things)))
+def resumed(state: State) -> State:
+    """``state`` that goes on after a pause."""
+    return without(replace(state, paused=False), Reason.PAUSED)
 
 
-def look_of(state: State, name: str) -> Look:
-    """How the link or thing of that name is shown."""
-    thing = next((each for each in state.things if each.name == name), None)
-    return state.looks.of(name) if thing is None else _as_link(thing.look)
+def kept_up(state: State, aimed: State, qd: FloatArray | None, speed: FloatArray) -> State:
+    """``aimed``, which is ``state`` with the newest of a stream as its goal, in that stream.
+
+    qd: (n,) how fast the stream changes; where it is None that is seen. speed: (n,) the most of it.
+    """
+    before = state.servo
+    if qd is None:
+        qd = np.zeros(speed.size) if before is None else before.qd
+        if before is not None and state.t > before.t:
+            dt = state.t - before.t
+            # Streams come unevenly.
+            qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
+    return replace(aimed, servo=Servoing(aimed.goal, frozen(np.clip(qd, -speed, speed)), state.t))
 
 
-def dressed(state: State, dress: Dress) -> State:
-    """With one trait of a look changed. Things bear theirs themselves."""
-
-    def changed(thing: Thing) -> Thing:
-        if thing.name != dress.name:
-            return thing
-        look = _as_link(thing.look).having(dress.trait, dress.value)
-        return replace(thing, look=_as_thing(look))
-
-    if any(each.name == dress.name for each in state.things):
-        return replace(state, things=tuple(map(changed, state.things)))
-    return replace(state, looks=state.looks.having(dress.name, dress.trait, dress.value))
+def begun(chain: Chain, state: State, plan: Plan) -> State:
+    """``state`` that follows ``plan`` from here, if the arm stands at its start."""
+    off = np.abs(state.setpoint - plan.start)
+    if off.max() > AT_START or not state.motion.at_rest:
+        axis = int(off.argmax())
+        told = without(state, Reason.NOT_AT_START).findings
+        return replace(
+            state, findings=(*told, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
+        )
+    return _along(chain, state, Following.begun(plan))
 
 
-PAINT = (204, 204, 204)
-"""Of a thing that is to be painted when nobody has mixed a colour."""
+def gone_along(chain: Chain, state: State, share: float) -> State:
+    """``state`` that goes on or back on its plan; without one there is nowhere to go."""
+    following = state.following
+    if following is None or following.leaving:
+        return state
+    return _along(chain, state, replace(following, towards=share * following.plan.span))
 
 
-def _as_link(look: solid.Look) -> Look:
-    """A thing's look in the words for a link's."""
-    painted = look.colour is not None or look.opacity < 1.0
-    choice = Choice.HIDDEN if look.hidden else Choice.PAINTED if painted else Choice.MADE
-    if look.colour is None:
-        return Look(choice, None, 1.0 - look.opacity)
-    red, green, blue = (part / 255.0 for part in look.colour)
-    return Look(choice, (red, green, blue), 1.0 - look.opacity)
-
-
-def _as_thing(look: Look) -> solid.Look:
-    """The other way; a thing as it is made has no paint to come back to."""
-    if look.choice is Choice.MADE:
-        return solid.PLAIN
-    colour = None if look.choice is Choice.HIDDEN else PAINT
-    if look.colour is not None:
-        red, green, blue = (round(255.0 * part) for part in look.colour)
-        colour = red, green, blue
-    opacity = max(1.0 - look.transparency, solid.FAINTEST)
-    return solid.Look(colour, opacity, look.choice is Choice.HIDDEN)
+def _along(chain: Chain, state: State, following: Following) -> State:
+    """With the goal where ``following`` ends."""
+    goal = following.goal
+    state = replace(state, branch=branch_of(chain, goal))
+    return replace(gone(state, JointTarget(goal), goal, ()), following=following)

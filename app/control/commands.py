@@ -6,20 +6,64 @@ of the right shape; whether the arm can do it is the session's to judge.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from app.control.looks import AS_MADE, LONGEST_NAME, Trait
-from app.control.things import FARTHEST, MOST, Mount, Thing
+from app.control.checked import check_finite, vector
+from app.control.thing_commands import (
+    THINGS,
+    Attach,
+    Dress,
+    Fill,
+    Furnish,
+    Place,
+    Remove,
+    Shift,
+)
 from app.errors import InputError
-from app.geometry import se3, so3
+from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.reading import Reading
 from app.kinematics.velocity import JogFrame
 from app.planning.plan import Plan
+
+__all__ = [
+    "JOG_TIME",
+    "LEAST_SPEED",
+    "THINGS",
+    "Attach",
+    "Command",
+    "Dress",
+    "Fill",
+    "Follow",
+    "Furnish",
+    "GoAlong",
+    "Home",
+    "Jog",
+    "MoveTool",
+    "Pause",
+    "Place",
+    "Release",
+    "Remove",
+    "Reset",
+    "Resume",
+    "Servo",
+    "SetAxes",
+    "SetGripper",
+    "SetJoint",
+    "SetJoints",
+    "SetPose",
+    "SetReading",
+    "SetTool",
+    "Settle",
+    "Shift",
+    "SpeedScale",
+    "Stop",
+    "Stretch",
+    "TakeBranch",
+    "Together",
+    "TurnTool",
+]
 
 LEAST_SPEED = 0.01
 """A share below this is a hold, for which there are Pause and Stop."""
@@ -38,7 +82,7 @@ class SetJoint:
     def __post_init__(self) -> None:
         if isinstance(self.axis, bool) or not isinstance(self.axis, int) or self.axis < 0:
             raise InputError(f"An axis is a whole number from 0, not {self.axis!r}.")
-        _check_finite(f"The angle of axis {self.axis + 1}", self.value)
+        check_finite(f"The angle of axis {self.axis + 1}", self.value)
 
 
 @dataclass(frozen=True)
@@ -62,7 +106,7 @@ class SetJoints:
     q: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "q", _vector("The joint vector", self.q, None))
+        object.__setattr__(self, "q", vector("The joint vector", self.q, None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +120,9 @@ class Servo:
     qd: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "q", _vector("The joint vector", self.q, None))
+        object.__setattr__(self, "q", vector("The joint vector", self.q, None))
         if self.qd is not None:
-            object.__setattr__(self, "qd", _vector("The joint rates", self.qd, self.q.size))
+            object.__setattr__(self, "qd", vector("The joint rates", self.qd, self.q.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +132,7 @@ class MoveTool:
     position: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", _vector("The tool position", self.position, 3))
+        object.__setattr__(self, "position", vector("The tool position", self.position, 3))
 
 
 @dataclass(frozen=True)
@@ -103,8 +147,8 @@ class TurnTool:
     roll: float
 
     def __post_init__(self) -> None:
-        _check_finite("The pitch", self.pitch)
-        _check_finite("The roll", self.roll)
+        check_finite("The pitch", self.pitch)
+        check_finite("The roll", self.roll)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +168,7 @@ class SetGripper:
     angle: float
 
     def __post_init__(self) -> None:
-        _check_finite("The finger angle", self.angle)
+        check_finite("The finger angle", self.angle)
 
 
 @dataclass(frozen=True)
@@ -216,7 +260,7 @@ class GoAlong:
     share: float
 
     def __post_init__(self) -> None:
-        _check_finite("The share of the plan", self.share)
+        check_finite("The share of the plan", self.share)
         if not 0.0 <= self.share <= 1.0:
             raise InputError(f"The share of the plan is from 0 to 1, not {self.share}.")
 
@@ -228,7 +272,7 @@ class SpeedScale:
     value: float
 
     def __post_init__(self) -> None:
-        _check_finite("The speed", self.value)
+        check_finite("The speed", self.value)
         if not LEAST_SPEED <= self.value <= 1.0:
             raise InputError(f"The speed is a share from {LEAST_SPEED} to 1, not {self.value}.")
 
@@ -244,75 +288,9 @@ class Jog:
     frame: JogFrame = JogFrame.BASE
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rates", _vector("The jog", self.rates, 5))
+        object.__setattr__(self, "rates", vector("The jog", self.rates, 5))
         if not isinstance(self.frame, JogFrame):
             raise InputError(f"A jog is along JogFrame.BASE or JogFrame.TOOL, not {self.frame!r}.")
-
-
-@dataclass(frozen=True)
-class Place:
-    """Put a thing where it says, in place of one of its name; what is held stays in the hand."""
-
-    thing: Thing
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.thing, Thing) or self.thing.held:
-            raise InputError(f"What is put somewhere is a thing out of the hand, not {self.thing}.")
-
-
-@dataclass(frozen=True)
-class Fill:
-    """Fill the cup with ``volume`` [m^3] of water, and wipe up what is elsewhere."""
-
-    volume: float
-
-    def __post_init__(self) -> None:
-        _check_finite("The volume", self.volume)
-
-
-@dataclass(frozen=True)
-class Remove:
-    """Take the thing of that name away; what is held stays."""
-
-    name: str
-
-
-@dataclass(frozen=True, eq=False)
-class Shift:
-    """Put the thing of that name elsewhere, or turn it; what is held stays.
-
-    position: (3,) [m], R: (3, 3), of its frame in the base; None to keep what it has.
-    """
-
-    name: str
-    position: FloatArray | None = None
-    R: FloatArray | None = None
-
-    def __post_init__(self) -> None:
-        if self.position is not None:
-            position = _vector(f"The position of {self.name!r}", self.position, 3)
-            if np.abs(position).max() > FARTHEST:
-                raise InputError(f"{self.name!r} would be more than {FARTHEST:g} m away.")
-            object.__setattr__(self, "position", position)
-        if self.R is not None:
-            R = so3.validated(self.R, f"The rotation of {self.name!r}")
-            object.__setattr__(self, "R", frozen(R))
-
-
-@dataclass(frozen=True)
-class Dress:
-    """Change one trait of how the link or thing ``name`` is shown; see ``Look.having``."""
-
-    name: str
-    trait: Trait
-    value: float | tuple[float, ...] | None
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and 0 < len(self.name) <= LONGEST_NAME):
-            raise InputError(
-                f"A part's name has 1 to {LONGEST_NAME} characters, not {self.name!r}."
-            )
-        AS_MADE.having(self.trait, self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,36 +302,6 @@ class Together:
     def __post_init__(self) -> None:
         if any(isinstance(each, Together) for each in self.commands):
             raise InputError("Commands that are given together are single ones.")
-
-
-@dataclass(frozen=True)
-class Attach:
-    """Fix the thing of that name to the hand, or to the world again; what is held stays."""
-
-    name: str
-    to: Mount
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.to, Mount):
-            raise InputError(f"A thing is fixed to one of {list(Mount)}, not {self.to!r}.")
-
-
-@dataclass(frozen=True, eq=False)
-class Furnish:
-    """Have these things about and no others, at one go; what is held stays, as the only one of its
-    name. ``volume``: of water in the cup [m^3]; None for no water anywhere."""
-
-    things: tuple[Thing, ...]
-    volume: float | None = None
-
-    def __post_init__(self) -> None:
-        names = {thing.name for thing in self.things}
-        if len(names) < len(self.things) or len(names) > MOST:
-            raise InputError(f"A scene has up to {MOST} things, each with a name of its own.")
-        if any(thing.held for thing in self.things):
-            raise InputError("What is put somewhere is a thing out of the hand.")
-        if self.volume is not None:
-            _check_finite("The volume", self.volume)
 
 
 Command = (
@@ -389,25 +337,3 @@ Command = (
     | SpeedScale
     | Jog
 )
-
-
-THINGS = (Place, Shift, Attach, Furnish, Remove, Fill, Dress)
-"""Those about what stands around and what is seen: no joint moves by them."""
-
-
-def _check_finite(what: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{what} has to be a finite number, not {value!r}.")
-
-
-def _vector(what: str, value: object, size: int | None) -> FloatArray:
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} has to be a list of numbers, not {value!r}.") from None
-    if array.ndim != 1 or array.size == 0 or (size is not None and array.size != size):
-        wanted = "a flat list" if size is None else f"{size} numbers"
-        raise InputError(f"{what} has to be {wanted}, not an array of shape {array.shape}.")
-    if not np.isfinite(array).all():
-        raise InputError(f"{what} has to be finite: {array.tolist()}.")
-    return frozen(array)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from app.collision.world import World
 from app.control.aims import without
 from app.control.state import Finding, Reason, State
@@ -27,7 +25,7 @@ def gripped(surroundings: Surroundings, world: World | None, state: State) -> St
     hand = surroundings.hand
     if world is None or hand is None or not (hand.fingers and state.things):
         return state
-    x = np.append(state.setpoint, state.gripper_setpoint)
+    x = state.x_setpoint
     if state.grip is not None:
         if state.gripper_setpoint <= state.grip + OPENED:
             return state

@@ -15,12 +15,13 @@ import numpy as np
 
 from app import tolerances
 from app.control import commands as cmd
-from app.control.aims import dressed, gone, turned, without
+from app.control.aims import gone, kept_up, paused, resumed, turned, without
+from app.control.arrangement import dressed
 from app.control.choices import Choice
 from app.control.joints import Joints
 from app.control.pouring import Pouring
-from app.control.session import LONGEST_STEP, SEEN
-from app.control.state import Finding, Halt, JointTarget, Reason, Servoing, State
+from app.control.session import LONGEST_STEP
+from app.control.state import Finding, Halt, JointTarget, Reason, State
 from app.control.things import Surroundings
 from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
@@ -52,19 +53,7 @@ class JointSession:
 
     def begin(self, q: FloatArray, gripper: float, t: float) -> State:
         """The state of joints that stand at ``q`` (n,) and hold."""
-        q = frozen(q)
-        return State(
-            t=t,
-            q=q,
-            gripper=gripper,
-            motion=Motion.rest(q),
-            gripper_setpoint=gripper,
-            goal=q,
-            gripper_goal=gripper,
-            tool="",
-            target=JointTarget(q),
-            branch=NO_BRANCH,
-        )
+        return State.standing(frozen(q), gripper, t, tool="", branch=NO_BRANCH)
 
     def check(self, command: cmd.Command) -> None:
         """Refuse, with an InputError for the sender, what cannot even be asked."""
@@ -142,10 +131,9 @@ class JointSession:
                 free = self._aim(replace(state, halted=None), self._limiter.halt(state.motion))
                 return without(free, Reason.HALTED)
             case cmd.Pause():
-                told = without(state, Reason.PAUSED).findings
-                return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
+                return paused(state)
             case cmd.Resume():
-                return without(replace(state, paused=False), Reason.PAUSED)
+                return resumed(state)
             case cmd.Reset():
                 return self._aim(state, self._limiter.halt(state.motion))
             case cmd.SpeedScale(value=value):
@@ -155,7 +143,7 @@ class JointSession:
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
             case cmd.Servo(q=q, qd=qd):
-                return self._keep_up(state, q, qd)
+                return kept_up(state, self._aim(state, q), qd, self.joints.speed)
             case cmd.Home() | cmd.Stretch():
                 return self._aim(state, self.ready)
             case cmd.Dress():
@@ -177,19 +165,6 @@ class JointSession:
             for axis in np.flatnonzero(np.abs(goal - q) > tolerances.LIMIT_SLACK).tolist()
         )
         return gone(state, JointTarget(q), goal, findings)
-
-    def _keep_up(self, state: State, q: FloatArray, qd: FloatArray | None) -> State:
-        """Take ``q`` (n,) for the newest of a stream, and ``qd`` (n,) for how fast it changes."""
-        before, speed = state.servo, self.joints.speed
-        aimed = self._aim(state, q)
-        if qd is None:
-            qd = np.zeros(self.joints.n) if before is None else before.qd
-            if before is not None and state.t > before.t:
-                dt = state.t - before.t
-                qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
-        return replace(
-            aimed, servo=Servoing(aimed.goal, frozen(np.clip(qd, -speed, speed)), state.t)
-        )
 
     def _halt(self, state: State) -> State:
         """Brake, and forget every wish."""

@@ -230,7 +230,7 @@ class Mover:
     def _updated(self, state: State) -> State:
         """``state`` with the distance of the contact it brakes for as it is now."""
         assert self._world is not None
-        x = np.append(state.setpoint, state.gripper_setpoint)
+        x = state.x_setpoint
         findings = tuple(
             replace(finding, amount=self._world.gap(x, *finding.parts))
             if finding.reason is Reason.CONTACT and finding.parts is not None
@@ -248,7 +248,7 @@ class Mover:
         if not way.any():
             return True
         share = min(1.0, PROBE / float(np.abs(way).sum()))
-        x = np.append(state.setpoint, state.gripper_setpoint)
+        x = state.x_setpoint
         towards = np.append(state.setpoint + share * way, state.gripper_setpoint)
         step = advance(self._world, x, towards, SETTLING)
         return bool((step.x == towards).all())

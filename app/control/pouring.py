@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.control.things import Surroundings, Thing
+from app.control.things import Surroundings, Thing, named
 from app.geometry.arrays import FloatArray
 from app.geometry.vectors import Vector, scale, sub, vector
 from app.water.around import Around
@@ -95,7 +95,7 @@ class Pouring:
         return self._flow(things).around
 
     def _flow(self, things: Sequence[Thing]) -> Flow:
-        basin = next((each for each in things if each.name == BASIN), None)
+        basin = named(things, BASIN)
         if self._made is None or self._made[0] is not basin:
             at = FAR if basin is None else vector(basin.T[:3, 3])
             around = replace(self._around, basin=replace(self._around.basin, at=at))
@@ -103,7 +103,7 @@ class Pouring:
         return self._made[1]
 
     def _pose(self, things: Sequence[Thing], x: FloatArray) -> FloatArray | None:
-        cup = next((each for each in things if each.name == CUP), None)
+        cup = named(things, CUP)
         return None if cup is None else self._surroundings.pose(cup, x)
 
     def _middle(self, T: FloatArray) -> Vector:

@@ -11,12 +11,22 @@ import numpy as np
 from app import tolerances
 from app.collision.world import World
 from app.control import commands as cmd
-from app.control.aims import dressed, gone, leaving, removed, shifted, turned, without
+from app.control.aims import (
+    begun,
+    gone,
+    gone_along,
+    kept_up,
+    leaving,
+    paused,
+    resumed,
+    turned,
+    without,
+)
 from app.control.arm import Arm
+from app.control.arrangement import dressed, removed, shifted
 from app.control.checks import check
 from app.control.choices import Choice, choice, choices, wish, wish_on
 from app.control.findings import of_joints, of_projection, of_tracked
-from app.control.following import Following
 from app.control.grip import gripped
 from app.control.mover import Mover
 from app.control.pouring import Pouring
@@ -27,7 +37,6 @@ from app.control.state import (
     JointTarget,
     PoseTarget,
     Reason,
-    Servoing,
     State,
     Target,
     ToolTarget,
@@ -39,7 +48,6 @@ from app.kinematics.branch import Branch, branch_of
 from app.kinematics.projection import project
 from app.kinematics.tracker import track
 from app.motion.limiter import Motion
-from app.planning.plan import Plan
 from app.water.around import Around
 
 TOOL_SPEED = 0.5
@@ -50,12 +58,6 @@ STILL = frozen(np.zeros(5))
 
 SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Together, *cmd.THINGS)
 """What counts while a stop holds the arm."""
-
-AT_START = 1e-6
-"""[rad] An arm that is no farther from the start of a plan stands there: no encoder tells it."""
-
-SEEN = 0.06
-"""[s] Over which it is seen how fast a stream changes."""
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -97,19 +99,8 @@ class Session:
     def begin(self, q: FloatArray, gripper: float, t: float) -> State:
         """The state of an arm that stands at ``q`` (n,) [rad] and holds."""
         q = frozen(q)
-        return State(
-            t=t,
-            q=q,
-            gripper=gripper,
-            motion=Motion.rest(q),
-            gripper_setpoint=gripper,
-            goal=q,
-            gripper_goal=gripper,
-            tool=self.arm.default_tool,
-            target=JointTarget(q),
-            branch=branch_of(self.arm.chain, q),
-            things=self._things,
-        )
+        branch = branch_of(self.arm.chain, q)
+        return State.standing(q, gripper, t, self.arm.default_tool, branch, self._things)
 
     def world_at(self, state: State) -> World | None:
         """What the arm must not touch, with the things of ``state``."""
@@ -153,7 +144,7 @@ class Session:
         state = self._mover(state).step(replace(state, t=max(t, state.t)), dt)
         state = gripped(self.surroundings, self.world_at(state), state)
         if self.pouring is not None and state.poured is not None:
-            x = np.append(state.setpoint, state.gripper_setpoint)
+            x = state.x_setpoint
             state = replace(state, poured=self.pouring.step(state.poured, state.things, x, dt))
         return state if state.jogging is None else self._jogged(state)
 
@@ -190,14 +181,13 @@ class Session:
                 free = replace(state, halted=None, goal=goal, target=JointTarget(goal))
                 return leaving(without(free, Reason.HALTED))
             case cmd.Pause():
-                told = without(state, Reason.PAUSED).findings
-                return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
+                return paused(state)
             case cmd.Resume():
-                return without(replace(state, paused=False), Reason.PAUSED)
+                return resumed(state)
             case cmd.Follow(plan=plan):
-                return self._begin(state, plan)
+                return begun(self.arm.chain, state, plan)
             case cmd.GoAlong(share=share):
-                return self._go_along(state, share)
+                return gone_along(self.arm.chain, state, share)
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
             case cmd.Jog(rates=rates, frame=frame):
@@ -210,7 +200,8 @@ class Session:
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
             case cmd.Servo(q=q, qd=qd):
-                return self._keep_up(state, q, qd)
+                aimed = self._aim(state, JointTarget(q))
+                return kept_up(state, aimed, qd, self.arm.chain.speed)
             case cmd.Home():
                 return self._aim(state, JointTarget(self.ready))
             case cmd.Stretch():
@@ -250,7 +241,7 @@ class Session:
             case cmd.Together(commands=commands):
                 return functools.reduce(self._take, commands, state)
             case cmd.Attach(name=name, to=to):
-                x = np.append(state.setpoint, state.gripper_setpoint)
+                x = state.x_setpoint
                 mounted = tuple(
                     self.surroundings.mounted(each, to, x) if each.name == name else each
                     for each in state.things
@@ -268,7 +259,7 @@ class Session:
         if volume is None:
             return replace(state, poured=None)
         assert self.pouring is not None
-        x = np.append(state.setpoint, state.gripper_setpoint)
+        x = state.x_setpoint
         return replace(state, poured=self.pouring.fill(volume, state.things, x))
 
     def _aim(self, state: State, target: JointTarget | PoseTarget) -> State:
@@ -284,19 +275,6 @@ class Session:
         findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
         return gone(state, target, best.q, findings)
 
-    def _keep_up(self, state: State, q: FloatArray, qd: FloatArray | None) -> State:
-        """Take ``q`` (n,) for the newest of a stream, and ``qd`` (n,) for how fast it changes."""
-        before, chain = state.servo, self.arm.chain
-        aimed = self._aim(state, JointTarget(q))
-        if qd is None:
-            qd = np.zeros(chain.n) if before is None else before.qd
-            if before is not None and state.t > before.t:
-                dt = state.t - before.t
-                # Streams come unevenly.
-                qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
-        qd = frozen(np.clip(qd, -chain.speed, chain.speed))
-        return replace(aimed, servo=Servoing(aimed.goal, qd, state.t))
-
     def _reread(self, state: State) -> State:
         """Go for what is wished in the reading there is now."""
         match state.target:
@@ -311,30 +289,6 @@ class Session:
         """Make ``target`` what is followed from now on, along the way the hand took there."""
         since = wish(self.arm, state) if state.since is None else state.since
         return leaving(replace(state, target=target, since=since, let_go=False))
-
-    def _begin(self, state: State, plan: Plan) -> State:
-        """Follow ``plan`` from here, if the arm stands at its start."""
-        off = np.abs(state.setpoint - plan.start)
-        if off.max() > AT_START or not state.motion.at_rest:
-            axis = int(off.argmax())
-            told = without(state, Reason.NOT_AT_START).findings
-            return replace(
-                state, findings=(*told, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
-            )
-        return self._along(state, Following.begun(plan))
-
-    def _go_along(self, state: State, share: float) -> State:
-        """Go on or back on the plan the arm is on; without one there is nowhere to go."""
-        following = state.following
-        if following is None or following.leaving:
-            return state
-        return self._along(state, replace(following, towards=share * following.plan.span))
-
-    def _along(self, state: State, following: Following) -> State:
-        """With the goal where ``following`` ends."""
-        goal = following.goal
-        state = replace(state, branch=branch_of(self.arm.chain, goal))
-        return replace(gone(state, JointTarget(goal), goal, ()), following=following)
 
     def _follow(self, state: State, target: ToolTarget, since: ToolTarget) -> State:
         """Take the goal on towards ``target``, as far as one tick has time for."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from app.control.following import Following
 from app.control.looks import ALL_AS_MADE, Looks
 from app.control.pouring import Poured
@@ -190,6 +192,30 @@ class State:
     poured: Poured | None = None
     looks: Looks = ALL_AS_MADE
 
+    @staticmethod
+    def standing(
+        q: FloatArray,
+        gripper: float,
+        t: float,
+        tool: str,
+        branch: Branch,
+        things: tuple[Thing, ...] = (),
+    ) -> State:
+        """Joints that stand at ``q`` (n,) and hold, with nothing asked of them yet."""
+        return State(
+            t=t,
+            q=q,
+            gripper=gripper,
+            motion=Motion.rest(q),
+            gripper_setpoint=gripper,
+            goal=q,
+            gripper_goal=gripper,
+            tool=tool,
+            target=JointTarget(q),
+            branch=branch,
+            things=things,
+        )
+
     @property
     def status(self) -> Status:
         """What the findings come to."""
@@ -215,6 +241,27 @@ class State:
     def setpoint(self) -> FloatArray:
         """Where the driver is told to be, (n,) [rad]."""
         return self.motion.q
+
+    @property
+    def x(self) -> FloatArray:
+        """Where the arm is and its finger joint behind it, (n + 1,) [rad], as bodies are placed."""
+        return np.append(self.q, self.gripper)
+
+    @property
+    def x_setpoint(self) -> FloatArray:
+        """Likewise, where the driver is told to be."""
+        return np.append(self.setpoint, self.gripper_setpoint)
+
+    @property
+    def near(self) -> frozenset[str]:
+        """The links and things that are about to touch."""
+        met = (each.parts for each in self.findings if each.reason is Reason.CONTACT)
+        return frozenset(part for parts in met for part in parts or ())
+
+    @property
+    def held(self) -> Thing | None:
+        """What the fingers hold."""
+        return next((each for each in self.things if each.held), None)
 
     @property
     def under_way(self) -> bool:

@@ -181,6 +181,11 @@ def placed(things: tuple[Thing, ...], thing: Thing) -> tuple[Thing, ...]:
     return tuple(thing if each.name == thing.name and not each.held else each for each in things)
 
 
+def named(things: Sequence[Thing], name: str) -> Thing | None:
+    """The one of that name."""
+    return next((each for each in things if each.name == name), None)
+
+
 def furnished_with(things: tuple[Thing, ...], wanted: tuple[Thing, ...]) -> tuple[Thing, ...]:
     """``wanted`` in place of ``things``, of which what is held stays."""
     held = tuple(each for each in things if each.held)

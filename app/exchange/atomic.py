@@ -14,6 +14,11 @@ from app.errors import InputError
 Writer = Callable[[BinaryIO], object]
 
 
+def writer_of(content: bytes) -> Writer:
+    """What writes just that."""
+    return lambda file: file.write(content)
+
+
 def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
     """Write every file, and only then put them in place, over what was there.
 

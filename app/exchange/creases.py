@@ -16,7 +16,7 @@ from app.geometry.arrays import FloatArray, IntArray
 CREASE = math.radians(40.0)
 """Faces that meet at a larger angle are shaded apart."""
 
-FLOAT, UBYTE, UINT = 5126, 5121, 5125
+FLOAT, UINT = 5126, 5125
 ARRAY, ELEMENT = 34962, 34963
 
 ROUGHNESS = 0.6

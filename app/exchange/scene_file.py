@@ -12,10 +12,9 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO
 
 from app.errors import InputError
-from app.exchange.atomic import write_files
+from app.exchange.atomic import write_files, writer_of
 from app.exchange.meshes import Mesh, read_mesh
 from app.exchange.shape_file import MOST_BYTES, Up
 from app.geometry.arrays import FloatArray
@@ -116,14 +115,8 @@ def write_scene_folder(path: Path, stored: StoredScene, T_palm_tool: FloatArray 
     files = _files(stored, T_palm_tool)
     text = files.pop(SCENE)
     (path.parent / FOLDER).mkdir(parents=True, exist_ok=True)
-
-    def writing(content: bytes) -> Callable[[BinaryIO], object]:
-        return lambda file: file.write(content)
-
-    write_files(
-        {path.parent / name: writing(content) for name, content in files.items()}
-        | {path: writing(text)}
-    )
+    contents = {path.parent / name: content for name, content in files.items()} | {path: text}
+    write_files({name: writer_of(content) for name, content in contents.items()})
 
 
 def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, bytes]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from app import programs
 from app.errors import ConfigurationError, InputError
-from app.exchange.atomic import write_files
+from app.exchange.atomic import write_files, writer_of
 from app.programs.source import LARGEST
 
 LIBRARY = Path(programs.__file__).parent / "library"
@@ -58,7 +58,7 @@ class Scripts:
         path = self._folder / f"{name}{ENDING}"
         if path.exists():
             raise InputError(f"There is a script {name!r} already; give this one another name.")
-        write_files({path: lambda file: file.write(text.encode())})
+        write_files({path: writer_of(text.encode())})
         return path
 
 

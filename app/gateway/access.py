@@ -16,7 +16,7 @@ from itsdangerous import BadSignature, URLSafeSerializer
 
 from app.control.lease import Role
 from app.errors import ConfigurationError, InputError
-from app.exchange.atomic import write_files
+from app.exchange.atomic import write_files, writer_of
 
 SALT = "katana450 access link"
 LONGEST_NAME = 40
@@ -126,5 +126,5 @@ class AccessFile:
 
     def _write(self, content: _Content) -> None:
         data = msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n"
-        write_files({self.path: lambda file: file.write(data)}, mode=0o600)
+        write_files({self.path: writer_of(data)}, mode=0o600)
         self._refresh()

@@ -14,13 +14,15 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from app.api import answers, requests, schema
+from app.api.fields import ROOT
 from app.control.lease import LOST_AFTER
 from app.errors import InputError, LeaseError
 from app.gateway import program
+from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, as_json, body_of
 from app.gateway.desk import Desk
 from app.gateway.door import Door, Visitor
 from app.gateway.hub import Hub, Window, key_of
-from app.gateway.uploads import ROOT, Uploads, body_of
+from app.gateway.uploads import Uploads
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +32,7 @@ QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "l
 PROGRAM = re.compile(r"[A-Za-z0-9_-]{8,64}")
 """The name of a program that asks by POST; who knows it speaks for the program."""
 
-REFUSED, NOT_UNDERSTOOD, TOO_SOON = 409, 422, 503
+TOO_SOON = 503
 
 
 class Api:
@@ -68,11 +70,11 @@ class Api:
                 # Whoever looks is alive.
                 self._hub.beat(self._window(request, visitor))
             try:
-                return _json(self._desk.look(at))
+                return as_json(self._desk.look(at))
             except LeaseError as error:
                 raise HTTPException(TOO_SOON, str(error)) from error
             except InputError as error:
-                return _json(answers.Refused(why=str(error)), REFUSED)
+                return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
         return read
 
@@ -84,19 +86,19 @@ class Api:
         visitor = self._visitor(request)
         if not PROGRAM.fullmatch(request.headers.get("x-program", "")):
             why = "A header X-Program of 8 to 64 letters and digits tells you apart."
-            return _json(answers.Refused(why=why), NOT_UNDERSTOOD)
+            return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.LARGEST)
         try:
             asked = requests.decoded(body)
             if isinstance(asked, requests.Hello | requests.Watch):
                 raise InputError("That is for a connection that lasts: the socket or the TCP port.")
             window = self._window(request, visitor)
-            return _json(self._desk.do(window, asked))
+            return as_json(self._desk.do(window, asked))
         except InputError as error:
             refused = answers.Refused(why=str(error), id=requests.id_of(body))
-            return _json(refused, NOT_UNDERSTOOD)
+            return as_json(refused, NOT_UNDERSTOOD)
         except LeaseError as error:
-            return _json(answers.Refused(why=str(error), id=requests.id_of(body)), REFUSED)
+            return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
 
     def _visitor(self, request: Request) -> Visitor:
         headers = request.headers
@@ -127,7 +129,3 @@ class Api:
     def _forget(self, key: str) -> None:
         window, _ = self._posting.pop(key)
         self._hub.leave(window, for_good=True)
-
-
-def _json(answer: answers.Answer, status: int = 200) -> Response:
-    return Response(answers.encoded(answer), status, media_type="application/json")

@@ -14,14 +14,14 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
-from app.api.requests import LONGEST_PRESS
+from app.api.fields import LONGEST_PRESS
 from app.gateway import control_socket, files, headers, viser_page
 from app.gateway.api import Api
+from app.gateway.bodies import body_of
 from app.gateway.bucket import Bucket
 from app.gateway.door import Address, Door, Visitor
 from app.gateway.hub import Hub
 from app.gateway.proxy import Proxy
-from app.gateway.uploads import body_of
 
 log = logging.getLogger(__name__)
 

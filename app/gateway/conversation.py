@@ -16,6 +16,7 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.api import requests
+from app.api.fields import Id
 from app.errors import InputError, LeaseError
 from app.gateway.bucket import Bucket
 from app.gateway.desk import Desk
@@ -139,7 +140,7 @@ class Conversation(ABC):
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)
 
-    def refuse(self, why: str, named: requests.Id) -> None:
+    def refuse(self, why: str, named: Id) -> None:
         """Say that what was asked is not done."""
         self.tell({"is": "refused", "why": why, "id": named})
 

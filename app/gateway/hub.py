@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from app.api.requests import Rates
+from app.api.fields import Rates
 from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.commands import JOG_TIME

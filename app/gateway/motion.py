@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.api.requests import Rates
+from app.api.fields import Rates
 from app.collision.world import World
 from app.control import commands as cmd
 from app.control.choices import Choice
@@ -114,7 +114,7 @@ class Motion:
         if isinstance(self._session, JointSession):
             self._session.refuse()
         state = self.state
-        world, x = self._session.world_at(state), np.append(state.q, state.gripper)
+        world, x = self._session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
             chain = self.robot.arm.chain_to(state.tool)

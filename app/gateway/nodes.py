@@ -14,7 +14,7 @@ import numpy as np
 
 from app.api import answers, requests
 from app.control import commands as cmd
-from app.control.aims import look_of
+from app.control.arrangement import look_of
 from app.control.looks import Colour, Trait
 from app.control.state import State
 from app.control.things import Surroundings, Thing
@@ -226,7 +226,7 @@ class Nodes:
     def _thing(self, name: str) -> _Node:
         def pose(state: State) -> FloatArray:
             thing = _known_thing(state, name)
-            return self._surroundings.pose(thing, np.append(state.q, state.gripper))
+            return self._surroundings.pose(thing, state.x)
 
         def rotation(state: State) -> FieldValue:
             return _axis_angle(pose(state)[:3, :3])

@@ -12,7 +12,7 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from app.api import answers
-from app.api.requests import Order
+from app.api.fields import Order
 from app.control import commands as cmd
 from app.control.lease import Role
 from app.control.state import State

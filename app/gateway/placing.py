@@ -11,10 +11,11 @@ from app.control import commands as cmd
 from app.control.pouring import BASIN, CUP
 from app.control.room import free_place
 from app.control.solid import PLAIN, Look
-from app.control.things import MOST, Form, Mount, Thing
+from app.control.things import MOST, Form, Mount, Thing, named
 from app.errors import InputError
 from app.gateway.hub import Hub
 from app.geometry import se3
+from app.water.units import ML
 
 
 class Placing:
@@ -33,7 +34,7 @@ class Placing:
             case requests.Load(scene=key):
                 return self._hub.scenes.furnishing(key, self._hub.present())
             case requests.Fill(ml=ml):
-                return cmd.Fill(1e-6 * ml)
+                return cmd.Fill(ML * ml)
             case requests.Remove(name=name):
                 self._out_of_the_hand(name)
                 return cmd.Remove(name)
@@ -56,8 +57,7 @@ class Placing:
         if asked.frame is requests.Frame.SHOULDER:
             T = arm.robot.T_base_shoulder @ T
         if thing.fixed:
-            x = np.append(arm.state.q, arm.state.gripper)
-            T = arm.surroundings.into_hand(se3.validated(T), x)
+            T = arm.surroundings.into_hand(se3.validated(T), arm.state.x)
         return replace(thing, T=T)
 
     def _shaped(self, asked: requests.Place, known: Thing | None) -> Thing:
@@ -121,7 +121,7 @@ class Placing:
         arm = self._hub.present()
         if any(part.name == name for part in arm.robot.bodies) or name == "table":
             raise InputError(f"{name!r} is no thing that can be put elsewhere.")
-        known = next((each for each in arm.state.things if each.name == name), None)
+        known = named(arm.state.things, name)
         if known is not None and known.held:
             raise InputError(f"{name!r} is held: open the gripper first.")
         return known

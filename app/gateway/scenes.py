@@ -13,16 +13,13 @@ from app.errors import InputError, LeaseError
 from app.exchange.meshes import Mesh, Meshes
 from app.exchange.scene_file import StoredScene, scene_zip
 from app.scene.scene import Scene
-from app.water.units import MILLILITRE
+from app.water.units import MILLILITRE, ML
 
 if TYPE_CHECKING:
     from app.gateway.hub import Arm
 
 KEPT = 4
 """Scenes that were uploaded and not loaded yet."""
-
-CUBIC_METRE = 1e-6
-"""[m^3] of a ml."""
 
 
 class Scenes:
@@ -66,21 +63,23 @@ class Scenes:
         stored = self._kept.get(key)
         if stored is None:
             raise InputError("There is no scene of that key, or no more: upload it again.")
-        held = next((thing.name for thing in arm.state.things if thing.held), None)
+        held = arm.state.held
         if held is not None:
-            raise LeaseError(f"{held!r} is held: open the gripper first.")
+            raise LeaseError(f"{held.name!r} is held: open the gripper first.")
         self._meshes.put(stored.meshes, used_in(arm.state))
         return _furnishing(stored)
 
     def stored(self, arm: Arm) -> StoredScene:
         """What there is now. Raises InputError, LeaseError where that cannot be saved."""
         state = arm.state
-        held = next((thing.name for thing in state.things if thing.held), None)
+        held = state.held
         if held is not None:
-            raise LeaseError(f"{held!r} is held: set it down first, a scene has nothing in hand.")
+            raise LeaseError(
+                f"{held.name!r} is held: set it down first, a scene has nothing in hand."
+            )
         water = None
         if state.poured is not None:
-            water = CUBIC_METRE * state.poured.water.cup / MILLILITRE
+            water = ML * state.poured.water.cup / MILLILITRE
         keys = dict.fromkeys(t.solid.key for t in state.things if t.solid is not None)
         meshes = tuple(self._meshes.need(key) for key in keys)
         return StoredScene(Scene(state.things, water, state.q), meshes)

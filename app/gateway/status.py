@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.control.state import Status
 from app.gateway.hub import Hub, Window
-from app.view.texts import headline, sentence
+from app.view.texts import headline, mood, sentence
 
 AGE_WORTH_TELLING = 0.2
 """[s] A picture that is younger counts as now."""
@@ -16,14 +15,12 @@ def common(hub: Hub) -> dict[str, Any]:
     """The part that is the same for all."""
     state = hub.arm.state if hub.arm is not None else None
     stopped = hub.stopped
-    mood = "starting"
+    now = "starting" if state is None else mood(state)
     if stopped is not None:
-        mood = "stopped"
-    elif state is not None:
-        mood = "moving" if state.moving and state.status is Status.OK else state.status.value
+        now = "stopped"
     holder = hub.lease.holder
     return {
-        "mood": mood,
+        "mood": now,
         "headline": "" if state is None else headline(state),
         "why": "" if state is None else sentence(state),
         "stopped": None if stopped is None else stopped.why,

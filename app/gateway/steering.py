@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from app.api import answers
-from app.api.requests import Order
+from app.api.fields import Order
 from app.errors import LeaseError
 from app.gateway.performer import Performer
 from app.programs.program import Program
@@ -58,4 +58,7 @@ class Steering:
                 future.set_result(None)
 
         loop.call_soon_threadsafe(done)
-        future.result(PATIENCE)
+        try:
+            future.result(PATIENCE)
+        except TimeoutError as error:
+            raise LeaseError("The server does not answer. See how the program stands.") from error

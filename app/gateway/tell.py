@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
+import msgspec
 
 from app.api import answers
 from app.control import state as control
@@ -19,6 +19,7 @@ from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
 from app.kinematics.tool import ToolTarget
 from app.kinematics.velocity import tool_speed
+from app.motion.limiter import Limits
 from app.robot.model import RobotModel
 from app.runtime.lateness import Lateness
 from app.view.texts import sentence, told
@@ -63,7 +64,7 @@ def state(hub: Hub) -> answers.State:
         margins=None if tool is None else margins(arm.margins),
         holding=None if arm.holding is None else arm.holding.tolist(),
         touching=list(touching(arm.surroundings.hand, now)),
-        held=next((thing.name for thing in now.things if thing.held), None),
+        held=None if now.held is None else now.held.name,
         branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
         reading=None if tool is None else now.reading.value,
         status=now.status.value,
@@ -124,45 +125,46 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
 def arm(model: RobotModel | Machine, ready: list[float]) -> answers.Arm:
     """``ready``: the posture that Home drives to."""
     if isinstance(model, Machine):
-        return _joints(model, ready)
-    chain, limits, gripper = model.arm.chain, model.arm.limits, model.arm.gripper
-    return answers.Arm(
-        name=model.name,
-        joints=list(chain.names),
-        lower=chain.lower.tolist(),
-        upper=chain.upper.tolist(),
-        speed=limits.speed.tolist(),
-        acceleration=limits.acceleration.tolist(),
-        jerk=limits.jerk.tolist(),
-        ready=ready,
+        joints = model.joints
+        jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
+        return jointed.told(model.mechanism.name, ready)
+    names, gripper = model.arm.chain.names, model.arm.gripper
+    jointed = _Jointed(names, (False,) * len(names), model.arm.limits)
+    return msgspec.structs.replace(
+        jointed.told(model.name, ready),
         tools={name: M.tolist() for name, M in model.arm.tools.items()},
         default_tool=model.arm.default_tool,
         gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
         T_base_shoulder=model.T_base_shoulder.tolist(),
-        slides=[False] * chain.n,
-        joints_only="",
     )
 
 
-def _joints(machine: Machine, ready: list[float]) -> answers.Arm:
-    joints = machine.joints
-    limits = joints.limits
-    return answers.Arm(
-        name=machine.mechanism.name,
-        joints=list(joints.names),
-        lower=limits.lower.tolist(),
-        upper=limits.upper.tolist(),
-        speed=limits.speed.tolist(),
-        acceleration=limits.acceleration.tolist(),
-        jerk=limits.jerk.tolist(),
-        ready=ready,
-        tools={},
-        default_tool=None,
-        gripper=None,
-        T_base_shoulder=None,
-        slides=list(joints.slides),
-        joints_only=joints.why,
-    )
+class _Jointed(NamedTuple):
+    """What every mechanism has. why: no tool of it can be brought to a pose."""
+
+    names: tuple[str, ...]
+    slides: tuple[bool, ...]
+    limits: Limits
+    why: str = ""
+
+    def told(self, name: str, ready: list[float]) -> answers.Arm:
+        """Without tools."""
+        return answers.Arm(
+            name=name,
+            joints=list(self.names),
+            lower=self.limits.lower.tolist(),
+            upper=self.limits.upper.tolist(),
+            speed=self.limits.speed.tolist(),
+            acceleration=self.limits.acceleration.tolist(),
+            jerk=self.limits.jerk.tolist(),
+            ready=ready,
+            tools={},
+            default_tool=None,
+            gripper=None,
+            T_base_shoulder=None,
+            slides=list(self.slides),
+            joints_only=self.why,
+        )
 
 
 def line(line: Line) -> answers.Line:
@@ -196,7 +198,7 @@ def things(hub: Hub) -> answers.Things:
     """What stands around or is held. Raises LeaseError while there is no arm yet."""
     arm = hub.present()
     now = arm.state
-    x = np.append(now.q, now.gripper)
+    x = now.x
     return answers.Things(
         things=[
             answers.Thing(

@@ -11,16 +11,16 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from app.api import answers, requests
+from app.api import answers
+from app.api.fields import ROOT
 from app.errors import InputError, LeaseError
 from app.exchange.meshes import read_mesh
 from app.exchange.scene_file import LARGEST_ZIP, read_scene_zip
 from app.exchange.shape_file import LONGEST_NAME, MOST_BYTES
+from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, as_json, body_of
 from app.gateway.bucket import Bucket
 from app.gateway.door import Visitor
 from app.gateway.hub import Hub
-
-ROOT = f"/api/v{requests.VERSION}"
 
 RATE, AT_ONCE = 0.5, 10.0
 """Files a second, and at once, of everybody together."""
@@ -31,7 +31,7 @@ WAITING = 4
 PATIENCE = 60.0
 """[s] Until a file is here and read, whoever sends it slowly."""
 
-NOT_ALLOWED, TOO_SLOW, NOT_NOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 403, 408, 409, 413, 422, 429
+NOT_ALLOWED, TOO_SLOW, TOO_MANY = 403, 408, 429
 
 T = TypeVar("T")
 
@@ -88,7 +88,7 @@ class Uploads:
             arm = self._hub.present()
             content = await asyncio.to_thread(self._hub.scenes.zipped, arm)
         except (InputError, LeaseError) as error:
-            return _json(answers.Refused(why=str(error)), NOT_NOW)
+            return as_json(answers.Refused(why=str(error)), NOT_NOW)
         headers = {"Content-Disposition": 'attachment; filename="scene.zip"'}
         return Response(content, media_type="application/zip", headers=headers)
 
@@ -100,17 +100,17 @@ class Uploads:
             raise HTTPException(NOT_ALLOWED, "You may watch, not bring anything.")
         if self._waiting >= WAITING or not self._often.take(self._hub.clock()):
             why = "Too many files at once. Wait a moment."
-            return _json(answers.Refused(why=why), TOO_MANY)
+            return as_json(answers.Refused(why=why), TOO_MANY)
         self._waiting += 1
         try:
             async with asyncio.timeout(PATIENCE):
-                return _json(await keep())
+                return as_json(await keep())
         except TimeoutError:
-            return _json(answers.Refused(why=f"That took more than {PATIENCE:g} s."), TOO_SLOW)
+            return as_json(answers.Refused(why=f"That took more than {PATIENCE:g} s."), TOO_SLOW)
         except InputError as error:
-            return _json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
+            return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
         except LeaseError as error:
-            return _json(answers.Refused(why=str(error)), NOT_NOW)
+            return as_json(answers.Refused(why=str(error)), NOT_NOW)
         finally:
             self._waiting -= 1
 
@@ -118,17 +118,3 @@ class Uploads:
         """What ``read`` makes, one at a time: each may take a process and a gigabyte."""
         async with self._reading:
             return await asyncio.to_thread(read)
-
-
-async def body_of(request: Request, largest: int) -> bytes:
-    """What is sent by POST, at most ``largest`` bytes."""
-    body = bytearray()
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > largest:
-            raise HTTPException(TOO_LONG, "That is too long.")
-    return bytes(body)
-
-
-def _json(answer: answers.Answer, status: int = 200) -> Response:
-    return Response(answers.encoded(answer), status, media_type="application/json")

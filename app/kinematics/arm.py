@@ -213,7 +213,7 @@ def arm_of(chain: Chain) -> FiveAxisArm:
         l3=l3,
         tilt=_tidy(wrapped(bearing3 - pitch)),
         signs=(signs[0], signs[1], signs[2], signs[3], signs[4]),
-        shifts=(0.0, *(_tidy(shift) for shift in shifts[1:4]), 0.0),  # type: ignore[arg-type]
+        shifts=(0.0, _tidy(shifts[1]), _tidy(shifts[2]), _tidy(shifts[3]), 0.0),
         T_C_S=frozen(_tidied(T_C_S)),
         T_K_tool=frozen(_tidied(T_K_tool)),
         off_axis=0.0 if gap else off_axis,

@@ -14,7 +14,7 @@ from app.control.commands import Command
 from app.control.plans import path_to, plan_along
 from app.control.session import Session
 from app.control.state import State
-from app.control.things import Thing
+from app.control.things import Thing, named
 from app.errors import InputError
 from app.geometry import se3
 from app.geometry.arrays import FloatArray, frozen
@@ -221,7 +221,7 @@ class Bench:
 
     def thing(self, name: str) -> Thing:
         """The thing of that name. Raises InputError with those there are."""
-        found = next((each for each in self.state.things if each.name == name), None)
+        found = named(self.state.things, name)
         if found is None:
             known = ", ".join(each.name for each in self.state.things) or "nothing"
             raise InputError(f"There is no {name!r} here; there is {known}.")

@@ -23,7 +23,6 @@ MOST_VALUES = 10_000
 
 NULL, TEXT = "tag:yaml.org,2002:null", "tag:yaml.org,2002:str"
 WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
-KNOWN = (NULL, TEXT, WHOLE, REAL, "tag:yaml.org,2002:bool", "tag:yaml.org,2002:timestamp")
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from app.programs.fields import Fields
 from app.programs.order import Filling, Putting
 from app.programs.setting import Setting
 from app.programs.source import Value
+from app.water.units import ML
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Fill:
 
     @classmethod
     def read(cls, value: Value, setting: Setting) -> Self:  # noqa: ARG003
-        return cls(1e-6 * read.number(0.0, 1000.0, "ml")(value))
+        return cls(ML * read.number(0.0, 1000.0, "ml")(value))
 
     def lay(self, bench: Bench) -> None:
         command = cmd.Fill(self.volume)

@@ -71,7 +71,7 @@ class Stage:
 
     def around(self, state: State) -> list[Item]:
         """The table, and the things."""
-        x = np.append(state.q, state.gripper)
+        x = state.x
         found = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
         for thing in state.things:
             if thing.look.hidden:

@@ -17,7 +17,7 @@ import numpy as np
 
 from app.control.arm import Arm
 from app.errors import InputError
-from app.exchange.atomic import Writer, write_files
+from app.exchange.atomic import write_files, writer_of
 from app.kinematics.forward import forward
 from app.programs.measures import MEASURES
 from app.programs.program import Program
@@ -149,10 +149,7 @@ class Report:
             "trace.csv": self.csv().encode(),
             **images,
         }
-        writers: dict[Path, Writer] = {
-            directory / name: lambda file, content=content: file.write(content)  # type: ignore[misc]
-            for name, content in contents.items()
-        }
+        writers = {directory / name: writer_of(content) for name, content in contents.items()}
         write_files(writers)
         return tuple(writers)
 

@@ -16,11 +16,9 @@ from app.programs.fields import Fields, choice, listed, millimetres, number, tex
 from app.programs.fields import degrees as read_degrees
 from app.programs.source import Problem, ScriptError, Value, read
 from app.scene.scene import Draft, Entry, MeshFile, Scene
+from app.water.units import ML
 
 VERSION = 1
-
-MILLILITRE = 1e-6
-"""[m^3]"""
 
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 9
 """Of a number in mm, and in degrees: to a millionth of a millimetre, a reader sees whole ones."""
@@ -52,7 +50,7 @@ def parsed(source: str) -> Draft:
     fields.done()
     return Draft(
         entries,
-        None if water is None else MILLILITRE * water,
+        None if water is None else ML * water,
         None if joints is None else np.array(joints),
     )
 
@@ -63,7 +61,7 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
     if scene.joints is not None:
         told["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
     if scene.water is not None:
-        told["water"] = _round(scene.water / MILLILITRE, LENGTH_DIGITS)
+        told["water"] = _round(scene.water / ML, LENGTH_DIGITS)
     told["things"] = [_told(thing, files, T_palm_tool) for thing in scene.things]
     said: str = yaml.dump(told, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
     return HEAD + said

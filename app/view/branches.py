@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
+from functools import partial
 from html import escape
-from typing import Any
 
 import viser
 
@@ -19,6 +19,7 @@ from app.control.commands import TakeBranch
 from app.control.state import State
 from app.kinematics.branch import BRANCHES
 from app.robot.model import RobotModel
+from app.view.controls import Listen
 from app.view.scene import Colour, GhostNodes
 from app.view.texts import BRANCH_HEADINGS, badge
 
@@ -33,9 +34,6 @@ than several pictures."""
 
 Find = Callable[[State], tuple[Choice, ...]]
 """The choice on each of BRANCHES."""
-
-Listen = Callable[[Any, Callable[[], TakeBranch]], None]
-"""Makes a person's click on a button or a shape send what the function makes."""
 
 
 class BranchList:
@@ -70,7 +68,7 @@ class BranchList:
             button = server.gui.add_button(
                 f"Take {branch}", hint="The tool where it is wished, the arm on this branch"
             )
-            listen(button, lambda branch=branch: TakeBranch(branch))  # type: ignore[misc]
+            listen(button, partial(TakeBranch, branch))
 
     def follow(self, state: State, now: float) -> None:
         """Show what the branches come to from ``state`` at time ``now`` [s].
@@ -106,7 +104,7 @@ class BranchList:
         name = f"/branch/{branch}"
         ghost = GhostNodes(self._server, self._model, name, COLOURS[number], OPACITY)
         for shape in ghost.shapes:
-            self._listen(shape, lambda: TakeBranch(branch))
+            self._listen(shape, partial(TakeBranch, branch))
         return ghost
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import viser
 
 from app.control import commands as cmd
 from app.control.state import State
-from app.errors import InputError
+from app.errors import InputError, KatanaError
 
 WORTH_SENDING = 2e-6
 """[deg, mm] Rounding on the way to radians and back is less."""
@@ -41,8 +42,7 @@ def listener(put: Callable[[cmd.Command], int]) -> Listen:
             try:
                 put(say())
             except InputError as error:
-                if event.client is not None:
-                    event.client.add_notification("Not done", str(error), color="red")
+                refuse(event, error)
 
         if isinstance(handle, viser.GuiInputHandle):
             handle.on_update(changed)
@@ -50,6 +50,14 @@ def listener(put: Callable[[cmd.Command], int]) -> Listen:
             handle.on_click(changed)
 
     return listen
+
+
+def refuse(
+    event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any], error: KatanaError
+) -> None:
+    """Tell whoever asked why it is not done, in their window."""
+    if event.client is not None:
+        event.client.add_notification("Not done", str(error), color="red")
 
 
 def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSliderHandle[float]:
@@ -72,9 +80,16 @@ def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSlid
     return speed
 
 
+def set_value(handle: Any, value: object) -> None:
+    """Show ``value``, if it is another."""
+    known = handle.value
+    if (tuple(known) if isinstance(known, list | np.ndarray) else known) != value:
+        handle.value = value
+
+
 def set_slider(slider: viser.GuiSliderHandle[float], value: float) -> None:
     """Show ``value``, if it is another."""
     # Rounded off where nobody can see it, so that no slider shows "-0.00".
     value = min(max(round(value, 6) + 0.0, slider.min), slider.max)
     if abs(slider.value - value) > WORTH_SENDING:
-        slider.value = value  # type: ignore[misc]  # viser declares it read-only
+        set_value(slider, value)

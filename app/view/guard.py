@@ -152,7 +152,7 @@ class Guard:
                 return _range(value, handle.min or [None] * 3, handle.max or [None] * 3)
             case viser.GuiTextHandle():
                 short = isinstance(value, str) and len(value) <= LONGEST_TEXT
-                return None if short else "a text has at most 200 characters"
+                return None if short else f"a text has at most {LONGEST_TEXT} characters"
         return "that control cannot be changed"
 
 

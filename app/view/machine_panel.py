@@ -11,13 +11,13 @@ import viser
 from app.control import commands as cmd
 from app.control.joints import Joints
 from app.control.ledger import Entry
-from app.control.state import State, Status
+from app.control.state import State
 from app.view.controls import Listen, add_motion, listener, set_slider
 from app.view.follower import READOUT_INTERVAL
 from app.view.ledger import LedgerList
 from app.view.looks import add_themes
 from app.view.readout import style
-from app.view.texts import headline, sentence, signed
+from app.view.texts import headline, mood, sentence, signed
 
 GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Reset()}
 
@@ -111,10 +111,9 @@ def page(joints: Joints, state: State) -> str:
         f"<td class='unit'>{'mm' if joints.slides[axis] else '°'}</td></tr>"
         for axis, name in enumerate(joints.names)
     )
-    mood = "moving" if state.moving and state.status is Status.OK else state.status.value
     return (
         f"<div class='k450'>"
-        f"<p class='status {mood}'><b>{escape(headline(state))}</b>"
+        f"<p class='status {mood(state)}'><b>{escape(headline(state))}</b>"
         f"<span>{escape(sentence(state)) or '&nbsp;'}</span></p>"
         f"<table><thead><tr><th>joint</th><th>now</th><th>goal</th><th></th></tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"

@@ -14,10 +14,11 @@ from app.control import commands as cmd
 from app.control.pouring import BASIN, CUP
 from app.control.solid import FAINTEST, Look
 from app.control.state import State
-from app.control.things import LEAST_SCALE, MOST_SCALE, Mount, Thing
+from app.control.things import LEAST_SCALE, MOST_SCALE, Mount, Thing, named
 from app.errors import InputError
 from app.geometry import so3
 from app.geometry.arrays import frozen
+from app.view.controls import refuse, set_value
 from app.view.things import COLOUR
 
 NOTHING = "nothing yet"
@@ -109,25 +110,24 @@ class ObjectsPanel:
             self._choice.options = names
             if new or chosen not in names:
                 # What has just come is what one wants to touch.
-                self._choice.value = new[-1] if new else names[0]  # type: ignore[misc]
-            elif self._choice.value != chosen:
-                self._choice.value = chosen  # type: ignore[misc]  # viser has it read-only
+                chosen = new[-1] if new else names[0]
+            set_value(self._choice, chosen)
         self._show(self._chosen())
 
     def _chosen(self) -> Thing | None:
-        return next((each for each in self._things if each.name == self._choice.value), None)
+        return named(self._things, self._choice.value)
 
     def _show(self, thing: Thing | None, *, anew: bool = False) -> None:
         if thing is None or (thing is self._shown and not anew):
             return
         self._shown = thing
-        _set(self._colour, thing.look.colour or COLOUR)
-        _set(self._opacity, round(100.0 * thing.look.opacity, 1))
-        _set(self._scale, thing.scale)
-        _set(self._hidden, thing.look.hidden)
+        set_value(self._colour, thing.look.colour or COLOUR)
+        set_value(self._opacity, round(100.0 * thing.look.opacity, 1))
+        set_value(self._scale, thing.scale)
+        set_value(self._hidden, thing.look.hidden)
         yaw = math.degrees(so3.to_rpy(thing.T[:3, :3])[2])
         if abs(math.remainder(self._turn.value - yaw, 360.0)) > 0.5:
-            _set(self._turn, round(yaw) + 0.0)
+            set_value(self._turn, round(yaw) + 0.0)
 
     def _acted(self, thing: Thing) -> cmd.Command:
         if self._acts.value == REMOVE:
@@ -151,8 +151,7 @@ class ObjectsPanel:
                 self._put(say(thing))
             except InputError as error:
                 self._show(self._chosen(), anew=True)
-                if event.client is not None:
-                    event.client.add_notification("Not done", str(error), color="red")
+                refuse(event, error)
 
         if isinstance(handle, viser.GuiButtonGroupHandle):
             handle.on_click(changed)
@@ -191,9 +190,3 @@ def _turned(thing: Thing, yaw: float) -> cmd.Command:
 
 def _names(things: tuple[Thing, ...]) -> tuple[str, ...]:
     return tuple(thing.name for thing in things) or (NOTHING,)
-
-
-def _set(handle: Any, value: Any) -> None:
-    known = handle.value
-    if (tuple(known) if isinstance(known, list | np.ndarray) else known) != value:
-        handle.value = value

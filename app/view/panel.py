@@ -18,7 +18,7 @@ from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList, Find
-from app.view.controls import add_motion, listener, set_slider
+from app.view.controls import add_motion, listener, set_slider, set_value
 from app.view.follower import READOUT_INTERVAL
 from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
@@ -104,10 +104,8 @@ class Panel:
         if self._gripper is not None:
             set_slider(self._gripper, self._opening(state.gripper_goal))
         set_slider(self._speed, 100.0 * state.speed)
-        if self._tool.value != state.tool:
-            self._tool.value = state.tool  # type: ignore[misc]  # viser declares it read-only
-        if self._reading.value != READINGS[state.reading]:
-            self._reading.value = READINGS[state.reading]  # type: ignore[misc]  # likewise
+        set_value(self._tool, state.tool)
+        set_value(self._reading, READINGS[state.reading])
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
         chain = self._model.arm.chain

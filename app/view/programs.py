@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import viser
 
 from app.api.answers import Progress as Told
-from app.api.requests import Order
+from app.api.fields import Order
 from app.control.state import State
 from app.errors import InputError, KatanaError
 from app.exchange.scripts import Scripts
@@ -18,6 +18,7 @@ from app.geometry.arrays import FloatArray
 from app.programs.program import Program
 from app.programs.taught import taught
 from app.robot.model import RobotModel
+from app.view.controls import refuse
 from app.view.preview import Preview
 
 STEERING = ("Script", "Program", "Look at", "Teach", "Name")
@@ -173,8 +174,7 @@ class ProgramsPanel:
             try:
                 act()
             except KatanaError as error:
-                if event.client is not None:
-                    event.client.add_notification("Not done", str(error), color="red")
+                refuse(event, error)
 
         return acted
 

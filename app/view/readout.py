@@ -7,14 +7,14 @@ from html import escape
 from pathlib import Path
 
 import app
-from app.control.state import State, Status
+from app.control.state import State
 from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.velocity import limit_distances, singular_values
 from app.robot.model import RobotModel
-from app.view.texts import headline, room, sentence, signed
+from app.view.texts import headline, mood, room, sentence, signed
 
 STATIC = Path(app.__file__).resolve().parent.parent / "static"
 
@@ -30,11 +30,10 @@ def page(model: RobotModel, state: State) -> str:
         f"<td class='unit'>{'mm' if name in 'xyz' else '°'}</td></tr>"
         for name, a, b in zip(ROWS, now, goal, strict=True)
     )
-    mood = "moving" if state.moving and state.status is Status.OK else state.status.value
     why = sentence(state)
     return (
         f"<div class='k450'>"
-        f"<p class='status {mood}'><b>{escape(headline(state))}</b>"
+        f"<p class='status {mood(state)}'><b>{escape(headline(state))}</b>"
         f"<span>{escape(why) or '&nbsp;'}</span></p>"
         f"<table><thead><tr><th>{escape(state.tool)} in {{S}}</th><th>now</th><th>goal</th>"
         f"<th></th></tr></thead><tbody>{rows}</tbody></table>{_at_once(chain, state.q)}</div>"

@@ -128,6 +128,12 @@ NOTHING_LOST = "nothing"
 MOVING = "Moving"
 
 
+def mood(state: State) -> str:
+    """The word for it that the style sheets know."""
+    moves = state.moving and state.status is Status.OK
+    return "moving" if moves else state.status.value
+
+
 def headline(state: State) -> str:
     """Two or three words for the state of the arm."""
     if state.moving and state.status is Status.OK:

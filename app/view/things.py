@@ -12,7 +12,7 @@ import viser
 
 from app.control.commands import Command, Place
 from app.control.solid import Solid
-from app.control.state import Reason, State
+from app.control.state import State
 from app.control.things import Form, Surroundings, Thing
 from app.exchange.creases import Drawn, drawn, glb
 from app.exchange.meshes import Meshes
@@ -81,15 +81,10 @@ class ThingNodes:
         changed = state.things is not self._seen
         if changed:
             self._take_in(state.things)
-        near = {
-            part
-            for finding in state.findings
-            if finding.reason is Reason.CONTACT
-            for part in finding.parts or ()
-        }
+        near = state.near
         for thing in state.things:
             if changed or thing.carried:
-                self._pose(thing, np.append(state.q, state.gripper))
+                self._pose(thing, state.x)
             if thing.name not in self._props:
                 self._shapes[thing.name].warn(thing, near=thing.name in near)
 

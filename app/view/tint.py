@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
-from app.control.state import Reason, State
+from app.control.state import State
 from app.geometry.arrays import frozen
 from app.robot.model import RobotModel
 from app.robot.props import Props
@@ -45,12 +45,7 @@ class Tint:
 
     def follow(self, state: State) -> None:
         """Coat the parts that ``state`` says are near a contact, and no others."""
-        parts = frozenset(
-            part
-            for finding in state.findings
-            if finding.reason is Reason.CONTACT
-            for part in finding.parts or ()
-        )
+        parts = state.near
         for part in self._coated ^ parts:
             for coat in self._coat(part):
                 coat.visible = part in parts

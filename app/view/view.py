@@ -88,14 +88,14 @@ class View(Follower):
         self._model = model
         self._mailbox = mailbox
         props = load_props()
-        self._scenery = Scenery(server, model, session, props, self._put_from_gizmo, besides.meshes)
+        self._scenery = Scenery(server, model, session, props, self._put_dragged, besides.meshes)
         state = board.snapshot.state
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, model, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._traces = Traces(server, model)
-        self._gizmo = Gizmo(server, model, self._put_from_gizmo, lambda: board.snapshot.state)
+        self._gizmo = Gizmo(server, model, self._put_dragged, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
         cloud = (
             None
@@ -124,7 +124,7 @@ class View(Follower):
         self._gizmo.let_go()
         self._scenery.things.let_go()
 
-    def _put_from_gizmo(self, command: Command) -> None:
+    def _put_dragged(self, command: Command) -> None:
         try:
             self._mailbox.put(command)
         except InputError:

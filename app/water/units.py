@@ -9,8 +9,11 @@ FEMTOLITRE = 1e-18
 """[m^3] Volumes are moved in whole ones, so that none is made or lost by rounding: a basin holds
 2e15 of them, which a float still tells apart."""
 
+ML = 1e-6
+"""[m^3] A millilitre, as people tell volumes."""
+
 MILLILITRE = 1_000_000_000_000
-"""[fl]"""
+"""[fl] The same, as they are counted."""
 
 
 def counted(volume: float) -> int:

@@ -1,13 +1,11 @@
 // Every instrument there is for an arm: what it is called, how it is made, what it shows of a state.
-import { readings } from "./channels.js";
+import { DEGREES, MM, readings } from "./channels.js";
 import { Command } from "./command.js";
 import { Bars, Gauge } from "./gauge.js";
 import { Knob } from "./knob.js";
 import { Plot } from "./plot.js";
 import { signed } from "./shape.js";
 
-const DEGREES = 180 / Math.PI;
-const MM = 1000;
 const MS = 1000;
 const AXES = ["base turn", "shoulder", "elbow", "wrist bend", "wrist roll"];
 const ONE = ["small", "large"];

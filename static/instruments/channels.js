@@ -1,6 +1,6 @@
 // What of a state is kept over time, in the units people read.
-const DEGREES = 180 / Math.PI;
-const MM = 1000;
+export const DEGREES = 180 / Math.PI;
+export const MM = 1000;
 
 // How each joint's numbers are read: {of, unit, mark}.
 export function readings(arm) {

@@ -7,6 +7,7 @@ const MARGIN = { left: 42, right: 8, top: 8, bottom: 18 }; // px
 const LINE_HEIGHT = 24; // px between lines across, about; and one for each so many seconds:
 const APART = { 10: 2, 30: 5, 120: 20 };
 const COLOURS_KEPT = 500; // ms
+const SERIES = 5; // colours in instruments.css; more lines have them again
 const READ_BY = 0.01; // share of the width a key moves the cursor
 
 export class Plot {
@@ -69,7 +70,7 @@ export class Plot {
     const { label, short = label } = this.#history.channels[channel];
     const button = html(
       "button",
-      { type: "button", "aria-pressed": "true", "aria-label": label, class: `series-${i + 1}` },
+      { type: "button", "aria-pressed": "true", "aria-label": label, class: `series-${(i % SERIES) + 1}` },
       html("i"), html("span", {}, short), value,
     );
     button.addEventListener("click", () => {

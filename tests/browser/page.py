@@ -241,11 +241,6 @@ class ViserPage:
             "(look) => harness.lookFrom(...look)", [camera.position, camera.look_at]
         )
 
-    def scene_rectangle(self) -> tuple[float, float, float, float]:
-        """Left, top, width and height of the scene in the window, in pixels."""
-        left, top, width, height = self.frame.evaluate("() => harness.view()")["rectangle"]
-        return (*self._in_window((left, top)), width, height)
-
     def _pixel(self, view: dict[str, Any], point: Matrix) -> Pixel:
         clip = _matrix(view["projection"]) @ _matrix(view["inverse"]) @ point
         x, y = clip[:2] / clip[3]

@@ -27,11 +27,6 @@ ACROSS = np.array([-0.81, 0.0, -0.586])
 OUT, _, UP = np.eye(3)
 
 
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
-
-
 def take(session: Session, state: State, *commands: cmd.Command) -> State:
     return session.step(state, commands, state.t + TICK)
 

@@ -8,30 +8,16 @@ import numpy as np
 import pytest
 
 from app.collision.clearance import STOP
-from app.collision.shape import cylinder, half_space
-from app.collision.world import World, obstacle
+from app.collision.world import World
 from app.control import commands as cmd
 from app.control.session import Session
 from app.control.state import JointTarget, Reason, State, Status
-from app.geometry import se3
 from app.geometry.arrays import FloatArray
-from app.robot.collision import world_of
-from app.robot.model import RobotModel
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 """The fingers a hand's breadth above the table."""
-
-
-@pytest.fixture(scope="module")
-def world(model: RobotModel) -> World:
-    """The arm on its table, a cup before it."""
-    found, _ = world_of(model)
-    assert found is not None
-    cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
-    cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
-    return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
 
 
 @pytest.fixture

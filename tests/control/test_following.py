@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 
 from app.collision.clearance import STOP
-from app.collision.shape import cylinder, half_space
-from app.collision.world import World, obstacle
+from app.collision.world import World
 from app.control import commands as cmd
 from app.control.arm import Arm
 from app.control.plans import path_to, plan_along, plan_to
 from app.control.session import TOOL_SPEED, Session
 from app.control.state import JointTarget, Reason, State, Status
 from app.errors import BlockedError, InputError
-from app.geometry import se3
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import branch_of
 from app.kinematics.forward import forward
@@ -30,8 +28,6 @@ from app.planning.jet import Jet
 from app.planning.path import joint_derivatives
 from app.planning.plan import Plan
 from app.planning.tool_path import ToolPath
-from app.robot.collision import world_of
-from app.robot.model import RobotModel
 from app.settings import Settings
 
 TICK = 0.01
@@ -39,21 +35,6 @@ SLIGHTLY = 2e-5  # m
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 """The fingers a hand's breadth above the table."""
 BEYOND_CUP = LOW - (1.1, 0.0, 0.0, 0.0, 0.0)
-
-
-@pytest.fixture(scope="module")
-def world(model: RobotModel) -> World:
-    """The arm on its table, a cup before it."""
-    found, _ = world_of(model)
-    assert found is not None
-    cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
-    cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
-    return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
-
-
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")

@@ -27,11 +27,6 @@ def run(
     return state, entries
 
 
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
-
-
 FAULTS: dict[Reason, list[cmd.Command]] = {
     Reason.AXIS_LIMIT: [cmd.SetJoint(0, 4.0)],
     Reason.GRIPPER_LIMIT: [cmd.SetGripper(2.0)],

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from app.control import commands as cmd
 from app.control import solid
-from app.control.aims import PAINT, look_of
+from app.control.arrangement import PAINT, look_of
 from app.control.looks import AS_MADE, MOST, Choice, Look, Looks, Trait
 from app.control.session import Session
 from app.control.things import Form, Thing

@@ -23,11 +23,6 @@ TICK = 0.01
 FAR = np.array([2.0, -0.4, 0.6, 0.8, -1.5])
 
 
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
-
-
 def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
     commands = list(commands)
     for _ in range(ticks):

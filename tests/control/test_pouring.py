@@ -19,9 +19,8 @@ from app.robot.model import RobotModel
 from app.robot.props import load_props
 from app.robot.water import around_of
 from app.settings import Settings
-from app.water.units import counted
+from app.water.units import ML, counted
 
-ML = 1e-6
 FULL = counted(200.0 * ML)
 
 

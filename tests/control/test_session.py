@@ -22,11 +22,6 @@ from app.kinematics.freedoms import pitch_and_roll
 TICK = 0.01
 
 
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
-
-
 def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
     """``ticks`` turns of the loop with an arm that follows exactly."""
     commands = list(commands)

@@ -1,4 +1,4 @@
-"""A program's hand on the server of a file of tests."""
+"""The server of a file of tests, and a program's hand on it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ import pytest
 
 from app.api import requests
 from app.client import Client, connect
-from tests.browser.server import AppServer
+from tests.browser.server import APP, AppServer
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    """One that speaks JSON lines too."""
+    with AppServer((*APP, "--lines", "0")) as server:
+        yield server
 
 
 @pytest.fixture

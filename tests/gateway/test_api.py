@@ -5,11 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-import re
-import socket
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +16,7 @@ import numpy.typing as npt
 import pytest
 
 from app.api import answers, requests, schema
+from app.api.fields import Matrix4
 from app.cli.main import main
 from app.client import AsyncClient, Client, RefusedError, aconnect, connect
 from app.client.files import LostError
@@ -30,66 +28,10 @@ from app.robot.model import RobotModel
 from app.robot.weight import loads_of
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask, websocket
+from tests.gateway.lines import Lines, post, speaking
 
-AT = re.compile(r"JSON lines on 127\.0\.0\.1:(\d+)")
 READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
 THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer((*APP, "--lines", "0")) as server:
-        yield server
-
-
-class Lines:
-    """A program on the TCP port."""
-
-    def __init__(self, server: AppServer) -> None:
-        found = AT.search(server.output)
-        assert found is not None
-        self.socket = socket.create_connection(("127.0.0.1", int(found[1])), timeout=5.0)
-        self.reader = self.socket.makefile("rb")
-
-    def say(self, **request: Any) -> None:
-        self.raw(json.dumps(request).encode() + b"\n")
-
-    def raw(self, data: bytes) -> None:
-        self.socket.sendall(data)
-
-    def hear(self) -> dict[str, Any]:
-        line = self.reader.readline()
-        assert line, "the line was closed"
-        heard: dict[str, Any] = json.loads(line)
-        return heard
-
-    def answer(self, **request: Any) -> dict[str, Any]:
-        self.say(**request, id="x")
-        while (heard := self.hear()).get("id") != "x":
-            pass
-        return heard
-
-    def ends(self) -> bool:
-        with suppress(ConnectionError):
-            while self.reader.readline():
-                pass
-        return True
-
-
-@contextmanager
-def speaking(server: AppServer, name: str = "Lines") -> Iterator[Lines]:
-    lines = Lines(server)
-    with lines.socket, lines.reader:
-        lines.say(do="hello", name=name)
-        assert lines.hear()["is"] == "welcome"
-        yield lines
-
-
-def post(server: AppServer, program: str = "a-test-that-posts", **request: Any) -> tuple[int, Any]:
-    status, _, body = ask(
-        f"{server.url}/api/v1/do", data=json.dumps(request).encode(), X_Program=program
-    )
-    return status, json.loads(body)
 
 
 def test_a_program_drives_the_joints_and_knows_when_they_are_there(
@@ -393,8 +335,8 @@ def test_where_a_link_is_asked_for_a_program_needs_a_token(tmp_path: Path, capsy
             assert lines.hear()["name"] == "operator, x"
 
 
-def _rows(T: npt.ArrayLike) -> requests.Matrix4:
-    rows: requests.Matrix4 = msgspec.convert(np.asarray(T).tolist(), requests.Matrix4)
+def _rows(T: npt.ArrayLike) -> Matrix4:
+    rows: Matrix4 = msgspec.convert(np.asarray(T).tolist(), Matrix4)
     return rows
 
 

@@ -13,12 +13,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.api import answers, requests
 from app.client import connect as connect_program
-from tests.browser.server import APP, AppServer
+from tests.browser.server import AppServer
 from tests.gateway.client import (
     SUBPROTOCOL,
     UPRIGHT,
@@ -263,12 +262,6 @@ def kept(state: answers.State) -> tuple[Any, ...]:
         state.stopped,
         state.moving,
     )
-
-
-@pytest.fixture
-def server() -> Any:
-    with AppServer((*APP, "--lines", str(0))) as server:
-        yield server
 
 
 def test_nothing_falls_and_nothing_moves(server: AppServer) -> None:

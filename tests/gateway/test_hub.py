@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.api.requests import Rates
+from app.api.fields import Rates
 from app.control import commands as cmd
 from app.control.choices import Choice
 from app.control.lease import LOST_AFTER, Lease, Role

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -32,10 +31,10 @@ from app.robot.bare import bare
 from app.robot.model import RobotModel
 from app.settings import Settings
 from robot_description import URDF_PATH
-from tests.browser.server import APP, AppServer
+from tests.browser.server import AppServer
 from tests.exchange.conftest import GANTRY
 from tests.gateway.client import ask
-from tests.gateway.test_api import Lines, post, speaking
+from tests.gateway.lines import Lines, post, speaking
 
 THERE = {"axis_1": 0.4, "axis_2": -1.0, "axis_3": 1.3, "axis_4": 0.3, "axis_5": -0.5}
 AXES = {"axis_1": (0, 0, 1), "axis_5": (1, 0, 0)}
@@ -246,12 +245,6 @@ def test_what_slides_has_a_translation_along_its_axis(session: Session) -> None:
         nodes.command(
             state, [setting("turn", "rotation", [*gantry.axis(gantry.joints["turn"]), 1])]
         )
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer((*APP, "--lines", "0")) as server:
-        yield server
 
 
 def arrived(lines: Lines, ticket: int) -> None:

@@ -6,7 +6,6 @@ import json
 import math
 import re
 import subprocess
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,16 +14,10 @@ import pytest
 from app.kinematics.inverse import inverse
 from app.kinematics.tool import ToolTarget
 from app.robot.model import RobotModel
-from tests.browser.server import APP, ROOT, AppServer
+from tests.browser.server import ROOT, AppServer
 from tests.gateway import octave
 
 OCTAVE = octave.find()
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer((*APP, "--lines", "0")) as server:
-        yield server
 
 
 def told_by(server: AppServer, script: str) -> dict[str, Any]:

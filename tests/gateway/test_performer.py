@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from app.api.requests import Order
+from app.api.fields import Order
 from app.control import commands as cmd
 from app.control.lease import Role
 from app.control.session import Session

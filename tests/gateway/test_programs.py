@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from app.api import answers, requests
-from app.api.requests import Order
+from app.api.fields import Order
 from app.client import Client, RefusedError, connect
 from tests.browser.server import AppServer
 

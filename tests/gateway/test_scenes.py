@@ -15,6 +15,7 @@ import pytest
 import trimesh
 
 from app.api import answers, requests
+from app.api.fields import Matrix4
 from app.cli.assembly import described
 from app.cli.furnishing import furnished
 from app.client import Client, RefusedError, connect
@@ -236,6 +237,6 @@ def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path)
             furnished(robot, None, [told])
 
 
-def _rows(T: Any) -> requests.Matrix4:
+def _rows(T: Any) -> Matrix4:
     a, b, c, d = (tuple(row) for row in np.asarray(T).tolist())
     return a, b, c, d

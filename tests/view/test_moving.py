@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 import viser
 
 from app.control.choices import Choice
-from app.control.commands import SetJoints, TakeBranch
+from app.control.commands import Command, SetJoints
 from app.control.session import Session
 from app.control.state import State
 from app.geometry import so3
@@ -19,6 +18,7 @@ from app.robot.conduit import Stretch
 from app.robot.model import RobotModel
 from app.view.branches import INTERVAL, BranchList
 from app.view.conduit import poses
+from app.view.controls import Clickable
 from app.view.scene import FrameTree
 
 
@@ -65,7 +65,7 @@ def test_branches_are_looked_for_once_a_second_while_the_arm_moves(
         looked.append(state)
         return session.choices(state)
 
-    def listen(_handle: Any, _say: Callable[[], TakeBranch]) -> None:
+    def listen(_handle: Clickable, _say: Callable[[], Command]) -> None:
         return
 
     rest = session.begin(session.ready, 0.0, 0.0)

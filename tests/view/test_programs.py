@@ -10,7 +10,7 @@ import pytest
 import viser
 
 from app.api.answers import Progress as Told
-from app.api.requests import Order
+from app.api.fields import Order
 from app.control.session import Session
 from app.exchange.scripts import Scripts
 from app.kinematics.forward import forward

@@ -1,0 +1,106 @@
+"""What requests are made of: what they have in common, and what their fields can be."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+VERSION = 1
+
+ROOT = f"/api/v{VERSION}"
+"""Where the API is by HTTP."""
+
+LARGEST = 1024
+"""Bytes of a request."""
+
+FASTEST_LINEAR = 0.5
+"""[m/s] More than the arm can do; anything beyond is nobody's wish."""
+
+FASTEST_ANGULAR = 3.0
+"""[rad/s] Likewise."""
+
+SLOWEST, FASTEST = 0.05, 1.0
+"""Share of full speed."""
+
+LEAST_SHARE = 0.01
+"""Of its own speed that a program can be run at."""
+
+MOST_STATES = 100
+"""States a second that one can be told: as many as there are."""
+
+MOST_JOINTS = 32
+
+Rates = tuple[float, float, float, float, float]
+"""Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
+
+Vector3 = tuple[float, float, float]
+Row = tuple[float, float, float, float]
+Matrix4 = tuple[Row, Row, Row, Row]
+
+LONGEST_PRESS = 64
+"""Characters that tell one press of STOP from another."""
+
+Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
+Press = Annotated[str, Meta(min_length=1, max_length=LONGEST_PRESS)] | None
+Name = Annotated[str, Meta(min_length=1, max_length=40)]
+FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
+NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
+Key = Annotated[str, Meta(pattern="^[0-9a-f]{1,64}$")]
+
+
+class Frame(Enum):
+    """Whose coordinates a pose is in."""
+
+    SHOULDER = "shoulder"
+    """The paper's frame {S}, where axes 1 and 2 cross."""
+    BASE = "base"
+    """On the table under the control box."""
+
+
+class Form(Enum):
+    """What a thing counts as where contacts are looked for."""
+
+    BOX = "box"
+    CYLINDER = "cylinder"
+    SPHERE = "sphere"
+    MESH = "mesh"
+    """A file that was uploaded; it counts as its convex hull."""
+
+
+class Mount(Enum):
+    """What a thing can be fixed to."""
+
+    HAND = "hand"
+    """It goes with the hand, whatever the fingers do, and counts as a part of it."""
+    WORLD = "world"
+    """It stays where it is."""
+    TABLE = "table"
+    """Likewise, once it is put down upright on the table below."""
+
+
+class Order(Enum):
+    """What a program can be told."""
+
+    RUN = "run"
+    STEP = "step"
+    """Run one step, then wait."""
+    PAUSE = "pause"
+    RESUME = "resume"
+    HALT = "halt"
+    """Come to rest and end it."""
+
+
+class Request(
+    msgspec.Struct,
+    frozen=True,
+    forbid_unknown_fields=True,
+    kw_only=True,
+    tag_field="do",
+    tag=str.lower,
+):
+    """Any of them; ``do`` is the name of the class in small letters."""
+
+    id: Id = None

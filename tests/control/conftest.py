@@ -1,0 +1,30 @@
+"""What tests of the session begin with: an arm at rest, and a cup in its way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.collision.shape import cylinder, half_space
+from app.collision.world import World, obstacle
+from app.control.session import Session
+from app.control.state import State
+from app.geometry import se3
+from app.robot.collision import world_of
+from app.robot.model import RobotModel
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    """The arm at rest in its ready posture."""
+    return session.begin(session.ready, 0.0, 0.0)
+
+
+@pytest.fixture(scope="session")
+def world(model: RobotModel) -> World:
+    """The arm on its table, a cup before it."""
+    found, _ = world_of(model)
+    assert found is not None
+    cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
+    cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
+    return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])

@@ -1,0 +1,67 @@
+"""Programs by hand: a line of JSON at a time on the TCP port, or a request over HTTP."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from tests.browser.server import AppServer
+from tests.gateway.client import ask
+
+AT = re.compile(r"JSON lines on 127\.0\.0\.1:(\d+)")
+
+
+class Lines:
+    """A program on the TCP port of a server with ``--lines``."""
+
+    def __init__(self, server: AppServer) -> None:
+        found = AT.search(server.output)
+        assert found is not None
+        self.socket = socket.create_connection(("127.0.0.1", int(found[1])), timeout=5.0)
+        self.reader = self.socket.makefile("rb")
+
+    def say(self, **request: Any) -> None:
+        self.raw(json.dumps(request).encode() + b"\n")
+
+    def raw(self, data: bytes) -> None:
+        self.socket.sendall(data)
+
+    def hear(self) -> dict[str, Any]:
+        line = self.reader.readline()
+        assert line, "the line was closed"
+        heard: dict[str, Any] = json.loads(line)
+        return heard
+
+    def answer(self, **request: Any) -> dict[str, Any]:
+        self.say(**request, id="x")
+        while (heard := self.hear()).get("id") != "x":
+            pass
+        return heard
+
+    def ends(self) -> bool:
+        with suppress(ConnectionError):
+            while self.reader.readline():
+                pass
+        return True
+
+
+@contextmanager
+def speaking(server: AppServer, name: str = "Lines") -> Iterator[Lines]:
+    """One that has said who it is."""
+    lines = Lines(server)
+    with lines.socket, lines.reader:
+        lines.say(do="hello", name=name)
+        assert lines.hear()["is"] == "welcome"
+        yield lines
+
+
+def post(server: AppServer, program: str = "a-test-that-posts", **request: Any) -> tuple[int, Any]:
+    """Status and answer of a single request over HTTP."""
+    status, _, body = ask(
+        f"{server.url}/api/v1/do", data=json.dumps(request).encode(), X_Program=program
+    )
+    return status, json.loads(body)
