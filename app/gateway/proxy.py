@@ -39,7 +39,7 @@ PICTURES = 1000.0
 """A second, that go to all browsers together: what a core can send them. A crowd shares them; who
 drives is not asked to."""
 
-UNASKED = 1.0 / 60.0
+FRAME = 1.0 / 60.0
 """[s] Pictures come no faster anyway."""
 
 LOOK_AGAIN = 0.1
@@ -125,6 +125,7 @@ class _Line:
         self._sending = asyncio.Lock()
         self._drags: set[str] = set()
         self._told_at = float("-inf")
+        self._due = float("-inf")
         window = hub.window(key)
         who = window.person.name if window is not None else "a window without our page"
         self._firewall = Firewall(guard, who, self._drags, self._drive, self._steer, hub.clock())
@@ -153,7 +154,7 @@ class _Line:
             assert isinstance(frame, bytes)
             await self._send(frame, age)
             sent_at = self._hub.clock()
-            pause = self._pause()
+            pause = self._pause(sent_at)
             if pause > 0.0 or not self._flow.has_room(sent_at):
                 self._valve.let(False)
                 await asyncio.sleep(pause)
@@ -169,12 +170,15 @@ class _Line:
                 async with asyncio.timeout(LOOK_AGAIN):
                     await self._room.wait()
 
-    def _pause(self) -> float:
+    def _pause(self, t: float) -> float:
         """[s] Before the next picture, so that a crowd leaves time for whoever drives."""
         holder = self._hub.lease.holder
         share = self._hub.watching / PICTURES
-        drives = holder is not None and holder.key == self._key
-        return 0.0 if drives or share <= UNASKED else share
+        if share <= FRAME or (holder is not None and holder.key == self._key):
+            return 0.0
+        self._due = max(self._due + share, t)
+        # Pictures come one by one: the one that is nearest to when it is due is taken.
+        return max(self._due - 0.5 * FRAME - t, 0.0)
 
     async def _up(self) -> None:
         """What the firewall lets pass."""
