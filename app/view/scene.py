@@ -118,7 +118,7 @@ def _as_made(
     )
 
 
-COAT = 1e-3
+COAT = 2e-3
 """[m] The ghost is this much thicker than the arm: where both are in one place it coats the arm
 instead of flickering in it."""
 
