@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 import viser
 import zstandard
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
@@ -137,7 +137,7 @@ class _Line:
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
-                with suppress(ConnectionClosed, WebSocketDisconnect):
+                with suppress(ConnectionClosed, WebSocketDisconnect, WebSocketDisconnected):
                     task.result()
         finally:
             for task in tasks:
