@@ -31,7 +31,6 @@ LONGEST = 4096
 class _Sent(NamedTuple):
     t: float
     size: int
-    age: float
 
 
 class Flow:
@@ -47,10 +46,10 @@ class Flow:
         self.counts = False
         """Whether the browser says what it has seen: our page does, other programs do not."""
 
-    def sent(self, size: int, t: float, age: float = 0.0) -> None:
-        """One more frame of ``size`` bytes was sent at ``t``, when it was ``age`` old already."""
+    def sent(self, size: int, t: float) -> None:
+        """One more frame of ``size`` bytes was sent at ``t``."""
         self._sent += 1
-        self._on_the_way.append(_Sent(t, size, age))
+        self._on_the_way.append(_Sent(t, size))
         self._bytes += size
 
     def seen(self, count: int, t: float) -> bool:
@@ -85,8 +84,7 @@ class Flow:
         """How old the oldest frame is that was sent and is not on the screen; 0 without."""
         if not (self.counts and self._on_the_way):
             return 0.0
-        oldest = self._on_the_way[0]
-        return t - oldest.t + oldest.age
+        return t - self._on_the_way[0].t
 
     def has_room(self, t: float) -> bool:
         """Whether another frame may be sent."""

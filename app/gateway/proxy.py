@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 import time
 from contextlib import suppress
 from typing import Any
@@ -23,17 +22,13 @@ from app.gateway.door import NOT_YOU, Door
 from app.gateway.firewall import Firewall, Ruling, Verdict
 from app.gateway.flow import Flow
 from app.gateway.hub import Hub, key_of
-from app.view.frames import VALVE_HEADER, Valve
+from app.view.frames import HATCH_HEADER, Hatch
 from app.view.guard import Guard
 from app.view.server import KEY_HEADER
 
 log = logging.getLogger(__name__)
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
-
-BUFFER = 4_096
-"""Bytes that may wait in the machine between viser and us: what waits there is not replaced by
-what is newer."""
 
 PICTURES = 1000.0
 """A second, that go to all browsers together: what a core can send them. A crowd shares them; who
@@ -77,13 +72,12 @@ class Proxy:
         # Without our page around it viser can be looked at, and no more.
         key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
         self._open += 1
-        valve = Valve()
+        hatch = Hatch()
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
-                sock=await _narrow_socket(self._port),
                 subprotocols=[SUBPROTOCOL],
-                additional_headers={KEY_HEADER: self._key, VALVE_HEADER: valve.name},
+                additional_headers={KEY_HEADER: self._key, HATCH_HEADER: hatch.name},
                 user_agent_header=None,
                 compression=None,
                 max_size=None,
@@ -91,7 +85,7 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                line = _Line(self._hub, self._guard, browser, upstream, valve, key)
+                line = _Line(self._hub, self._guard, browser, upstream, hatch, key)
                 if not await self._door.while_welcome(
                     lambda: self._door.visitor(browser.cookies), line.run()
                 ):
@@ -112,11 +106,11 @@ class _Line:
         guard: Guard,
         browser: WebSocket,
         upstream: ClientConnection,
-        valve: Valve,
+        hatch: Hatch,
         key: str,
     ) -> None:
         self._hub = hub
-        self._valve = valve
+        self._hatch = hatch
         self._browser = browser
         self._upstream = upstream
         self._key = key
@@ -133,7 +127,8 @@ class _Line:
     async def run(self) -> None:
         """Until either side closes."""
         self._hub.show(self._key, self._flow, self._drags)
-        tasks = [asyncio.create_task(each) for each in (self._down(), self._up())]
+        ways = (self._down(), self._up(), self._upstream.wait_closed())
+        tasks = [asyncio.create_task(way) for way in ways]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
@@ -149,19 +144,10 @@ class _Line:
 
     async def _down(self) -> None:
         """Pictures, as fast as the browser sees them."""
-        age = 0.0
-        async for frame in self._upstream:
-            assert isinstance(frame, bytes)
-            await self._send(frame, age)
-            sent_at = self._hub.clock()
-            pause = self._pause(sent_at)
-            if pause > 0.0 or not self._flow.has_room(sent_at):
-                self._valve.let(False)
-                await asyncio.sleep(pause)
-                await self._wait_for_room()
-                self._valve.let(True)
-            # The next one may have passed the valve just before it was shut.
-            age = self._hub.clock() - sent_at
+        while True:
+            await self._send(await self._hatch.take())
+            await asyncio.sleep(self._pause(self._hub.clock()))
+            await self._wait_for_room()
 
     async def _wait_for_room(self) -> None:
         while not self._flow.has_room(self._hub.clock()):
@@ -177,8 +163,7 @@ class _Line:
         if share <= FRAME or (holder is not None and holder.key == self._key):
             return 0.0
         self._due = max(self._due + share, t)
-        # Pictures come one by one: the one that is nearest to when it is due is taken.
-        return max(self._due - 0.5 * FRAME - t, 0.0)
+        return self._due - t
 
     async def _up(self) -> None:
         """What the firewall lets pass."""
@@ -211,10 +196,10 @@ class _Line:
             window.tell({"is": "refused", "why": verdict.refusal})
         return True
 
-    async def _send(self, frame: bytes, age: float = 0.0) -> None:
+    async def _send(self, frame: bytes) -> None:
         async with self._sending:
             await self._browser.send_bytes(frame)
-            self._flow.sent(len(frame), self._hub.clock(), age)
+            self._flow.sent(len(frame), self._hub.clock())
 
     def _drive(self) -> None:
         if not self._key:
@@ -226,15 +211,6 @@ class _Line:
         if window is None:
             raise LeaseError("Open the front page to run programs.")
         self._hub.performer.touch(window)
-
-
-async def _narrow_socket(port: int) -> socket.socket:
-    """A connection to viser in which little can wait."""
-    line = socket.socket()
-    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
-    line.setblocking(False)
-    await asyncio.get_running_loop().sock_connect(line, ("127.0.0.1", port))
-    return line
 
 
 def _frame(messages: tuple[Any, ...]) -> bytes:

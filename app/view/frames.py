@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -28,42 +29,55 @@ FRESH = 0.03
 ALIGNED = 8
 """Bytes: arrays begin at multiples of it."""
 
+HATCH_HEADER = "X-Katana450-Hatch"
+"""Header in which the gateway names the hatch of a browser's line."""
 
-VALVE_HEADER = "X-Katana450-Valve"
-"""Header in which the gateway names the valve of a browser's line."""
 
+class Hatch:
+    """Where the frames for one browser come out: in the gateway's thread, one when one is wanted.
 
-class Valve:
-    """Holds back what would only wait on the way to one browser.
-
-    A frame that is made says what is so by then; one that waits grows old. The gateway shuts and
-    opens it from its own thread.
+    A frame that is made says what is so by then, and one that waits grows old; so none is made
+    before. It is given from hand to hand, since a socket in between would cost a crowd as much as
+    all the rest of its way.
     """
 
     def __init__(self) -> None:
+        """In the loop of whoever takes the frames."""
         self.name = secrets.token_hex(16)
-        self._is_open = True
-        self._changed = asyncio.Event()
-        self._loop: asyncio.AbstractEventLoop | None = None
-        _valves[self.name] = self
+        self._frames: deque[bytes] = deque()
+        self._taker = asyncio.get_running_loop()
+        self._giver: asyncio.AbstractEventLoop | None = None
+        self._came = asyncio.Event()
+        self._wanted = asyncio.Event()
+        _hatches[self.name] = self
 
-    def let(self, is_open: bool) -> None:
-        """Open it or shut it. For any thread."""
-        self._is_open = is_open
-        if self._loop is not None:
-            with suppress(RuntimeError):  # viser's loop may have ended
-                self._loop.call_soon_threadsafe(self._changed.set)
+    async def take(self) -> bytes:
+        """The next frame; in the taker's loop."""
+        while not self._frames:
+            self._came.clear()
+            if self._giver is not None:
+                _signal(self._giver, self._wanted)
+            await self._came.wait()
+        return self._frames.popleft()
 
-    async def passed(self) -> None:
-        """Return while it is open; in viser's loop."""
-        # Known before the look, so that whoever opens it after the look is heard.
-        self._loop = asyncio.get_running_loop()
-        while not self._is_open:
-            self._changed.clear()
-            await self._changed.wait()
+    def open(self) -> None:
+        """Say that frames come, the first of them unasked; in the giver's loop."""
+        self._giver = asyncio.get_running_loop()
+
+    async def give(self, frame: bytes) -> None:
+        """Give ``frame``, and return when another one is wanted; in the giver's loop."""
+        self._wanted.clear()
+        self._frames.append(frame)
+        _signal(self._taker, self._came)
+        await self._wanted.wait()
 
 
-_valves: WeakValueDictionary[str, Valve] = WeakValueDictionary()
+def _signal(loop: asyncio.AbstractEventLoop, event: asyncio.Event) -> None:
+    with suppress(RuntimeError):  # the loop may have ended
+        loop.call_soon_threadsafe(event.set)
+
+
+_hatches: WeakValueDictionary[str, Hatch] = WeakValueDictionary()
 
 
 class _Packed(NamedTuple):
@@ -116,14 +130,15 @@ class Packer:
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
     """Send a browser the windows of a buffer, as viser's own producer of this name does."""
     packer = buffer.__dict__.setdefault("packer", Packer())
-    valve = _valves.get(line.request.headers.get(VALVE_HEADER, ""))
+    hatch = _hatches.get(line.request.headers.get(HATCH_HEADER, ""))
+    send = line.send
+    if hatch is not None:
+        hatch.open()
+        send = hatch.give
     windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
     try:
         async for window in windows:
-            await line.send(packer.frame(window))
-            # What is for one browser alone is an answer, and does not repeat itself.
-            if valve is not None and buffer.persistent_messages:
-                await valve.passed()
+            await send(packer.frame(window))
     finally:
         # An unfinished one would keep what it has not sent.
         await windows.aclose()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import secrets
-import socket
 from typing import Any
 
 import viser
@@ -16,9 +15,6 @@ from app.view.cameras import FOV, LOOKS, Preset
 
 KEY_HEADER = "X-Katana450-Key"
 """Header in which the gateway shows the key."""
-
-UNSENT = 4096
-"""Bytes that may wait on their way to the gateway: a handful of frames."""
 
 
 def open_server(key: str) -> viser.ViserServer:
@@ -64,19 +60,10 @@ class _Lock:
         shown = line.request.headers.get(KEY_HEADER, "") if line.request else ""
         if secrets.compare_digest(shown.encode(), self._key.encode()):
             self._friends.add(connection.client_id)
-            _narrow(line.transport)
             return
         # What it has sent already would still be read.
         connection._handle_incoming_message = _ignore
         await line.close(1008, "Not here: the page is at another port.")
-
-
-def _narrow(transport: Any) -> None:
-    """Let little wait in the machine: what viser still holds it replaces by what is newer."""
-    transport.set_write_buffer_limits(high=UNSENT)
-    if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-        line = transport.get_extra_info("socket")
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
 
 
 async def _ignore(_client_id: Any, _message: Any) -> None:

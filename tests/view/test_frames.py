@@ -5,6 +5,9 @@ from __future__ import annotations
 import asyncio
 import importlib.util
 import sys
+import threading
+from contextlib import suppress
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -36,10 +39,10 @@ def visers_own(monkeypatch: pytest.MonkeyPatch) -> Any:
 class Line:
     """Takes in what is sent."""
 
-    def __init__(self, valve: frames.Valve | None = None) -> None:
+    def __init__(self, hatch: frames.Hatch | None = None) -> None:
         self.heard: list[bytes] = []
         self.request = SimpleNamespace(
-            headers={} if valve is None else {frames.VALVE_HEADER: valve.name}
+            headers={} if hatch is None else {frames.HATCH_HEADER: hatch.name}
         )
 
     async def send(self, frame: bytes) -> None:
@@ -112,16 +115,20 @@ def test_a_crowd_is_sent_frames_that_were_packed_once(monkeypatch: pytest.Monkey
     assert all(line.heard == lines[0].heard for line in lines)
 
 
-def test_behind_a_shut_valve_nothing_waits_but_the_newest() -> None:
-    valve = frames.Valve()
-    line, other = Line(valve), Line()
+def test_what_is_not_taken_gives_way_to_what_is_newer() -> None:
+    async def take(hatch: frames.Hatch) -> list[float]:
+        told = opened(await hatch.take())[0]["messages"]
+        return [message["position"][0] for message in told]
 
-    async def act() -> None:
-        buffer = AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
-        tasks = [
-            asyncio.create_task(frames.produce(each, buffer, number))
-            for number, each in enumerate((line, other))
-        ]
+    async def act(viser: asyncio.AbstractEventLoop) -> None:
+        hatch = frames.Hatch()
+
+        async def begin() -> tuple[Any, Any]:
+            buffer = AsyncMessageBuffer(viser, persistent_messages=True)
+            return buffer, asyncio.create_task(frames.produce(Line(hatch), buffer, 1))
+
+        there = partial(asyncio.run_coroutine_threadsafe, loop=viser)
+        buffer, producing = await asyncio.wrap_future(there(begin()))
 
         async def push(*xs: float) -> None:
             for x in xs:
@@ -129,23 +136,33 @@ def test_behind_a_shut_valve_nothing_waits_but_the_newest() -> None:
                 buffer.flush()
                 await asyncio.sleep(0.05)
 
-        await push(1.0)
-        valve.let(False)
-        # One may be on its way already.
-        await push(2.0, 3.0, 4.0)
-        assert len(line.heard) <= 2
-        assert len(other.heard) == 4
-        before = len(line.heard)
-        await asyncio.to_thread(valve.let, True)
+        await push(1.0, 2.0, 3.0)
+        assert await take(hatch) == [1.0]
+        assert await take(hatch) == [3.0]
+        waiting = asyncio.create_task(take(hatch))
         await asyncio.sleep(0.1)
-        told = [opened(frame)[0]["messages"] for frame in line.heard[before:]]
-        assert [[each["position"][0] for each in messages] for messages in told] == [[4.0]]
-        await push(5.0)
-        assert len(line.heard) == before + 2
-        buffer.set_done()
-        await asyncio.gather(*tasks)
+        assert not waiting.done()
+        await push(4.0, 5.0)
+        assert await waiting == [4.0]
+        assert await take(hatch) == [5.0]
 
-    asyncio.run(act())
+        async def end() -> None:
+            producing.cancel()
+            with suppress(asyncio.CancelledError):
+                await producing
+
+        await asyncio.wrap_future(there(end()))
+
+    # As in the app: viser has a thread of its own.
+    viser = asyncio.new_event_loop()
+    thread = threading.Thread(target=viser.run_forever)
+    thread.start()
+    try:
+        asyncio.run(act(viser))
+    finally:
+        viser.call_soon_threadsafe(viser.stop)
+        thread.join()
+        viser.close()
 
 
 def test_what_a_message_says_later_is_sent_later() -> None:
