@@ -213,7 +213,14 @@
   // The rest of the bar
 
   byId("reset").addEventListener("click", () => say({ do: "reset" }));
-  byId("help-button").addEventListener("click", () => byId("help").showModal());
+  // Below the bar and not modal: STOP must be there for a mouse and a finger too.
+  const [help, helpButton] = [byId("help"), byId("help-button")];
+  helpButton.addEventListener("click", () => {
+    if (help.open) return help.close();
+    help.show();
+    helpButton.setAttribute("aria-expanded", "true");
+  });
+  help.addEventListener("close", () => helpButton.setAttribute("aria-expanded", "false"));
   function show(id, shown) {
     byId(id).hidden = !shown;
     byId(`${id}-button`).setAttribute("aria-expanded", String(shown));

@@ -172,7 +172,7 @@ class Performer:
         if hub.stopped is not None:
             self._leave_with(Phase.STOPPED, hub.stopped.why)
         elif arm is not None and arm.caught_up:
-            self._run, commands = runner.step(program, self._run, arm.state)
+            self._run, commands = runner.step(program, self._run, arm.state, t)
             self._tell(*commands)
             if self._run.phase is not Phase.RUNNING:
                 self._leave_with(self._run.phase, self._run.why)
@@ -241,7 +241,7 @@ class Performer:
         self._self, self._owner, self._seen = joined, window, hub.clock()
         arm = hub.present()
         self._speed = arm.state.speed
-        self._run = Run(arm.state.t, single=single)
+        self._run = Run(self._seen, single=single)
         log.info("%s runs the program %s.", window.person.name, program.name)
 
     def _plan(self, planning: _Planning, text: str, speed: float, rig: Rig, state: State) -> None:

@@ -13,7 +13,7 @@ MEASURES: Final = {
     "path_length_mm": "of the tool on its paths",
     "smallest_singular_value": "of the Jacobian, translations by the characteristic length",
     "margin_to_limits_deg": "the least of any joint, on the whole run",
-    "nearest_clearance_mm": "between any two parts, on all plans",
+    "nearest_clearance_mm": "between any two parts, on all plans but those that lift something off",
     "greatest_speed_share": "of any joint, of its most",
     "greatest_acceleration_share": "of any joint, over two ticks, of its most",
     "greatest_jerk_share": "of any joint, over three ticks, of its most",

@@ -27,6 +27,7 @@ class PourDemo:
         )
         return f"""\
 name: Pour
+about: The paper's second experiment; a full cup is carried and emptied into a basin.
 frame: base
 tool: grasp
 steps:

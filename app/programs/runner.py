@@ -53,11 +53,15 @@ class Progress:
     why: str
 
 
-def step(program: Program, run: Run, state: State) -> tuple[Run, tuple[cmd.Command, ...]]:
-    """The run after ``state``, which has all commands in it, and what the arm is told now."""
+def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple[cmd.Command, ...]]:
+    """The run after ``state``, which has all commands in it, and what the arm is told now.
+
+    t: now [s], on the clock of ``run.t``. An arm at rest tells nothing new, so that the time of its
+    newest state stands still.
+    """
     if run.phase is not Phase.RUNNING:
         return run, ()
-    dt, run = state.t - run.t, replace(run, t=state.t)
+    dt, run = t - run.t, replace(run, t=t)
     if state.halted is not None:
         return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
     if any(finding.reason is Reason.INTERNAL for finding in state.findings):

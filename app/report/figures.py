@@ -46,6 +46,9 @@ STYLE = {
 SPREADINGS = 30
 """Until names that would lie on each other lie beside each other."""
 
+PARTS = 200
+"""Of a path, of each of which the largest error is drawn."""
+
 TIME = "time (s)"
 
 
@@ -63,8 +66,8 @@ def path_figure(paths: Sequence[Along]) -> bytes:
     plt = _plt()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(7.2, 3.9))
-        space = figure.add_axes((0.0, 0.0, 0.52, 0.90), projection="3d")
-        panel = figure.add_axes((0.62, 0.15, 0.36, 0.71))
+        space = figure.add_axes((0.0, 0.0, 0.52, 0.92), projection="3d")
+        panel = figure.add_axes((0.62, 0.15, 0.36, 0.76))
         worst = 1e3 * max(float(path.error.max()) for path in paths)
         power = math.floor(math.log10(worst)) if worst > 0.0 else 0
         for number, path in enumerate(paths):
@@ -74,13 +77,15 @@ def path_figure(paths: Sequence[Along]) -> bytes:
             label = {"label": "traced"} if number == 0 else {}
             space.plot(*traced.T, color=AXES[0], linewidth=1.1, **label)
             space.scatter(*wished[0], color=INK, s=14)
-            error = 1e3 * path.error / 10.0**power
-            panel.plot(100.0 * path.sigma, error, color=ERROR, linewidth=0.5)
+        sigma, errors = largest(paths)
+        errors = 1e3 * errors / 10.0**power
+        panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
+        panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
         _equal(space, 1e3 * np.concatenate([path.desired for path in paths]))
         space.set_xlabel("x (mm)")
         space.set_ylabel("y (mm)")
-        space.set_zlabel("z (mm)")
-        figure.text(0.02, 0.89, "Desired and traced path", fontsize=10.0, fontweight="bold")
+        space.set_zlabel("z (mm)", labelpad=9.0)
+        figure.text(0.02, 0.931, "Desired and traced path", fontsize=10.0, fontweight="bold")
         space.legend(loc="upper left", bbox_to_anchor=(0.01, 1.0), ncols=2, fontsize=8.0)
         space.view_init(elev=22.0, azim=-52.0)
         for axis in (space.xaxis, space.yaxis, space.zaxis):
@@ -96,6 +101,19 @@ def path_figure(paths: Sequence[Along]) -> bytes:
         said = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
         panel.annotate(said, (99.0, 1.03 * top), ha="right", va="bottom")
         return _png(plt, figure)
+
+
+def largest(paths: Sequence[Along]) -> tuple[FloatArray, FloatArray]:
+    """sigma (m,) in the middle of PARTS parts of every path, and the largest error there [m].
+
+    Rounding errors jump from place to place: all of them on each other would be a block of colour.
+    """
+    edges = np.linspace(0.0, 1.0, PARTS + 1)
+    most = np.zeros(PARTS)
+    for path in paths:
+        part = np.minimum((PARTS * path.sigma).astype(int), PARTS - 1)
+        np.maximum.at(most, part, path.error)
+    return 0.5 * (edges[:-1] + edges[1:]), most
 
 
 def joints_figure(arm: Arm, trace: Trace) -> bytes:

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from app.collision.clearance import STOP
 from app.control.arm import Arm
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
@@ -65,11 +66,16 @@ class Bound:
         """Whether it is so."""
         return self.value is not None and self.low <= self.value <= self.high
 
-    def __str__(self) -> str:
+    @property
+    def wanted(self) -> str:
+        """The bound in words."""
         wanted = [f"at least {self.low:g}"] if self.low > -np.inf else []
         wanted += [f"at most {self.high:g}"] if self.high < np.inf else []
+        return " and ".join(wanted) or "any"
+
+    def __str__(self) -> str:
         is_now = "was not measured" if self.value is None else f"is {self.value:.3g}"
-        return f"{self.name} {is_now}; expected is {' and '.join(wanted) or 'any'}."
+        return f"{self.name} {is_now}; expected is {self.wanted}."
 
 
 def alongs(program: Program) -> tuple[Along, ...]:
@@ -102,7 +108,10 @@ def measured(program: Program, arm: Arm, trace: Trace) -> dict[str, float | None
     nearest = [
         task.order.plan.nearest.contact.distance
         for task in program.tasks
-        if isinstance(task.order, Go) and task.order.plan.nearest is not None
+        if isinstance(task.order, Go)
+        and task.order.plan.nearest is not None
+        # What is lifted touches the table before.
+        and task.order.plan.nearest.contact.distance >= STOP
     ]
     return {
         "max_position_error_mm": _most(1e3 * errors),

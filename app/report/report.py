@@ -28,7 +28,16 @@ from app.report.trace import Trace
 
 NONE: Mapping[str, bytes] = {}
 
-UNITS = {"_mm_s": "mm/s", "_mm": "mm", "_deg": "deg", "_s": "s"}
+UNITS = {
+    "_m_s3": "m/s³",
+    "_mm_s": "mm/s",
+    "_mm": "mm",
+    "_ml": "ml",
+    "_percent": "%",
+    "_deg": "deg",
+    "_s": "s",
+}
+"""Of a measure, by how its name ends; the longer ends first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +78,7 @@ class Report:
     def lines(self) -> list[str]:
         """The measures as a person reads them."""
         return [
-            f"{_title(name):<32} {_shown(value)} {_unit(name)}".rstrip()
-            for name, value in self.values.items()
+            f"{_title(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
         ]
 
     def json(self, written: datetime) -> str:
@@ -162,11 +170,12 @@ class Report:
         )
         rows = "\n".join(
             f"<tr><th>{_title(name)}<small>{MEASURES[name]}</small></th>"
-            f"<td>{_shown(value)}&nbsp;{_unit(name)}</td></tr>"
+            f"<td>{_with_unit(name, value)}</td></tr>"
             for name, value in self.values.items()
         )
         checks = "\n".join(
-            f'<li class="{"held" if bound.held else "missed"}">{html.escape(str(bound))}</li>'
+            f'<li class="{"held" if bound.held else "missed"}">{_title(bound.name)}: '
+            f"{_with_unit(bound.name, bound.value)}; {bound.wanted}</li>"
             for bound in self.bounds
         )
         said = {
@@ -174,10 +183,13 @@ class Report:
             False: "A bound is missed.",
         }[self.held]
         notes = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
-        facts = " · ".join(f"{name} {value}" for name, value in self.facts.items())
+        facts = " · ".join(
+            f"{name.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{name} {value}"
+            for name, value in self.facts.items()
+        )
         return PAGE.format(
             name=html.escape(self.script.name),
-            about=html.escape(self.script.about),
+            about=f"<p>{html.escape(self.script.about)}</p>" if self.script.about else "",
             verdict=said,
             mood="held" if self.held else "missed",
             figures=shown,
@@ -202,7 +214,8 @@ CAPTIONS = {
         "Desired and traced path in 3D, and the error along it",
         (
             "Left: the path wished for and that of forward kinematics on the planned joints, in "
-            "the shoulder frame; the dot is its start. Right: how far apart they are."
+            "the shoulder frame; dots are where paths start. Right: how far apart they are, the "
+            "most in each half of a percent of all paths."
         ),
     ),
     "joints.png": ("Joint angles over time", "What the arm was told, a hundred times a second."),
@@ -244,7 +257,7 @@ ul {{ padding-left: 1.2rem; }}
 footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 </style>
 <h1>{name}</h1>
-<p>{about}</p>
+{about}
 <p class="verdict {mood}">{verdict}</p>
 {notes}
 {figures}
@@ -270,7 +283,10 @@ def _title(name: str) -> str:
     return name.removesuffix(end).replace("_", " ").capitalize()
 
 
-def _shown(value: float | None) -> str:
-    if value is None:
-        return "none"
+def _with_unit(name: str, value: float | None) -> str:
+    """A measure as a person reads it."""
+    return "none" if value is None else f"{_shown(value)} {_unit(name)}".rstrip()
+
+
+def _shown(value: float) -> str:
     return f"{value:.2e}" if value != 0.0 and abs(value) < 1e-3 else f"{value:.4g}"

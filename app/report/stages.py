@@ -37,7 +37,7 @@ FOV = float(np.deg2rad(36.0))
 ON_TABLE = (1.06, 0.66, 0.70), (0.19, 0.04, 0.21)
 """[m] From where cup, basin and hand are seen, and what is looked at."""
 
-ON_PATH = (0.80, -0.86, 0.60), (0.07, 0.0, 0.22)
+ON_PATH = (0.88, -0.95, 0.66), (0.13, -0.02, 0.185)
 """[m] The same for a path before the arm."""
 
 CLOSING = ": close"

@@ -75,7 +75,7 @@ class Rehearsal:
             t = len(self._seen) * self._period
             if t > LONGEST:
                 raise InputError(f"The program takes more than {LONGEST / 3600.0:g} hours.")
-            self.run, commands = runner.step(self._program, self.run, state)
+            self.run, commands = runner.step(self._program, self.run, state, state.t)
             state = self._session.step(state, commands, t)
             sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
             state = self._session.observe(state, sent.q, sent.gripper)

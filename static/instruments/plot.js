@@ -6,6 +6,7 @@ import { clamp, html, set, signed, write } from "./shape.js";
 const MARGIN = { left: 42, right: 8, top: 8, bottom: 18 }; // px
 const LINE_HEIGHT = 24; // px between lines across, about; and one for each so many seconds:
 const APART = { 10: 2, 30: 5, 120: 20 };
+const LABEL_WIDTH = 56; // px for the time below a line; the outermost ones are not centred
 const COLOURS_KEPT = 500; // ms
 const SERIES = 5; // colours in instruments.css; more lines have them again
 const READ_BY = 0.01; // share of the width a key moves the cursor
@@ -177,10 +178,13 @@ export class Plot {
       pen.fillText(signed(value, digits(axis.by)), box.left - 6, at);
     }
     pen.textBaseline = "alphabetic";
+    const room = ((box.right - box.left) * APART[span]) / span;
+    const told = APART[span] * Math.ceil(LABEL_WIDTH / room);
     for (let back = 0; back <= span; back += APART[span]) {
       const at = Math.round(box.right - ((box.right - box.left) * back) / span) - 0.5;
       pen.moveTo(at, box.top);
       pen.lineTo(at, box.bottom);
+      if (back % told) continue;
       pen.textAlign = back === 0 ? "right" : back === span ? "left" : "center";
       pen.fillText(back > 0 ? `−${back} s` : end === null ? "now" : "paused", at, box.bottom + 14);
     }

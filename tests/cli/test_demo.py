@@ -112,7 +112,11 @@ def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     for one, other in itertools.combinations(shown, 2):
         # At least the hand is elsewhere.
         assert (np.abs(one - other).sum(axis=2) > 60).mean() > 0.005
+    found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    # The cup on the table, before it is lifted, is no clearance of the arm's.
+    assert 6.0 < found["nearest_clearance_mm"] < 60.0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Emptied: 100 %; at least 99" in page
     captions = ("Initial configuration", "Grasping the cup", "Approaching the", "Emptying the cup")
     places = [page.index(caption) for caption in captions]
     assert places == sorted(places)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from app.control.session import Session
 from app.errors import LeaseError
 from app.gateway.hub import Window
 from app.programs.bench import Rig
+from app.programs.order import PATIENCE
 from tests.gateway.test_hub import PAGES, Table
 
-SCRIPT = "name: Wave\nsteps:\n  - wait: 0.05\n  - joints: [20, -60, 80, 8, 0]\n"
+SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 
 class Staged(Table):
@@ -31,9 +33,9 @@ class Staged(Table):
         told = self.hub.performer.told()
         return "" if told is None else told.status
 
-    def plan(self, window: Window) -> None:
+    def plan(self, window: Window, script: str = SCRIPT) -> None:
         """And wait for the thread that does it."""
-        self.hub.performer.script(window, SCRIPT, more=False, speed=1.0)
+        self.hub.performer.script(window, script, more=False, speed=1.0)
         due = time.monotonic() + 10.0
         while self.status == "planning" and time.monotonic() < due:
             time.sleep(0.005)
@@ -58,6 +60,35 @@ def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
     assert any(isinstance(command, cmd.SpeedScale) for command in table.arm.commands)
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         table.hub.drive(window.person.key)
+
+
+def test_time_passes_for_it_while_the_arm_tells_nothing_new(table: Staged) -> None:
+    """An arm at rest shows the state in which it came to rest, its time included."""
+    window = table.join(PAGES[0])
+    table.plan(window)
+    table.hub.performer.steer(window, Order.RUN)
+    table.wait(29.0, window)
+    assert not any(isinstance(command, cmd.Follow) for command in table.arm.commands)
+    table.wait(2.0, window)
+    assert any(isinstance(command, cmd.Follow) for command in table.arm.commands)
+
+
+def test_a_pause_takes_nobodys_patience(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window, "steps:\n  - gripper: open\n")
+    table.hub.performer.steer(window, Order.RUN)
+    rest = table.arm.rest
+    table.arm.rest = replace(rest, gripper_goal=rest.gripper_goal + 0.5)
+    table.wait(0.1, window)
+    # The fingers rest on their way, and nothing new is shown before they are told to go on.
+    table.arm.rest = replace(table.arm.rest, paused=True)
+    table.wait(2.0 * PATIENCE, window)
+    assert table.status == "paused"
+    table.arm.rest = replace(table.arm.rest, t=rest.t + 2.0 * PATIENCE + 0.1, paused=False)
+    table.wait(0.1, window)
+    assert table.status == "running"
+    table.wait(PATIENCE, window)
+    assert table.status == "failed"
 
 
 def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> None:

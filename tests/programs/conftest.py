@@ -34,7 +34,7 @@ class Stage:
         return self.session.begin(self.session.ready, 0.0, 0.0)
 
     def tick(self, program: Program, run: Run, state: State) -> tuple[Run, State]:
-        run, commands = runner.step(program, run, state)
+        run, commands = runner.step(program, run, state, state.t)
         state = self.session.step(state, commands, state.t + TICK)
         return run, self.session.observe(state, state.setpoint, state.gripper_setpoint)
 
