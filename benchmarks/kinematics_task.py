@@ -72,15 +72,3 @@ class Solver(Protocol):
     def joints(self, found: Any) -> FloatArray:
         """(k, 5) every exact answer in what `solve` returned [rad]; k may be 0."""
         ...
-
-
-class BatchSolver(Protocol):
-    """A solver of many poses in one call; only `solve_batch` is timed."""
-
-    package: str
-
-    def solve_batch(self, T: FloatArray) -> Any: ...
-
-    def joints_batch(self, found: Any) -> list[FloatArray]:
-        """For each pose (k, 5) [rad]."""
-        ...

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from app.errors import InputError
-from app.exchange.atomic import write_files, writer_of
 from app.exchange.meshes import Mesh, read_mesh
 from app.exchange.shape_file import MOST_BYTES, Up
 from app.geometry.arrays import FloatArray
@@ -108,15 +107,6 @@ def scene_zip(stored: StoredScene, T_palm_tool: FloatArray | None) -> bytes:
         for name, content in _files(stored, T_palm_tool).items():
             archive.writestr(zipfile.ZipInfo(name, EPOCH), content, zipfile.ZIP_DEFLATED)
     return out.getvalue()
-
-
-def write_scene_folder(path: Path, stored: StoredScene, T_palm_tool: FloatArray | None) -> None:
-    """Write the text to ``path`` and the meshes into a folder beside it, all or nothing."""
-    files = _files(stored, T_palm_tool)
-    text = files.pop(SCENE)
-    (path.parent / FOLDER).mkdir(parents=True, exist_ok=True)
-    contents = {path.parent / name: content for name, content in files.items()} | {path: text}
-    write_files({name: writer_of(content) for name, content in contents.items()})
 
 
 def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, bytes]:

@@ -124,8 +124,8 @@ instead of flickering in it."""
 
 
 DETAIL = 3e-3
-"""[m] Smaller things cannot be told in what is translucent and of one colour; without them it takes a
-quarter fewer bytes."""
+"""[m] Smaller things cannot be told in what is translucent and of one colour; without them it takes
+a quarter fewer bytes."""
 
 
 class GhostNodes(FrameTree):
