@@ -90,15 +90,16 @@ async def scene_bytes(url: str, cookie: str) -> int:
 
 
 def wait_for_port(port: int) -> None:
-    """Return when somebody listens on the port of this machine."""
+    """Return when somebody listens on the port of this machine, and goes on to."""
     deadline = time.monotonic() + OPEN_SECONDS
     while time.monotonic() < deadline:
-        try:
-            socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
-        except OSError:
-            time.sleep(0.01)
-        else:
+        with suppress(OSError):
+            # viser tries a port before it serves there, and so is heard twice.
+            for _ in range(2):
+                socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+                time.sleep(0.02)
             return
+        time.sleep(0.01)
     raise TimeoutError(f"nobody listened on port {port} for {OPEN_SECONDS:g} s")
 
 
