@@ -146,9 +146,7 @@ def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -
     stage.wait_for("running")
     stage.wait(
         lambda state: (
-            program(state).task == "pour"
-            and state.water is not None
-            and state.water.basin_ml > 2.0
+            program(state).task == "pour" and state.water is not None and state.water.basin_ml > 2.0
         )
     )
     flowing = water()
