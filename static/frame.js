@@ -11,6 +11,12 @@
   // viser's page looks for its server again only while it has the focus; ours always does.
   document.hasFocus = () => true;
 
+  // viser draws faintly until the light of the room is loaded. Where drawing takes as long as that it
+  // loses count and leaves the picture faint for good.
+  const clear = new CSSStyleSheet();
+  clear.replaceSync("canvas { opacity: 1 !important }");
+  document.adoptedStyleSheets.push(clear);
+
   // The policy of this page lets no text become code. viser tries that once, for clouds of splats,
   // which are not used here; nobody need hear of it.
   const refusal = new EvalError("No text becomes code here.");

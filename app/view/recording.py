@@ -21,6 +21,10 @@ from app.view.traces import Traces
 TITLE = "<title>Viser</title>"
 """Of viser's page."""
 
+CLEAR = "<style>canvas { opacity: 1 !important }</style>"
+"""viser draws faintly until the light of the room is loaded. Where drawing takes as long as that it
+loses count and leaves the picture faint for good; and in a recording it loads again each time."""
+
 
 def recorded(
     model: RobotModel, session: Session, states: Iterable[State], interval: float, title: str
@@ -37,7 +41,8 @@ def recorded(
                 recording.insert_sleep(interval)
             scenery.show(state)
             traces.follow(state)
-        return recording.as_html().replace(TITLE, f"<title>{html.escape(title)}</title>", 1)
+        head = f"<title>{html.escape(title)}</title>{CLEAR}"
+        return recording.as_html().replace(TITLE, head, 1)
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()

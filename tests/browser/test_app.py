@@ -22,6 +22,14 @@ from tests.browser.server import AppServer
 
 AXES = tuple(f"Axis {number}" for number in range(1, 6))
 READY = np.array(Settings().ready)
+FAINTEST = """() => {
+    const canvas = document.querySelector("canvas[data-engine]");
+    const before = canvas.style.opacity;
+    canvas.style.opacity = "0.05";
+    const shown = getComputedStyle(canvas).opacity;
+    canvas.style.opacity = before;
+    return shown;
+}"""
 MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
 
 # A dragged handle lands within a pixel of where it was meant: 1 mm from this far away.
@@ -128,6 +136,10 @@ def go_home(robot: Robot) -> None:
 
 def pitch_of(T: FloatArray) -> float:
     return math.asin(-T[2, 0])
+
+
+def test_the_picture_is_clear_while_viser_would_have_it_faint(robot: Robot) -> None:
+    assert robot.page.frame.evaluate(FAINTEST) == "1"
 
 
 def test_the_arm_follows_the_arrow_it_is_dragged_by(robot: Robot, artefacts: Path) -> None:

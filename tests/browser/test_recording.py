@@ -22,6 +22,13 @@ SECONDS, TURN = 4.0, 1.2
 
 TRACK = ".mantine-Slider-trackContainer"
 
+FAINTEST = """() => {
+  const canvas = document.querySelector('canvas[data-engine]');
+  canvas.style.opacity = '0.05';
+  return getComputedStyle(canvas).opacity;
+}"""
+"""How clear the picture is while viser would have it faint."""
+
 NOW = "() => Number(document.querySelector('[role=slider]').getAttribute('aria-valuenow'))"
 
 
@@ -50,6 +57,7 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
         page.goto(f"{recording.as_uri()}?fixedDpr=0.5")
         page.locator("[role=slider]").wait_for(state="attached", timeout=60_000)
         page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
+        assert page.evaluate(FAINTEST) == "1"
         page.locator("button").first.click()
         for share in (0.2, 0.9, 0.5):
             box = page.locator(TRACK).bounding_box()
