@@ -1,10 +1,11 @@
 // In viser's page, before its own script. It says which page around it this is, tells the gateway
-// what is on the screen, keeps the camera over a lost connection, and hands keys to the page.
+// what is on the screen, keeps camera and theme over a lost connection, and hands keys to the page.
 "use strict";
 (() => {
   const TELL_EVERY = 50; // ms
   const AGAIN = 100; // ms
   const TRIES = 30;
+  const THEME = "katana450.theme";
   const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
 
@@ -33,6 +34,8 @@
   let camera = null; // where this person last looked from
   let kept = null; //   the same, from when the line is back until viser looks from there again
   let tries = 0;
+  let replayed = false;
+  let themes = null; // the id of the buttons for it
   let seen = 0;
   let told = 0;
   let telling = false;
@@ -67,6 +70,13 @@
     worker.dispatchEvent(new MessageEvent("message", { data }));
   }
 
+  // viser starts light likewise. What was chosen in this tab counts, else the system's choice; the
+  // page around goes along.
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const theme = () => sessionStorage.getItem(THEME) ?? (system.matches ? "Dark" : "Light");
+  const around = () => outer?.katana?.theme(theme().toLowerCase());
+  around();
+
   const same = (a, b) =>
     ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-3));
 
@@ -82,6 +92,11 @@
       if (data?.type === "set_server" && page)
         data = { ...data, server: `${data.server}?page=${page}` };
       if (data?.type === "send" && data.message.type === "ViewerCameraMessage") this.#looks(data.message);
+      if (data?.type === "set_server") system.onchange = () => this.#dress();
+      if (data?.type === "send" && themes && data.message.uuid === themes) {
+        sessionStorage.setItem(THEME, data.message.updates.value);
+        around();
+      }
       super.postMessage(data, ...rest);
     }
 
@@ -94,29 +109,35 @@
       }
     }
 
+    #dress() {
+      around();
+      if (!replayed || !themes) return;
+      const message = { type: "GuiUpdateMessage", uuid: themes, updates: { value: theme() } };
+      super.postMessage({ type: "send", message });
+    }
+
     #hear(data) {
       if (data?.type === "connected") {
         seen = 0;
+        replayed = false;
+        themes = null;
         kept = camera;
         tries = 0;
       }
       if (data?.type !== "message_batch" || data.ours) return;
       seen += 1;
       tell((message) => super.postMessage(message));
-      if (!kept || tries > 0 || !data.messages.some(({ type }) => type === "ReplayDoneMessage")) return;
+      const ready = data.messages.some(({ type }) => type === "ReplayDoneMessage");
+      replayed ||= ready;
+      // While the arm is still being started, the panel comes later.
+      const buttons = data.messages.find(({ type, props }) => type === "GuiButtonGroupMessage" && props.label === "Theme");
+      themes = buttons?.uuid ?? themes;
+      if ((ready || buttons) && theme() === "Dark") this.#dress();
+      if (!kept || tries > 0 || !ready) return;
       tries = 1;
       setTimeout(() => kept && look(this), AGAIN);
     }
   };
-
-  // The page around follows viser's switch between light and dark.
-  const SCHEME = "data-mantine-color-scheme";
-  let scheme = null;
-  new MutationObserver(() => {
-    const now = document.documentElement.getAttribute(SCHEME);
-    if (scheme !== null && now !== scheme) outer?.katana?.theme(now);
-    scheme = now;
-  }).observe(document.documentElement, { attributeFilter: [SCHEME] });
 
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });

@@ -94,7 +94,7 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  // viser's page has a switch for this; until somebody uses it the system's choice counts.
+  // viser's page has a switch for this; until it is there the system's choice counts.
   const theme = (name) => (document.documentElement.dataset.theme = name);
   window.katana = { key, blur, theme };
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from app.cli.version import version
-from app.errors import ConfigurationError
+from app.errors import ConfigurationError, installing
 from app.workspace.grid import IntArray
 from app.workspace.map import Survey
 
@@ -70,8 +70,7 @@ def connected(address: str) -> Iterator[Cluster]:
         distributed: Any = import_module("distributed")
     except ImportError:
         raise ConfigurationError(
-            "--scheduler needs Dask's distributed, which is not installed; install it with "
-            "`pip install 'katana450[dask]'`."
+            "--scheduler needs Dask's distributed, which is not installed. " + installing("dask")
         ) from None
     # What goes wrong is told as one error of ours.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

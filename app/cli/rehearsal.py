@@ -15,6 +15,7 @@ from app.report.report import Report
 from app.report.stages import stage_pictures
 from app.robot.props import load_props
 from app.settings import Settings
+from app.view.texts import part
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
 
@@ -61,7 +62,7 @@ def _tell(program: Program) -> None:
             plan = task.order.plan
             said = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
             if plan.nearest is not None:
-                one, other = plan.nearest.contact.parts
+                one, other = map(part, plan.nearest.contact.parts)
                 apart = 1e3 * plan.nearest.contact.distance
                 said += f", {apart:.0f} mm from {one} to {other}"
         print(f"line {task.line:>4}  {task.name:<24} {said}".rstrip())

@@ -25,7 +25,7 @@ from app.kinematics.tool import ToolTarget
 from app.kinematics.tracker import leap
 from app.motion.limiter import Motion
 from app.planning.curve import Curve
-from app.planning.path import Path
+from app.planning.path import Path, joint_derivatives
 from app.planning.plan import JOINED, check_clear
 from app.planning.tool_path import ToolPath
 from app.programs.order import Go, Order
@@ -35,6 +35,9 @@ L = TypeVar("L")
 
 EXACT = 1e-9
 """[m or rad] A pose that is missed by no more is reached."""
+
+ALONG = np.linspace(0.0, 1.0, 5)
+"""Places of a path at which is seen whether it moves anything."""
 
 CARRY = 1.0
 """[m/s^2] The most of the tool while it carries something."""
@@ -182,10 +185,18 @@ class Bench:
         self.follow(paths, name)
 
     def follow(self, paths: Sequence[Path], name: str) -> None:
-        """Go along ``paths``, the first of which begins here. Raises BlockedError."""
+        """Go along ``paths``, the first of which begins here.
+
+        Raises BlockedError, and InputError for a path on which nothing moves.
+        """
         world, fingers = self.world, self.state.gripper_setpoint
-        if world is not None:
-            for path in {id(path): path for path in paths}.values():
+        for path in {id(path): path for path in paths}.values():
+            if float(np.abs(joint_derivatives(path, ALONG)[1]).max()) <= EXACT:
+                raise InputError(
+                    f"This {name} moves nothing: it ends where it begins. Say where it goes, or "
+                    "take it out."
+                )
+            if world is not None:
                 check_clear(path, world, fingers)
         self.note(
             name, Draft(self.rig.arm, world, self.state, tuple(paths)), self.standing(paths[-1].end)

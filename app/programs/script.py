@@ -89,7 +89,8 @@ def _steps(value: Value, setting: Setting) -> tuple[Placed, ...]:
             problems += item.wrong(said).problems
             break
     if value.kind != "list" or not value.items:
-        problems += value.wrong(f"A list of steps goes here, not {value}.").problems
+        what = "an empty one" if value.kind == "list" else value
+        problems += value.wrong(f"A list of steps goes here, not {what}.").problems
     if problems:
         raise ScriptError(tuple(problems))
     return tuple(found)

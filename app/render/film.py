@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from app.errors import ConfigurationError, InputError
+from app.errors import ConfigurationError, InputError, installing
 
 QUALITY = 8
 """Of 10."""
@@ -26,8 +26,7 @@ def check_filmable(size: tuple[int, int], fps: float) -> None:
     """Raises ConfigurationError without imageio-ffmpeg, and InputError for what no film can be."""
     if importlib.util.find_spec("imageio_ffmpeg") is None:
         raise ConfigurationError(
-            "Films are made with imageio-ffmpeg, which is not installed. Install it with: "
-            "pip install 'katana450[report]'"
+            "Films are made with imageio-ffmpeg, which is not installed. " + installing("report")
         )
     if any(side % 2 for side in size):
         raise InputError(f"A film has an even number of pixels a side, not {size[0]}x{size[1]}.")

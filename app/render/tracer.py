@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from app.errors import ConfigurationError
+from app.errors import ConfigurationError, installing
 from app.render.scene import Bools, Floats, Ints, Scene
 
 NOTHING = -1
@@ -19,8 +19,7 @@ def check_traceable() -> None:
     """ConfigurationError when embreex is missing, told before a long run."""
     if importlib.util.find_spec("embreex") is None:
         raise ConfigurationError(
-            "Pictures are made with embreex, which is not installed. Install it with: "
-            "pip install 'katana450[report]'"
+            "Pictures are made with embreex, which is not installed. " + installing("report")
         )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from app.control.arm import Arm
-from app.errors import ConfigurationError
+from app.errors import ConfigurationError, installing
 from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import tool_speed
 from app.report.measures import Along
@@ -56,8 +56,8 @@ def check_drawable() -> None:
     """ConfigurationError when matplotlib is missing, told before a long run."""
     if importlib.util.find_spec("matplotlib") is None:
         raise ConfigurationError(
-            "The figures of a report are drawn by matplotlib, which is not installed. Install it "
-            "with: pip install 'katana450[report]'"
+            "The figures of a report are drawn by matplotlib, which is not installed. "
+            + installing("report")
         )
 
 

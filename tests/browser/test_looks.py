@@ -95,3 +95,27 @@ def test_a_theme_is_of_one_window(pair: tuple[ViserPage, ViserPage], artefacts: 
     page.click_button("Light")
     page.wait_until(lambda: sky(page).min() > min(LIGHT.floor) - 40, "the day")
     assert page.errors == other.errors == []
+
+
+def test_a_window_is_as_its_system_until_its_person_chooses(
+    pair: tuple[ViserPage, ViserPage],
+) -> None:
+    chose, other = pair
+
+    def themes(window: ViserPage) -> tuple[str, str]:
+        """Of the page, and of viser's in it."""
+        return (
+            window.page.evaluate("() => document.documentElement.dataset.theme"),
+            window.frame.evaluate("() => document.documentElement.dataset.mantineColorScheme"),
+        )
+
+    if not chose.frame.get_by_role("button", name="Light", exact=True).is_visible():
+        chose.frame.get_by_text("Show", exact=True).click()
+    chose.click_button("Light")
+    for window in pair:
+        window.page.emulate_media(color_scheme="dark")
+    other.wait_until(lambda: themes(other) == ("dark", "dark"), "the night of the system")
+    other.page.emulate_media(color_scheme="light")
+    other.wait_until(lambda: themes(other) == ("light", "light"), "the day of the system")
+    assert themes(chose) == ("light", "light")
+    assert chose.errors == other.errors == []

@@ -150,6 +150,7 @@ def test_a_dry_run_only_plans() -> None:
     assert done.returncode == 0, done.stderr
     assert "628 mm" in done.stdout
     assert "3 steps" in done.stdout
+    assert "_link" not in done.stdout
 
 
 def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:

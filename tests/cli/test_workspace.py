@@ -97,7 +97,7 @@ def test_without_distributed_the_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert main(["workspace", "--scheduler", "tcp://127.0.0.1:1"]) == 1
-    assert "pip install 'katana450[dask]'" in capsys.readouterr().err
+    assert "pip install --editable '.[dask]'" in capsys.readouterr().err
 
 
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
