@@ -42,16 +42,12 @@ class Go:
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         return (cmd.Follow(self.plan),)
 
-    def done(self, state: State, waited: float) -> bool:
+    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         following = state.following
         if following is None or following.leaving or not np.array_equal(state.goal, self.plan.end):
             if any(finding.reason is Reason.NOT_AT_START for finding in state.findings):
                 raise InputError("The arm does not stand where the step begins; run it again.")
             raise InputError("The arm was told to go elsewhere.")
-        if state.blocked and state.motion.at_rest and waited > PATIENCE:
-            met = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
-            what = " and ".join(met[0]) if met and met[0] else "Something"
-            raise InputError(f"The way stays blocked: {what} would meet.")
         return following.there
 
     def share(self, state: State, waited: float) -> float:  # noqa: ARG002

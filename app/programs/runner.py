@@ -8,6 +8,7 @@ from enum import Enum
 from app.control import commands as cmd
 from app.control.state import Reason, State
 from app.errors import InputError
+from app.programs.order import PATIENCE
 from app.programs.program import Program
 
 
@@ -26,6 +27,7 @@ class Run:
     number: of the task under way, from 0.
     begun: whether it has been asked for.
     waited: since then, pauses left out [s].
+    blocked: for how long the arm has stood before something that is in its way [s].
     t: when it was last looked at [s].
     phase, why: how it stands; why it ended, if not well.
     single: whether it rests after the step under way.
@@ -35,6 +37,7 @@ class Run:
     number: int = 0
     begun: bool = False
     waited: float = 0.0
+    blocked: float = 0.0
     phase: Phase = Phase.RUNNING
     why: str = ""
     single: bool = False
@@ -70,9 +73,12 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         return run, ()
     task = program.tasks[run.number]
     if not run.begun:
-        return replace(run, begun=True, waited=0.0), task.order.commands(program.speed)
-    run = replace(run, waited=run.waited + dt)
+        return replace(run, begun=True, waited=0.0, blocked=0.0), task.order.commands(program.speed)
+    stands = state.blocked and state.motion.at_rest
+    run = replace(run, waited=run.waited + dt, blocked=run.blocked + dt if stands else 0.0)
     try:
+        if run.blocked > PATIENCE:
+            raise InputError(f"The way stays blocked: {_met(state)} would meet.")
         done = task.order.done(state, run.waited)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
@@ -85,6 +91,12 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     if run.single and program.tasks[after.number].number != task.number:
         return replace(after, single=False), (cmd.Pause(),)
     return after, ()
+
+
+def _met(state: State) -> str:
+    """What is in whose way."""
+    met = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
+    return " and ".join(met[0]) if met and met[0] else "something"
 
 
 def halted(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:

@@ -12,10 +12,11 @@ import pytest
 import app.programs
 from app.control import commands as cmd
 from app.control.state import State
+from app.control.things import Form, Thing
 from app.kinematics.forward import forward
 from app.kinematics.tool import ToolTarget
 from app.programs import runner
-from app.programs.order import Go
+from app.programs.order import PATIENCE, Go
 from app.programs.program import Program, compiled
 from app.programs.runner import Phase, Run
 from app.programs.script import parse
@@ -140,6 +141,29 @@ def test_a_pause_keeps_to_the_way_and_waits_no_time_away(stage: Stage, program: 
         run, state = stage.tick(program, run, state)
     assert run.phase is Phase.DONE
     assert np.array_equal(state.q, whole[-1].q)
+
+
+@pytest.mark.parametrize("cleared", [False, True])
+def test_patience_begins_where_the_way_is_blocked(stage: Stage, cleared: bool) -> None:
+    script = parse("steps:\n  - joints: [60, -68, 85, 8, 0]")
+    program = compiled(script, stage.rig, stage.begin(), speed=0.03)
+    at = np.eye(4)
+    at[:2, 3] = 0.5 * np.array((np.cos(0.8), np.sin(0.8)))
+    wall = Thing("wall", Form.BOX, (0.1, 0.1, 0.5), at)
+    state = stage.session.step(stage.begin(), [cmd.Place(wall)], 0.01)
+    run, stood = Run(state.t), 0.0
+    while stood < 0.9 * PATIENCE:
+        run, state = stage.tick(program, run, state)
+        assert run.phase is Phase.RUNNING
+        stood += 0.01 * (state.blocked and state.motion.at_rest)
+    assert run.waited > 2.0 * PATIENCE
+    assert runner.progress(program, run, state).status == "blocked"
+    if cleared:
+        state = stage.session.step(state, [cmd.Remove("wall")], state.t + 0.01)
+    while run.phase is Phase.RUNNING:
+        run, state = stage.tick(program, run, state)
+    assert run.phase is (Phase.DONE if cleared else Phase.FAILED)
+    assert ("and wall would meet" in run.why) is not cleared
 
 
 def test_steps_are_taken_one_at_a_time(stage: Stage, program: Program) -> None:
