@@ -181,7 +181,7 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
     app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
     gallery: Camera(),
-    pouring: Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(50.0)),
+    pouring: Camera((1.19, 0.68, 0.80), (0.2, 0.09, 0.2), math.radians(50.0)),
     instruments: Camera((0.9, -0.75, 0.7), (0.25, 0.0, 0.2), math.radians(45.0)),
     out_of_reach: Camera((0.75, -1.25, 0.70), (0.3, -0.06, 0.17), math.radians(40.0)),
 }
