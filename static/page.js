@@ -161,6 +161,14 @@
     document.querySelector("#speed output").value = `${Math.round(100 * status.speed)} %`;
   }
 
+  // What the arm does now cannot be told from here.
+  function unknown() {
+    if (!status) return;
+    body.dataset.mood = "starting";
+    text("headline", "Out of touch");
+    text("why", "");
+  }
+
   function drawLink() {
     const age = up ? Math.max(status?.age ?? 0, silent / 1000 - 0.2) : (performance.now() - since) / 1000;
     const lost = !up;
@@ -174,7 +182,9 @@
     banner.hidden = !(lost || bad) || (lost && !status);
     banner.className = lost ? "lost" : "";
     const words = lost
-      ? "No line to the arm: what you see is old. Trying to get it back."
+      ? asking !== null
+        ? "No line to the arm: your STOP goes out as soon as it is back."
+        : "No line to the arm: what you see is old. Trying to get it back."
       : "A slow line: what you see is old.";
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
   }
@@ -194,6 +204,7 @@
       if (up) since = performance.now();
       up = false;
       trip = null;
+      unknown();
       Jog.quiet();
       if (data.code === NOT_YOU) enter().catch(() => {});
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;

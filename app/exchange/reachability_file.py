@@ -29,6 +29,8 @@ from app.workspace.colors import share_colors
 from app.workspace.map import ReachabilityMap, Survey
 
 FORMAT = "katana450 reachability 1"
+ZIP = b"PK"
+"""What an .npz, being a .zip, begins with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,10 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
     name = Path(path)
     try:
         with name.open("rb") as file:
+            # Else numpy takes it for a pickle, and advises to trust it.
+            if file.read(len(ZIP)) != ZIP:
+                raise ValueError("it is no .npz file")
+            file.seek(0)
             arrays = np.load(file, allow_pickle=False)
             if str(arrays["format"]) != FORMAT:
                 raise ValueError(f"its format is {arrays['format']}, not {FORMAT}")

@@ -282,7 +282,7 @@ class Performer:
         if self._hub.lease.holder == joined.person:
             self._hub.give_up(joined)
         self._hub.leave(joined, for_good=True)
-        log.info("The program %s: %s.", joined.person.name, why or phase.value)
+        log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
     def _check_free(self) -> None:
         if self.running:

@@ -15,6 +15,9 @@ from app.errors import InputError, KatanaError
 WORTH_SENDING = 2e-6
 """[deg, mm] Rounding on the way to radians and back is less."""
 
+READ_IN = 10.0
+"""[s] Why something is not done goes away by itself, or the reasons would cover the scene."""
+
 Clickable = (
     viser.GuiInputHandle[Any]
     | viser.GuiButtonHandle
@@ -57,7 +60,9 @@ def refuse(
 ) -> None:
     """Tell whoever asked why it is not done, in their window."""
     if event.client is not None:
-        event.client.add_notification("Not done", str(error), color="red")
+        event.client.add_notification(
+            "Not done", str(error), color="red", auto_close_seconds=READ_IN
+        )
 
 
 def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSliderHandle[float]:

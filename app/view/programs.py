@@ -16,6 +16,7 @@ from app.errors import InputError, KatanaError
 from app.exchange.scripts import Scripts
 from app.geometry.arrays import FloatArray
 from app.programs.program import Program
+from app.programs.script import parse
 from app.programs.taught import taught
 from app.robot.model import RobotModel
 from app.view.controls import refuse
@@ -84,8 +85,14 @@ class ProgramsPanel:
         self._preview = Preview(server, model)
         gui = server.gui
         with gui.add_folder("Programs", expand_by_default=False):
+            names = tuple(scripts.paths)
+            # First one that this arm can run: the library has a circle for the bare flange too.
+            fitting = (name for name in names if _suits(scripts, name, model))
             self._choice = gui.add_dropdown(
-                "Script", tuple(scripts.paths), hint="Those that come along, and of --programs DIR"
+                "Script",
+                names,
+                initial_value=next(fitting, None),
+                hint="Those that come along, and of --programs DIR",
             )
             self._choice.on_update(lambda _: self._draw(None))
             self._orders = gui.add_button_group(
@@ -179,6 +186,14 @@ class ProgramsPanel:
         return acted
 
 
+def _suits(scripts: Scripts, name: str, model: RobotModel) -> bool:
+    """Whether the script can be read, and is not for an arm without the gripper there is."""
+    try:
+        return not (parse(scripts.text(name)).bare and model.arm.gripper.moves)
+    except KatanaError:
+        return False
+
+
 def _page(told: Told | None, poses: int) -> str:
     lines = []
     if told is not None:
@@ -189,6 +204,8 @@ def _page(told: Told | None, poses: int) -> str:
                 f"Step {told.step} of {told.steps}, line {told.line}: {escape(told.task)}, "
                 f"{told.share:.0%}"
             )
+        elif told.status == "planning":
+            lines.append("All of it is planned before anything moves, which may take a while.")
         elif told.status == "ready":
             lines.append(f"{told.steps} steps, {told.seconds:.1f} s of motion at full speed")
         lines += [escape(line) for line in told.why.splitlines()]

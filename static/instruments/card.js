@@ -15,7 +15,7 @@ export class Card {
     this.#size.hidden = sizes.length < 2;
     const hide = tool(`Hide ${title}`, "×", "Hide");
     const action = instrument.plot ? [instrument.plot.action] : [];
-    const header = html("header", {}, this.grip, html("h2", {}, title), ...action, this.#size, hide);
+    const header = html("header", {}, this.grip, html("h2", { title }, title), ...action, this.#size, hide);
     this.element = html("article", { class: "card", "data-id": id, "aria-label": title }, header, instrument.element);
     this.grip.addEventListener("keydown", (event) => {
       if (!(event.key in KEYS)) return;

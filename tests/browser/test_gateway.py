@@ -307,12 +307,14 @@ def test_a_killed_server_is_told_at_once_and_the_page_comes_back(
         told = time.monotonic() - killed
         page.keep(artefacts / "gateway-lost.png")
         assert "No line" in bar(page, "link")
+        assert bar(page, "headline") == "Out of touch"
         assert told < 1.0
         robot.since = time.time()
         server.restart()
         back = time.monotonic()
         page.page.wait_for_selector("#banner", state="hidden")
         page.wait_until(lambda: page.connected, "viser to come back")
+        page.wait_until(lambda: bar(page, "headline") != "Out of touch", "the state to be told")
         print(f"told after {told:.2f} s, back after {time.monotonic() - back:.2f} s")
         page.wait_ready(("/arm", MOVE))
         robot.settle()

@@ -149,7 +149,7 @@ def test_what_is_no_npz_is_refused(npz: Path, tmp_path: Path) -> None:
     np.save(array, POINTS)
     for content in (b"", b"nonsense", whole[: len(whole) // 2], array.getvalue()):
         other.write_bytes(content)
-        with pytest.raises(InputError, match=r"other\.npz is no reachability map"):
+        with pytest.raises(InputError, match=r"other\.npz is no reachability map(?!.*pickle)"):
             load_map(other)
     damaged = bytearray(whole)
     damaged[whole.index(b"points.npy") + 50] ^= 0xFF

@@ -51,6 +51,7 @@ def test_what_is_said_is_text_and_no_markup() -> None:
     assert "&lt;b&gt;x" in page
     assert "<script>" not in page
     assert "2 poses" in page
+    assert "a while" in _page(Told(name="", by="me", status="planning"), 0)
     told = Told(name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", share=0.5)
     assert "Step 2 of 3, line 7: line, 50%" in _page(told, 0)
     assert _page(None, 0) == ""
@@ -62,6 +63,8 @@ def test_it_previews_steers_and_teaches(
     performer = Performer()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
+    # Not the first, which is for an arm without its gripper.
+    assert panel._choice.value == "Circle with gripper"
     panel.follow()
     way = panel._preview._way
     assert not way.visible
@@ -82,7 +85,7 @@ def test_it_previews_steers_and_teaches(
     assert [order for _, order in performer.asked] == [
         Order.RUN, Order.PAUSE, Order.RUN, Order.HALT
     ]  # fmt: skip
-    assert parse(performer.asked[0][0]).name == "Circle"
+    assert parse(performer.asked[0][0]).name == "Circle with gripper"
 
     for said in ("Add pose", "Add pose", "Save"):
         panel._teach.value = said  # type: ignore[misc]  # likewise
