@@ -134,6 +134,13 @@ class RunningArm:
             self._link.close()
         self._loop.stop()
 
+    def join(self) -> None:
+        """After ``stop``, once the other end of the pipe is gone too: let nothing of it run on."""
+        if self._link is not None:
+            self._link.join()
+        # So that Python, as it ends, puts away what hangs together in circles.
+        gc.unfreeze()
+
 
 def _be_prompt() -> None:
     """Let nothing that can wait come between the ticks."""

@@ -69,7 +69,7 @@ def serve(
 
     meshes = () if stored is None else stored.meshes
     outfit = Outfit(settings, urdf, tool, listening, lines, workspace, meshes)
-    current = Front(outfit)
+    current, arm = Front(outfit), None
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
         from app.cli.assembly import RunningArm, recognised
@@ -103,9 +103,13 @@ def serve(
             current.stop()
             current, began = Front(outfit), time.monotonic()
             arm.attach(current.pipe)
-        arm.stop()
     finally:
+        # The arm first: a front whose arm hangs up ends in peace.
+        if arm is not None:
+            arm.stop()
         current.stop()
+        if arm is not None:
+            arm.join()
         listening.close()
     return 0
 

@@ -357,6 +357,7 @@ class Hub:
 
     def _halt(self, stopped: Stopped) -> None:
         self._let_go()
+        self.performer.stopped()
         if self.arm is not None:
             self.arm.stop()
         if self.stopped is None:

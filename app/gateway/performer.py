@@ -143,6 +143,10 @@ class Performer:
             case Order.HALT:
                 self._end(f"{window.person.name} ended it.")
 
+    def stopped(self) -> None:
+        """The arm was stopped: what was asked for before that is not done after it."""
+        self._then = None
+
     def leave(self, window: Window) -> None:
         """Somebody is gone for good."""
         self._parts.pop(window.person.key, None)

@@ -91,8 +91,10 @@ class Proxy:
                 ):
                     await browser.close(NOT_YOU, "Your link is no good any more.")
         except OSError as error:
-            log.warning("viser is not there: %s", error)
-            await browser.close(1013)
+            log.warning("viser does not answer: %s", str(error) or type(error).__name__)
+            # Who has left meanwhile needs no farewell.
+            with suppress(WebSocketDisconnect, RuntimeError):
+                await browser.close(1013)
         finally:
             self._open -= 1
 

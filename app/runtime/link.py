@@ -34,6 +34,9 @@ GONE = (EOFError, OSError)
 REPORT_EVERY = 1.0
 """[s] Between two reports of how late the ticks are."""
 
+ENDING_SECONDS = 2.0
+"""[s] A thread that waits to report wakes sooner."""
+
 
 @dataclass(frozen=True)
 class Told:
@@ -94,6 +97,11 @@ class ArmEnd:
         self.cut.set()
         with suppress(*GONE):
             self._pipe.send(None)
+
+    def join(self) -> None:
+        """Return once its threads have ended, as they do when both ends are closed."""
+        for thread in self._threads:
+            thread.join(ENDING_SECONDS)
 
     def _listen(self) -> None:
         try:

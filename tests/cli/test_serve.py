@@ -99,6 +99,14 @@ def test_it_stops_when_told(number: signal.Signals) -> None:
     assert output == ""
 
 
+def test_a_start_that_fails_late_says_why_and_no_more(tmp_path: Path) -> None:
+    (tmp_path / "map.npz").write_text("no map")
+    done = serve("--port", str(free_port()), "--workspace", str(tmp_path / "map.npz"))
+    assert done.returncode == 1
+    (said,) = done.stderr.strip().splitlines()
+    assert "map.npz is no reachability map" in said
+
+
 def test_the_command_tells_its_version_and_its_ways() -> None:
     for option in ("--version", "--help"):
         done = subprocess.run(

@@ -155,3 +155,18 @@ def test_what_the_panel_asked_for_is_done_once_it_is_planned(table: Staged) -> N
         table.wait(0.02, window)
         time.sleep(0.005)
     assert table.status == "running"
+
+
+def test_what_was_asked_for_before_a_stop_is_not_done_after_it(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    performer = table.hub.performer
+    performer.touch(window)
+    performer.plan(SCRIPT, Order.RUN)
+    table.hub.stop("Anybody")
+    table.hub.reset(window)
+    due = time.monotonic() + 10.0
+    while table.status == "planning" and time.monotonic() < due:
+        time.sleep(0.005)
+    table.wait(1.0, window)
+    assert table.status == "ready"
+    assert not performer.running
