@@ -81,7 +81,7 @@ async def flood(url: str) -> None:
         # Whoever is sent away takes a moment to come again.
         await asyncio.sleep(0.1)
         with suppress(ConnectionClosed, OSError):
-            async with websocket(url, "/api/v1/socket?name=Flood") as socket:
+            async with websocket(url, "/api/v1/socket?name=Flood", max_queue=None) as socket:
                 while True:
                     await socket.send('{"do":"look"}')
                     # So that this process has time for the others it plays.

@@ -33,6 +33,9 @@ TOO_MUCH = 4429
 NONSENSE = 1008
 """Close code for who says what is no request, again and again."""
 
+FAREWELL = 1.0
+"""[s] That who is sent away has for being told so: who reads nothing cannot be told."""
+
 
 QUESTIONS = (requests.Beat, requests.Look, requests.Get)
 """Requests that are answered without an id too."""
@@ -126,19 +129,24 @@ class Conversation(ABC):
             except InputError as error:
                 log.warning("A bad request of %s: %s", window.person.name, error)
                 if not self._bad.take(self.hub.clock()):
-                    await self._line.close(NONSENSE, "Too many bad requests.")
+                    await self._send_away(NONSENSE, "Too many bad requests.")
                     return
                 self.refuse(str(error), requests.id_of(text))
                 continue
             # A hand that hammers on STOP is never too fast.
             if not self._often.take(self.hub.clock()) and not isinstance(request, requests.Stop):
                 log.warning("%s asks too much at once and is sent away.", window.person.name)
-                await self._line.close(TOO_MUCH, "Too many requests.")
+                await self._send_away(TOO_MUCH, "Too many requests.")
                 return
             try:
                 self.answer(window, request)
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)
+
+    async def _send_away(self, code: int, why: str) -> None:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(FAREWELL):
+                await self._line.close(code, why)
 
     def refuse(self, why: str, named: Id) -> None:
         """Say that what was asked is not done."""

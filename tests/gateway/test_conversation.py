@@ -7,7 +7,7 @@ import time
 from itertools import pairwise
 
 from app.control.lease import Role
-from app.gateway.conversation import GoneError
+from app.gateway.conversation import FAREWELL, GoneError
 from app.gateway.door import Visitor
 from app.gateway.hub import Hub
 from app.gateway.program import Program
@@ -34,6 +34,16 @@ class Torrent:
         raise GoneError
 
 
+class Deaf(Torrent):
+    """One that takes in nothing, not even a farewell."""
+
+    async def send(self, _text: str) -> None:
+        await asyncio.Event().wait()
+
+    async def close(self, _code: int, _why: str, /) -> None:
+        await asyncio.Event().wait()
+
+
 def test_who_has_asked_two_hundred_times_keeps_nobody_waiting() -> None:
     async def ask() -> list[int]:
         hub, torrent = Hub(time.monotonic), Torrent()
@@ -50,3 +60,15 @@ def test_who_has_asked_two_hundred_times_keeps_nobody_waiting() -> None:
     taken = asyncio.run(ask())
     assert taken[-1] == 0
     assert max(before - after for before, after in pairwise(taken)) == 1
+
+
+def test_who_asks_too_much_and_hears_nothing_is_left_all_the_same() -> None:
+    async def ask() -> None:
+        hub, deaf = Hub(time.monotonic), Deaf()
+        deaf.left = 10**9
+        program = Program(hub, deaf)
+        window = hub.join(Visitor("session", "Deaf", Role.OPERATOR), "a-page", program.tell)
+        async with asyncio.timeout(10.0 * FAREWELL):
+            await program.run(window)
+
+    asyncio.run(ask())
