@@ -61,18 +61,27 @@ async def _held(arm: AsyncClient) -> bool:
 
 
 async def watch(url: str, pictures: list[int]) -> None:
-    """See the scene as a browser does, until cancelled."""
+    """See the scene as a browser does that draws ``PICTURES`` times a second, until cancelled."""
     cookie = enter(url)
     path = f"/viser?page={page_name()}"
+    count = 0
     async with websocket(url, path, cookie, subprotocols=[SUBPROTOCOL]) as socket:
-        count, told = 0, 0.0
-        async for _ in socket:
-            count += 1
-            pictures[0] += 1
-            now = time.monotonic()
-            if now - told > 0.9 / PICTURES:
-                told = now
-                await socket.send(msgspec.msgpack.encode({"type": "Seen", "count": count}))
+
+        async def draw() -> None:
+            told = 0
+            while True:
+                await asyncio.sleep(1.0 / PICTURES)
+                if count > told:
+                    told = count
+                    await socket.send(msgspec.msgpack.encode({"type": "Seen", "count": told}))
+
+        drawing = asyncio.create_task(draw())
+        try:
+            async for _ in socket:
+                count += 1
+                pictures[0] += 1
+        finally:
+            drawing.cancel()
 
 
 async def flood(url: str) -> None:
