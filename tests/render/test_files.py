@@ -102,7 +102,7 @@ def test_what_no_film_can_be_is_refused(
 
 def test_what_to_install_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(ConfigurationError, match=r"pip install 'katana450\[report\]'"):
+    with pytest.raises(ConfigurationError, match=r"pip install --editable '\.\[report\]'"):
         tracer.check_traceable()
-    with pytest.raises(ConfigurationError, match=r"pip install 'katana450\[report\]'"):
+    with pytest.raises(ConfigurationError, match=r"pip install --editable '\.\[report\]'"):
         film.check_filmable((96, 64), 25.0)
