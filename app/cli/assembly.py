@@ -138,8 +138,6 @@ class RunningArm:
         """After ``stop``, once the other end of the pipe is gone too: let nothing of it run on."""
         if self._link is not None:
             self._link.join()
-        # So that Python, as it ends, puts away what hangs together in circles.
-        gc.unfreeze()
 
 
 def _be_prompt() -> None:

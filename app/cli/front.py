@@ -132,6 +132,7 @@ def _run(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
 def _serve(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
     from app.exchange.meshes import Meshes
     from app.gateway.gateway import Gateway
+    from app.view.server import close_server
 
     kept = Meshes()
     kept.put(outfit.meshes, ())
@@ -156,6 +157,7 @@ def _serve(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
         view.stop()
     finally:
         gateway.stop()
+        close_server(gateway.viser)
         # So that Python, as it ends, puts away what hangs together in circles.
         gc.unfreeze()
 

@@ -74,7 +74,7 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
                 return content
 
             return _read(_text(opened(SCENE, LARGEST), SCENE), opened, T_palm_tool)
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError) as error:
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError) as error:
         raise InputError(f"This is no .zip that can be read: {error}.") from error
     except (OSError, EOFError, ValueError, zlib.error) as error:
         if isinstance(error, InputError):

@@ -117,7 +117,7 @@ class Gateway:
             loop.call_soon_threadsafe(self._hub.announce, why)
 
     def stop(self) -> None:
-        """Close every socket and the port; viser is left to its view."""
+        """Close every socket and the port; viser is left to ``close_server``."""
         self._server.should_exit = True
         if self._thread.is_alive():
             self._thread.join()

@@ -165,8 +165,7 @@ class _Line:
         if share <= FRAME or (holder is not None and holder.key == self._key):
             return 0.0
         self._due = max(self._due + share, t)
-        # They come one by one: the nearest to its time is taken, not the one after.
-        return max(self._due - 0.5 * FRAME - t, 0.0)
+        return self._due - t
 
     async def _up(self) -> None:
         """What the firewall lets pass."""

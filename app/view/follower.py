@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import logging
 import threading
 import time
@@ -37,13 +35,10 @@ class Follower(ABC):
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop following, and close the server."""
+        """Stop following."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
-        # viser would say goodbye in its own words.
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
 
     @abstractmethod
     def show(self, snapshot: Snapshot) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
-import io
 import secrets
 from collections.abc import Iterable
 
@@ -15,7 +13,7 @@ from app.exchange.meshes import Meshes
 from app.robot.model import RobotModel
 from app.robot.props import load_props
 from app.view.scenery import Scenery
-from app.view.server import open_server
+from app.view.server import close_server, open_server
 from app.view.traces import Traces
 
 TITLE = "<title>Viser</title>"
@@ -44,8 +42,7 @@ def recorded(
         head = f"<title>{html.escape(title)}</title>{CLEAR}"
         return recording.as_html().replace(TITLE, head, 1)
     finally:
-        with contextlib.redirect_stdout(io.StringIO()):
-            server.stop()
+        close_server(server)
 
 
 def _ignore(command: Command) -> None:

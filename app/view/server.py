@@ -32,6 +32,12 @@ def open_server(key: str) -> viser.ViserServer:
     return server
 
 
+def close_server(server: viser.ViserServer) -> None:
+    """Close it, without viser's own words of goodbye."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
 class _Lock:
     """Lets in those who have the key.
 

@@ -105,6 +105,7 @@ def test_a_start_that_fails_late_says_why_and_no_more(tmp_path: Path) -> None:
     assert done.returncode == 1
     (said,) = done.stderr.strip().splitlines()
     assert "map.npz is no reachability map" in said
+    assert "viser" not in done.stdout
 
 
 def test_the_command_tells_its_version_and_its_ways() -> None:
