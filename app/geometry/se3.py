@@ -25,7 +25,7 @@ Rows = list[list[float]]
 _ARRAY: Final = np.ndarray
 _FLOAT: Final = np.dtype(np.float64)
 _LAST_ROW: Final = [0.0, 0.0, 0.0, 1.0]
-_SQUARES_EXACT: Final = 6.0 * tolerances.ROTATION_EXACT**2
+_MISFITS_EXACT: Final = math.sqrt(6.0) * tolerances.ROTATION_EXACT
 
 
 def hat(V: npt.ArrayLike) -> FloatArray:
@@ -106,7 +106,7 @@ def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
 
 def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
     """What `validated` returns, as nested lists of floats."""
-    if type(T) is _ARRAY and T.dtype == _FLOAT and T.shape == (4, 4):
+    if type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4):
         rows: Rows = T.tolist()
         if _is_clean(rows):
             return rows
@@ -125,9 +125,13 @@ def _is_clean(rows: Rows) -> bool:
     On plain floats, because this stands before every inverse kinematics. NaN fails every test.
     """
     (a, b, c, x), (d, e, f, y), (g, h, i, z), last = rows
-    one, two, both = a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, a * b + d * e + g * h
-    # The third axis is right-handed: unit length and squareness follow.
-    u, v, w = d * h - g * e - c, g * b - a * h - f, a * e - d * b - i
-    squares = one * one + two * two + both * both + u * u + v * v + w * w
-    total = x + y + z
-    return squares <= _SQUARES_EXACT and total - total == 0.0 and last == _LAST_ROW
+    misfits = math.hypot(
+        a * a + d * d + g * g - 1.0,
+        b * b + e * e + h * h - 1.0,
+        a * b + d * e + g * h,
+        # The third axis is right-handed: unit length and squareness follow.
+        d * h - g * e - c,
+        g * b - a * h - f,
+        a * e - d * b - i,
+    )
+    return misfits <= _MISFITS_EXACT and math.isfinite(x + y + z) and last == _LAST_ROW
