@@ -162,10 +162,11 @@ def test_tool_vertical(chain: Chain, pitch: float) -> None:
     assert contains(solutions, q, 1e-12)
 
 
-@pytest.mark.parametrize("hint", [None, 0.6])
+@pytest.mark.parametrize("hint", [None, 0.6, -2.9, 3.1, 1e6])
 def test_tool_vertical_on_axis_1_leaves_theta1_to_the_hint(
     chain: Chain, hint: float | None
 ) -> None:
+    """Whatever its turn, and the other shoulder stands half a turn on in the turn that fits."""
     # The wrist straight above the shoulder, the tool pointing up.
     T = se3.from_rotation_translation(
         so3.rotation_z(0.9) @ so3.rotation_y(-math.pi / 2), [0.0, 0.0, 0.55]
@@ -173,7 +174,10 @@ def test_tool_vertical_on_axis_1_leaves_theta1_to_the_hint(
     q_hint = None if hint is None else [hint, 0.0, 0.0, 0.0, 0.0]
     solutions = inverse(chain, T, q_hint=q_hint)
     assert_all_exact(chain, T, solutions)
-    assert solutions[0].q[0] == (0.0 if hint is None else hint)
+    for s, half in zip(solutions, (0.0, 0.0, math.pi, math.pi), strict=True):
+        wished = math.remainder((hint or 0.0) + half, math.tau)
+        assert math.remainder(s.q[0] - wished, math.tau) == pytest.approx(0.0, abs=1e-9)
+        assert abs(s.q[0]) <= math.pi
 
 
 def test_wrist_on_axis_1(chain: Chain) -> None:
