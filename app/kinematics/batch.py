@@ -312,10 +312,15 @@ def _turn(made: _Arm, angles: FloatArray) -> None:
         if sign < 0.0:
             np.negative(angle, out=angle)
         if max(-lower, upper) > np.pi + tolerances.LIMIT_SLACK:
-            outside = (angle < lower) | (angle > upper)
-            for turn in (-2.0 * np.pi, 2.0 * np.pi):
-                other = angle + turn
-                np.copyto(angle, other, where=outside & (other >= lower) & (other <= upper))
+            below, above = angle < lower, angle > upper
+            # The first turn past the limit that it misses.
+            turns = np.where(
+                below,
+                np.ceil((lower - angle) * (0.5 / np.pi)),
+                np.floor((upper - angle) * (0.5 / np.pi)),
+            )
+            other = angle + 2.0 * np.pi * turns
+            np.copyto(angle, other, where=(below | above) & (other >= lower) & (other <= upper))
 
 
 def _inside(made: _Arm, angles: FloatArray) -> BoolArray:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -112,18 +111,6 @@ def test_no_pose_depends_on_its_neighbours(chain: Chain, rng: np.random.Generato
     on_axis = se3.from_rotation_translation(np.eye(3), [0.0, 0.0, 0.3])
     among = inverse_batch(chain, np.concatenate((T, [square, on_axis])))
     np.testing.assert_array_equal(among.q[:50], alone)
-
-
-def test_limits_beyond_a_half_turn_decide_the_turn(chain: Chain) -> None:
-    shifted = dataclasses.replace(
-        chain,
-        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]),
-        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]),
-    )
-    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0])
-    found = inverse_batch(shifted, forward(shifted, q)[None])
-    np.testing.assert_allclose(found.q[0, 0], q, atol=1e-12)
-    assert found.within_limits[0, 0]
 
 
 def test_single_precision_is_made_a_rotation_again(chain: Chain, rng: np.random.Generator) -> None:

@@ -10,6 +10,7 @@ import pytest
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.batch import inverse_batch
 from app.kinematics.branch import BRANCHES, branch_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
@@ -262,16 +263,21 @@ def test_the_hint_decides_between_turns(chain: Chain) -> None:
     np.testing.assert_allclose(solution.angles, q, atol=1e-12)
 
 
-def test_a_limit_beyond_pi_moves_the_answer_into_its_turn(chain: Chain) -> None:
+@pytest.mark.parametrize("turns", [-3, -1, 0, 1, 2])
+def test_a_limit_beyond_pi_moves_the_answer_into_its_turn(chain: Chain, turns: int) -> None:
+    whole = turns * math.tau * np.array([1.0, 0.0, 0.0, 0.0, -1.0])
     shifted = dataclasses.replace(
         chain,
-        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]),
-        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]),
+        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]) + whole,
+        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]) + whole,
     )
-    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0])
+    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0]) + whole
     solution = inverse(shifted, forward(shifted, q))[0]
     np.testing.assert_allclose(solution.q, q, atol=1e-12)
     assert solution.within_limits
+    found = inverse_batch(shifted, forward(shifted, q)[None])
+    np.testing.assert_allclose(found.q[0, 0], q, atol=1e-12)
+    assert found.within_limits[0, 0]
 
 
 def test_the_circle_of_the_paper(flange_chain: Chain) -> None:
