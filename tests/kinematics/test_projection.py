@@ -142,6 +142,20 @@ def test_too_near_the_shoulder_the_tool_folds_back_as_far_as_it_goes(chain: Chai
     assert p.reach
 
 
+def test_too_near_the_shoulder_the_forearm_folds_back_with_the_wrist_at_its_end(
+    chain: Chain,
+) -> None:
+    # A wrist that stays bent makes forearm and tool one link, longer than the upper arm.
+    lower, upper = np.array([-3.0, -3.0, 1.2, 1.7, -3.0]), np.array([3.0, 3.0, 2.2, 1.876, 3.0])
+    bent = dataclasses.replace(chain, lower=lower, upper=upper)
+    hole = math.hypot(0.139 + 0.3028 * math.cos(1.876), 0.3028 * math.sin(1.876)) - 0.190
+    p = project(bent, pose([0.0, 0.3, 0.0], [0.04, 0.0, 0.03]), branch=FRONT_UP)
+    assert p.position_error == pytest.approx(hole - 0.05, abs=1e-12)
+    assert p.q[3] == 1.876
+    assert p.limits == (3,)
+    assert p.reach
+
+
 def test_a_yawed_tool_loses_its_yaw_alone(chain: Chain, rng: np.random.Generator) -> None:
     q = np.array([0.5, -0.9, 1.1, 0.3, 0.4])
     T = forward(chain, q)
