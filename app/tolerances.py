@@ -71,6 +71,9 @@ TOUCHING: Final = 1e-6
 SAME_POSITION: Final = 1e-9
 SAME_ROTATION: Final = 1e-9
 
+# [m] How far away a pose may be: beyond it sums of a few coordinates leave the numbers there are.
+FARTHEST: Final = 1e300
+
 # [1, m] How exactly axis 1 must be upright and the tool point lie on axis 5 for a workspace to be
 # mapped: what is off by this is nothing beside a voxel.
 MAPPED_ARM: Final = 1e-6

@@ -26,6 +26,7 @@ _ARRAY: Final = np.ndarray
 _FLOAT: Final = np.dtype(np.float64)
 _LAST_ROW: Final = [0.0, 0.0, 0.0, 1.0]
 _MISFITS_EXACT: Final = math.sqrt(6.0) * tolerances.ROTATION_EXACT
+_FARTHEST: Final = tolerances.FARTHEST
 
 
 def hat(V: npt.ArrayLike) -> FloatArray:
@@ -98,8 +99,8 @@ def log(T: FloatArray) -> FloatArray:
 def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
     """A clean copy of the pose `T` (4, 4): rotation made orthonormal, last row exact.
 
-    Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, or its
-    rotation is none.
+    Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, its
+    rotation is none, or it is too far away to be computed with.
     """
     return np.array(validated_rows(T, name))
 
@@ -114,6 +115,11 @@ def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
     if np.abs(M[3] - (0.0, 0.0, 0.0, 1.0)).max() > tolerances.POSE_LAST_ROW:
         row = " ".join(f"{x:g}" for x in M[3])
         raise InputError(f"{name} has the last row {row}; a pose ends in 0 0 0 1.")
+    if np.abs(M[:3, 3]).max() > tolerances.FARTHEST:
+        raise InputError(
+            f"{name} is {np.abs(M[:3, 3]).max():.2g} m away; give positions up to "
+            f"{tolerances.FARTHEST:.0e} m."
+        )
     R = so3.validated(M[:3, :3], f"The rotation of {name}")
     clean: Rows = from_rotation_translation(R, M[:3, 3]).tolist()
     return clean
@@ -134,4 +140,4 @@ def _is_clean(rows: Rows) -> bool:
         g * b - a * h - f,
         a * e - d * b - i,
     )
-    return misfits <= _MISFITS_EXACT and math.isfinite(x + y + z) and last == _LAST_ROW
+    return misfits <= _MISFITS_EXACT and math.hypot(x, y, z) <= _FARTHEST and last == _LAST_ROW

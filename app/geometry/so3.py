@@ -165,8 +165,10 @@ def validated(R: npt.ArrayLike, name: str = "The rotation") -> FloatArray:
     single-precision rounding explains.
     """
     M = finite_array(R, (3, 3), name)
-    misfit = float(np.abs(M.T @ M - np.eye(3)).max())
-    if misfit > tolerances.ROTATION_INPUT:
+    with np.errstate(over="ignore", invalid="ignore"):
+        misfit = float(np.abs(M.T @ M - np.eye(3)).max())
+    # What overflowed is infinite or NaN.
+    if not misfit <= tolerances.ROTATION_INPUT:
         raise InputError(
             f"{name} is not a rotation: its columns are off orthonormal by {misfit:.2g} "
             f"(allowed: {tolerances.ROTATION_INPUT:.0e}); remove scale and shear from it."

@@ -90,8 +90,8 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
             if position is not None and rotation is not None:
                 for branch in range(4):
                     reached = _forward(chain, q[rows, branch].T)
-                    miss = reached[:3, 3] - asked[:3, 3]
-                    position[rows, branch] = np.sqrt((miss * miss).sum(axis=0))
+                    x, y, z = reached[:3, 3] - asked[:3, 3]
+                    position[rows, branch] = np.hypot(np.hypot(x, y), z)
                     rotation[rows, branch] = _angle(reached, asked)
     return Solutions(q, inside, position, rotation)
 
@@ -141,7 +141,7 @@ def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
     if (
         not np.abs(misfit, out=misfit).max() <= tolerances.ROTATION_EXACT
         or (T[3] != _LAST_ROW).any()
-        or not np.isfinite(T[:3, 3]).all()
+        or not np.abs(T[:3, 3], out=products).max() <= tolerances.FARTHEST
     ):
         _clean(T, start)
 
@@ -151,7 +151,8 @@ def _clean(T: FloatArray, start: int) -> None:
     misfit = np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max(axis=(1, 2))
     last_row = np.abs(T[3] - _LAST_ROW).max(axis=0)
     usable = (misfit <= tolerances.ROTATION_INPUT) & (np.linalg.det(R) > 0.0)
-    usable &= (last_row <= tolerances.POSE_LAST_ROW) & np.isfinite(p).all(axis=0)
+    usable &= last_row <= tolerances.POSE_LAST_ROW
+    usable &= (np.abs(p) <= tolerances.FARTHEST).all(axis=0)
     for i in np.flatnonzero(~usable):
         T[:, :, i] = se3.validated(T[:, :, i], f"Pose {start + i}")
     U, _, Vt = np.linalg.svd(R)
@@ -311,10 +312,15 @@ def _turn(made: _Arm, angles: FloatArray) -> None:
         if sign < 0.0:
             np.negative(angle, out=angle)
         if max(-lower, upper) > np.pi + tolerances.LIMIT_SLACK:
-            outside = (angle < lower) | (angle > upper)
-            for turn in (-2.0 * np.pi, 2.0 * np.pi):
-                other = angle + turn
-                np.copyto(angle, other, where=outside & (other >= lower) & (other <= upper))
+            below, above = angle < lower, angle > upper
+            # The first turn past the limit that it misses.
+            turns = np.where(
+                below,
+                np.ceil((lower - angle) * (0.5 / np.pi)),
+                np.floor((upper - angle) * (0.5 / np.pi)),
+            )
+            other = angle + 2.0 * np.pi * turns
+            np.copyto(angle, other, where=(below | above) & (other >= lower) & (other <= upper))
 
 
 def _inside(made: _Arm, angles: FloatArray) -> BoolArray:

@@ -67,6 +67,18 @@ class PlaneOrientation(NamedTuple):
         c, s = math.cos(0.5 * psi), math.sin(0.5 * psi)
         return 2.0 * math.atan2(c * self.y - s * self.z, c * self.w + s * self.x)
 
+    def best_turn(self, psi: float) -> float:
+        """The theta1 that comes nearest with some pitch, for a given psi.
+
+        Of the pairs (theta1, phi) as `best` of (phi, psi): A Rx(psi)^T is to be Rz(theta1) Ry(phi),
+        and the matrix of its overlap with that is [[w, y], [z, -x]].
+        """
+        c, s = math.cos(0.5 * psi), math.sin(0.5 * psi)
+        w, x = c * self.w + s * self.x, c * self.x - s * self.w
+        y, z = c * self.y - s * self.z, c * self.z + s * self.y
+        theta1, _ = PlaneOrientation(w, y, z, x).best()
+        return theta1
+
     def angle(self, phi: float, psi: float) -> float:
         """Angle [rad] between the asked orientation and Ry(phi) Rx(psi)."""
         a, b, c, d = PlaneOrientation.turned(phi, psi)

@@ -14,7 +14,7 @@ from app.geometry.se3 import Rows
 from app.kinematics.arm import Five, FiveAxisArm, arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.closed_form import Functions, closed_form
-from app.kinematics.turns import in_turn
+from app.kinematics.turns import in_turn, wrapped
 
 FourBranches = tuple[Five, Five, Five, Five]
 
@@ -79,8 +79,9 @@ def facing_near_axis_1(
                 front, back = back, front
             return _with_angle(*front) + _with_angle(*back)
     elif rho <= 0.5 * rounding:
+        free = wrapped(free)
         c, s = math.cos(free), math.sin(free)
-        return free, c, s, 0.0, free + math.pi, -c, -s, 0.0
+        return free, c, s, 0.0, wrapped(free + math.pi), -c, -s, 0.0
     sine = min(max(d / rho, -1.0), 1.0)
     cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
     x, y = x / rho, y / rho

@@ -154,11 +154,15 @@ def _theta1(
     """The theta1 to try, and whether a limit holds it there.
 
     Off axis 1 the point's direction gives it. On it the plane must hold the tool's direction, which
-    faces either way; with the tool along axis 1 too, nothing is asked of theta1.
+    faces either way; with the tool along axis 1 too, nothing is asked of theta1. A roll held at an
+    end is nearest in a plane of its own.
     """
     interval = limited.limits[0]
     facing = asked.facing(limited.arm, branch.shoulder)
-    for angle in _facing_on_axis(asked, branch, hint) if facing is None else (facing,):
+    angles = (facing,) if facing is not None else _facing_on_axis(asked, branch, hint)
+    if facing is None and asked.along is not None:
+        angles += tuple(asked.orientation.best_turn(end) for end in limited.limits[4].ends)
+    for angle in angles:
         theta1, bound = _fitted(interval, angle)
         if bound and hint is not None:
             theta1 = min(interval, key=lambda end: abs(end - hint[0]))

@@ -20,11 +20,15 @@ def wrapped(theta: float) -> float:
 def in_turn(theta: float, lower: float, upper: float) -> float:
     """`theta` in the turn between the limits if there is one, else in (-pi, pi]."""
     theta = wrapped(theta)
-    slack = tolerances.LIMIT_SLACK
-    for turned in (theta, theta - math.tau, theta + math.tau):
-        if lower - slack <= turned <= upper + slack:
-            return turned
-    return theta
+    lower, upper = lower - tolerances.LIMIT_SLACK, upper + tolerances.LIMIT_SLACK
+    if lower <= theta <= upper:
+        return theta
+    # The first turn past the limit that it misses.
+    turns = math.ceil((lower - theta) / math.tau)
+    if theta > upper:
+        turns = math.floor((upper - theta) / math.tau)
+    turned = theta + math.tau * turns
+    return turned if lower <= turned <= upper else theta
 
 
 def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:

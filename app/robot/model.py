@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.control.arm import NO_GRIPPER, Arm, Gripper
-from app.errors import RobotDescriptionError
+from app.errors import InputError, RobotDescriptionError
 from app.geometry import screws, se3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.arm import arm_of
@@ -190,7 +190,7 @@ def _tools(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> list[str]:
     if not five:
         raise RobotDescriptionError(
             f"{path.name} has no link that hangs on five turning joints; "
-            f"its joints are {', '.join(urdf.joint_map)}."
+            f"its joints are {', '.join(f'{j.name} ({j.type})' for j in urdf.joint_map.values())}."
         )
     return [max(five, key=lambda link: len(turning[link]))]
 
@@ -209,6 +209,11 @@ def _driven_joints(urdf: yourdfpy.URDF, tool: str) -> list[str]:
     """The movable joints from the root to ``tool``, in that order."""
     names: list[str] = []
     for joint in _joints_to(urdf, tool):
+        if joint.mimic is not None:
+            raise RobotDescriptionError(
+                f"Joint {joint.name!r} follows joint {joint.mimic.joint!r}; "
+                f"the five axes that carry {tool!r} must each turn by themselves."
+            )
         if joint.type in TURNING:
             names.append(joint.name)
         elif joint.type != "fixed":
@@ -239,7 +244,12 @@ def _shoulder_frame(frames: Mapping[str, FloatArray], joints: list[Any]) -> Floa
 def _screw(joint: Any, T_shoulder_child: FloatArray) -> FloatArray:
     """The joint's screw axis (6,) in {S}; a URDF joint turns about an axis of its child's frame."""
     direction = T_shoulder_child[:3, :3] @ joint.axis
-    return screws.revolute(direction, T_shoulder_child[:3, 3])
+    try:
+        return screws.revolute(direction, T_shoulder_child[:3, 3])
+    except InputError as error:
+        raise RobotDescriptionError(
+            f"Joint {joint.name!r} is not described rightly. {error}"
+        ) from error
 
 
 def _limit(joint: Any, which: str) -> float:

@@ -17,6 +17,12 @@ from app.workspace.reachability import Reachability
 POSES = 65536
 """Poses worked on at a time: some 50 MB, and enough chunks for a progress bar and a cluster."""
 
+MOST_SAMPLES = 1_000_000
+"""Their poses take 170 MB."""
+
+MOST_SEED = 2**63 - 1
+"""The file of the map keeps it in 64 bits."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityMap:
@@ -37,7 +43,7 @@ class Survey:
     """The work of one map, cut into chunks that can be done apart, anywhere and in any order.
 
     voxel: edge [m]. samples: random postures for the cloud. seed: of those. Raises InputError for a
-    voxel that makes no grid, a table that leaves none, a negative number or seed.
+    voxel that makes no grid, a table that leaves none, another number or seed than 0 to the most.
     """
 
     reachability: Reachability
@@ -46,9 +52,12 @@ class Survey:
     seed: int
 
     def __post_init__(self) -> None:
-        for name, value in (("number of samples", self.samples), ("seed", self.seed)):
-            if value < 0:
-                raise InputError(f"The {name} is {value}; give 0 or more.")
+        for name, value, most in (
+            ("number of samples", self.samples, MOST_SAMPLES),
+            ("seed", self.seed, MOST_SEED),
+        ):
+            if not 0 <= value <= most:
+                raise InputError(f"The {name} is {value}; give 0 to {most}.")
         # Asked for now, because it may refuse.
         _ = self.grid
 

@@ -99,6 +99,8 @@ def _with(row: int, column: int, value: float) -> FloatArray:
         (_with(3, 0, 0.5), "last row 0.5 0 0 1"),
         (_with(3, 3, 2.0), "last row 0 0 0 2"),
         (_with(0, 0, 1.1), "not a rotation"),
+        (_with(0, 0, 1e200), "not a rotation"),
+        (_with(1, 3, -1.7e308), r"1\.7e\+308 m away; give positions up to 1e\+300 m"),
         (_with(2, 2, -1.0), "reflection"),
         ("pose", "shape|values"),
     ],

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -29,7 +28,8 @@ def assert_as_one_by_one(chain: Chain, T: FloatArray, angle: float, error: float
         for b, s in enumerate(inverse(chain, pose)):
             between = np.angle(np.exp(1j * (found.q[i, b] - s.q)))
             assert np.abs(between).max() < angle
-            assert found.position_error[i, b] == pytest.approx(s.position_error, abs=error)
+            miss = pytest.approx(s.position_error, rel=1e-12, abs=error)
+            assert found.position_error[i, b] == miss
             assert found.rotation_error[i, b] == pytest.approx(s.rotation_error, abs=error)
             assert found.within_limits[i, b] == s.within_limits
 
@@ -92,9 +92,7 @@ def test_poses_no_arm_can_take_are_missed_as_alone(chain: Chain, rng: np.random.
             for _ in range(5)
         ]
     )
-    found = inverse_batch(chain, T)
-    assert np.isfinite(found.q).all()
-    assert_as_one_by_one(chain, T[:-5], 1e-6, 1e-9)
+    assert_as_one_by_one(chain, T, 1e-6, 1e-9)
 
 
 def test_a_tool_square_to_the_plane_is_solved_as_alone(chain: Chain) -> None:
@@ -115,18 +113,6 @@ def test_no_pose_depends_on_its_neighbours(chain: Chain, rng: np.random.Generato
     np.testing.assert_array_equal(among.q[:50], alone)
 
 
-def test_limits_beyond_a_half_turn_decide_the_turn(chain: Chain) -> None:
-    shifted = dataclasses.replace(
-        chain,
-        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]),
-        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]),
-    )
-    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0])
-    found = inverse_batch(shifted, forward(shifted, q)[None])
-    np.testing.assert_allclose(found.q[0, 0], q, atol=1e-12)
-    assert found.within_limits[0, 0]
-
-
 def test_single_precision_is_made_a_rotation_again(chain: Chain, rng: np.random.Generator) -> None:
     T = forward_batch(chain, random_q(chain, rng, 20)).astype(np.float32).astype(np.float64)
     assert_as_one_by_one(chain, T, 1e-6, 1e-12)
@@ -144,6 +130,8 @@ def test_no_pose_has_no_solution(chain: Chain) -> None:
         (lambda T: T + np.diag([0.0, 0.0, 0.0, 1e-3]), "Pose 5000 has the last row"),
         (lambda T: T @ np.diag([1.0, 1.0, 1.1, 1.0]), "Pose 5000 is not a rotation"),
         (lambda T: T @ np.diag([1.0, 1.0, -1.0, 1.0]), "Pose 5000 is a reflection"),
+        (lambda T: T @ np.diag([1.0, 1e200, 1.0, 1.0]), "Pose 5000 is not a rotation"),
+        (lambda T: np.where(np.arange(16).reshape(4, 4) == 7, 1.7e308, T), "Pose 5000 is 1.7e"),
     ],
 )
 def test_the_first_pose_that_is_none_is_named(chain: Chain, spoilt: object, words: str) -> None:

@@ -10,6 +10,7 @@ import pytest
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
+from app.kinematics.batch import inverse_batch
 from app.kinematics.branch import BRANCHES, branch_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
@@ -162,10 +163,11 @@ def test_tool_vertical(chain: Chain, pitch: float) -> None:
     assert contains(solutions, q, 1e-12)
 
 
-@pytest.mark.parametrize("hint", [None, 0.6])
+@pytest.mark.parametrize("hint", [None, 0.6, -2.9, 3.1, 1e6])
 def test_tool_vertical_on_axis_1_leaves_theta1_to_the_hint(
     chain: Chain, hint: float | None
 ) -> None:
+    """Whatever its turn, and the other shoulder stands half a turn on in the turn that fits."""
     # The wrist straight above the shoulder, the tool pointing up.
     T = se3.from_rotation_translation(
         so3.rotation_z(0.9) @ so3.rotation_y(-math.pi / 2), [0.0, 0.0, 0.55]
@@ -173,7 +175,10 @@ def test_tool_vertical_on_axis_1_leaves_theta1_to_the_hint(
     q_hint = None if hint is None else [hint, 0.0, 0.0, 0.0, 0.0]
     solutions = inverse(chain, T, q_hint=q_hint)
     assert_all_exact(chain, T, solutions)
-    assert solutions[0].q[0] == (0.0 if hint is None else hint)
+    for s, half in zip(solutions, (0.0, 0.0, math.pi, math.pi), strict=True):
+        wished = math.remainder((hint or 0.0) + half, math.tau)
+        assert math.remainder(s.q[0] - wished, math.tau) == pytest.approx(0.0, abs=1e-9)
+        assert abs(s.q[0]) <= math.pi
 
 
 def test_wrist_on_axis_1(chain: Chain) -> None:
@@ -258,16 +263,21 @@ def test_the_hint_decides_between_turns(chain: Chain) -> None:
     np.testing.assert_allclose(solution.angles, q, atol=1e-12)
 
 
-def test_a_limit_beyond_pi_moves_the_answer_into_its_turn(chain: Chain) -> None:
+@pytest.mark.parametrize("turns", [-3, -1, 0, 1, 2])
+def test_a_limit_beyond_pi_moves_the_answer_into_its_turn(chain: Chain, turns: int) -> None:
+    whole = turns * math.tau * np.array([1.0, 0.0, 0.0, 0.0, -1.0])
     shifted = dataclasses.replace(
         chain,
-        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]),
-        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]),
+        lower=np.array([0.0, -2.2, -2.1, -2.1, -6.0]) + whole,
+        upper=np.array([6.0, 0.2, 2.3, 1.9, 0.1]) + whole,
     )
-    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0])
+    q = np.array([4.5, -0.8, 1.0, 0.4, -5.0]) + whole
     solution = inverse(shifted, forward(shifted, q))[0]
     np.testing.assert_allclose(solution.q, q, atol=1e-12)
     assert solution.within_limits
+    found = inverse_batch(shifted, forward(shifted, q)[None])
+    np.testing.assert_allclose(found.q[0, 0], q, atol=1e-12)
+    assert found.within_limits[0, 0]
 
 
 def test_the_circle_of_the_paper(flange_chain: Chain) -> None:

@@ -15,6 +15,7 @@ from app.kinematics.branch import BRANCHES, Branch, branch_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.inverse import inverse
+from app.kinematics.orientation import PlaneOrientation
 from app.kinematics.projection import Projection, project
 
 FRONT_UP = Branch("front", "up")
@@ -138,6 +139,20 @@ def test_too_near_the_shoulder_the_tool_folds_back_as_far_as_it_goes(chain: Chai
     assert p.position_error == pytest.approx(hole - 0.005, abs=1e-12)
     assert p.q[2] == -0.4
     assert p.limits == (2,)
+    assert p.reach
+
+
+def test_too_near_the_shoulder_the_forearm_folds_back_with_the_wrist_at_its_end(
+    chain: Chain,
+) -> None:
+    # A wrist that stays bent makes forearm and tool one link, longer than the upper arm.
+    lower, upper = np.array([-3.0, -3.0, 1.2, 1.7, -3.0]), np.array([3.0, 3.0, 2.2, 1.876, 3.0])
+    bent = dataclasses.replace(chain, lower=lower, upper=upper)
+    hole = math.hypot(0.139 + 0.3028 * math.cos(1.876), 0.3028 * math.sin(1.876)) - 0.190
+    p = project(bent, pose([0.0, 0.3, 0.0], [0.04, 0.0, 0.03]), branch=FRONT_UP)
+    assert p.position_error == pytest.approx(hole - 0.05, abs=1e-12)
+    assert p.q[3] == 1.876
+    assert p.limits == (3,)
     assert p.reach
 
 
@@ -277,6 +292,38 @@ def test_tool_along_axis_1_takes_theta1_from_the_hint(chain: Chain) -> None:
         assert p.rotation_error < 1e-7
         assert p.q[0] == theta1
     assert project(chain, T).q[0] == 0.0
+
+
+@pytest.mark.parametrize("pitch", [-math.pi / 2, math.pi / 2])
+def test_tool_along_axis_1_turns_axis_1_for_a_roll_beyond_its_limits(
+    chain: Chain, pitch: float
+) -> None:
+    """There axes 1 and 5 turn about one line, so that either does what the other cannot."""
+    height = 0.6 if pitch < 0.0 else -0.1
+    for roll in np.radians(np.arange(0.0, 360.0, 7.5)):
+        R = so3.rotation_y(pitch) @ so3.rotation_x(roll)
+        T = se3.from_rotation_translation(R, [0.0, 0.0, height])
+        for hint in (None, [0.0, -1.2, 0.5, 0.0, 0.0], [2.8, -1.2, 0.5, 0.0, 2.8]):
+            p = project(chain, T, q_hint=hint)
+            assert p.position_error < 2e-12
+            assert p.rotation_error < 1e-9
+
+
+def test_over_axis_1_a_roll_at_its_end_has_a_plane_of_its_own(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    theta1, pitch = np.meshgrid(np.linspace(-3.0, 2.8, 59), np.linspace(-math.pi, math.pi, 73))
+    for end in (chain.lower[4], chain.upper[4]):
+        turned = so3.rotation_x(end)
+        steps = [
+            so3.rotation_z(a) @ so3.rotation_y(b) @ turned
+            for a, b in zip(theta1.flat, pitch.flat, strict=True)
+        ]
+        for R in (so3.exp(2.0 * rng.normal(size=3)) for _ in range(5)):
+            asked = PlaneOrientation.of(R)
+            best = asked.seen_from(asked.best_turn(end))
+            least = best.angle(best.best_pitch(end), end)
+            assert least <= min(so3.angle(R, step) for step in steps[::3]) + 1e-9
 
 
 def test_small_steps_of_the_target_are_small_steps_of_the_arm(chain: Chain) -> None:

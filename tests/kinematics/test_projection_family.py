@@ -178,6 +178,22 @@ def test_beside_axis_1_out_of_reach_is_as_near_as_the_stretched_arm() -> None:
         assert p.reach
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_beside_axis_1_the_end_that_comes_nearer_is_taken(side: float) -> None:
+    """In the gap of axis 1, which is not always the end that is nearer in angle."""
+    offsets = Offsets(0.0, 0.06 * side, (0.1, 0.1, 0.05), (0.0,) * 3, 0.0, (1, 1, 1, 1, 1))
+    limits = np.array([2.5, 3.0, 3.0, 3.0, 3.0])
+    chain = dataclasses.replace(member(offsets, np.eye(4), np.eye(4)), lower=-limits, upper=limits)
+    # The plane through a far target is turned less against it than that of the stretched arm.
+    azimuth = side * (math.pi + 0.13)
+    target = 2.0 * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
+    p = project(chain, se3.from_rotation_translation(np.eye(3), target), branch=BRANCHES[0])
+    stretched = [math.dist(forward(chain, [end, 0, 0, 0, 0])[:3, 3], target) for end in (-2.5, 2.5)]
+    assert p.q[0] == 2.5 * side
+    assert p.position_error == pytest.approx(min(stretched), abs=1e-12)
+    assert max(stretched) > min(stretched) + 0.01
+
+
 def test_limits_wider_than_a_turn_keep_the_turn_of_the_hint(rng: np.random.Generator) -> None:
     chain, _ = random_member(rng)
     wide = dataclasses.replace(chain, lower=np.full(5, -7.0), upper=np.full(5, 7.0))

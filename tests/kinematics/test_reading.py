@@ -16,6 +16,7 @@ from app.kinematics.freedoms import pitch_and_roll
 from app.kinematics.projection import Projection, project
 from app.kinematics.reading import Reading
 from app.kinematics.tool import ToolTarget
+from tests.kinematics.test_projection import targets
 
 FRONT_UP = Branch("front", "up")
 
@@ -158,3 +159,16 @@ def test_a_tool_target_turned_round_is_the_same_pose(chain: Chain) -> None:
 def test_over_axis_1_a_tool_target_stays_in_the_arms_plane(chain: Chain) -> None:
     over = ToolTarget(np.array([0.0, 0.0, 0.4]), 0.0, 0.0)
     assert over.facing(chain, FRONT_UP, 1.234) == 1.234
+
+
+def test_without_a_branch_the_one_that_keeps_the_pitch_best_is_taken(
+    chain: Chain, rng: np.random.Generator
+) -> None:
+    """The pitch comes before the roll and the yaw, though another branch has these nearer."""
+    for T in targets(chain, rng, 15):
+        p = project(chain, T, reading=Reading.POSITION)
+        each = [project(chain, T, reading=Reading.POSITION, branch=branch) for branch in BRANCHES]
+        nearest = min(e.position_error for e in each) + 1e-9
+        assert p.position_error <= nearest
+        pitches = [e.pitch_error for e in each if e.position_error <= nearest]
+        assert p.pitch_error <= min(pitches) + 1e-8

@@ -205,6 +205,23 @@ def test_what_is_reached_is_reached_exactly(chain: Chain, rng: np.random.Generat
             )
 
 
+@pytest.mark.parametrize("turn", [-0.5, 0.5])
+def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
+    chain: Chain, turn: float, rng: np.random.Generator
+) -> None:
+    """Also with the back to the target, where theta1 is not its direction."""
+    seen = set()
+    for q in rng.uniform(chain.lower + 0.1, chain.upper - 0.1, size=(40, 5)):
+        q[0] *= 0.75
+        end = q + np.array([turn, 0.0, 0.0, 0.0, 0.0])
+        branch, target, goal = branch_of(chain, q), ToolTarget.at(chain, end), q
+        for _ in range(3):
+            goal = track(chain, goal, target, branch=branch).best.q
+        np.testing.assert_allclose(goal, end, atol=1e-6)
+        seen.add(branch)
+    assert len(seen) == 4
+
+
 @pytest.mark.parametrize("reading", Reading)
 def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, reading: Reading) -> None:
     for position in ([9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [-3.0, 0.0, -3.0]):

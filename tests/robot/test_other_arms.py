@@ -190,6 +190,17 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
         ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.1 0 0"/>', "axis 3 must be parallel"),
         ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="fixed">', "five turn"),
         ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="prismatic">', "five"),
+        (
+            '<joint name="elbow" type="revolute">',
+            '<joint name="elbow" type="floating">',
+            "elbow .fl",
+        ),
+        (
+            '<limit lower="-2.0',
+            '<mimic joint="shoulder"/><limit lower="-2.0',
+            "'elbow' follows joint",
+        ),
+        ('<axis xyz="1 0 0"/>', '<axis xyz="nan 0 0"/>', "'wrist_rotate' is not .* axis has nan"),
         ('lower="-1.97222205" ', "", "shoulder"),
     ],
 )
