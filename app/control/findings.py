@@ -49,6 +49,8 @@ def of_projection(
     if in_place and pitch_gave_way:
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
     if findings:
+        if best.reach:
+            findings.append(Finding(Reason.IN_LINE))
         for axis in best.limits:
             q, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
             findings.append(

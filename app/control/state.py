@@ -70,6 +70,7 @@ class Reason(Enum):
     ACROSS_GAP = "across a gap"
     OUT_OF_REACH = "out of reach"
     POSITION_CHANGED = "position changed"
+    IN_LINE = "links in line"
     AXIS_LIMIT = "axis limit"
     SLIDE_LIMIT = "slide limit"
     GRIPPER_LIMIT = "gripper limit"
