@@ -17,7 +17,7 @@ import viser
 from app.control.choices import Choice
 from app.control.commands import TakeBranch
 from app.control.state import State
-from app.kinematics.branch import BRANCHES
+from app.kinematics.branch import BRANCHES, Branch
 from app.robot.model import RobotModel
 from app.view.controls import Listen
 from app.view.scene import Colour, GhostNodes
@@ -57,7 +57,7 @@ class BranchList:
         # The box is ticked in a thread of viser's.
         self._lock = threading.Lock()
         found = find(state)
-        self._table = server.gui.add_html(_rows(found))
+        self._table = server.gui.add_html(_rows(found, state.branch))
         self._box = server.gui.add_checkbox(
             "Ghosts of the others",
             initial_value=False,
@@ -87,7 +87,7 @@ class BranchList:
 
     def _draw(self, state: State) -> None:
         found = self._find(state)
-        rows = _rows(found)
+        rows = _rows(found, state.branch)
         if rows != self._table.content:
             self._table.content = rows
         if self._box.value and not self._ghosts:
@@ -108,11 +108,13 @@ class BranchList:
         return ghost
 
 
-def _rows(found: tuple[Choice, ...]) -> str:
+def _rows(found: tuple[Choice, ...], now: Branch) -> str:
+    """A row a branch, that of ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
     rows = "".join(
-        f"<tr data-branch='{choice.badge.branch}'><th><i style='background:rgb{colour}'></i>"
-        f"{choice.badge.branch}</th>"
+        f"<tr data-branch='{choice.badge.branch}'"
+        f"{' aria-current=true' if choice.badge.branch == now else ''}>"
+        f"<th><i style='background:rgb{colour}'></i>{choice.badge.branch}</th>"
         + "".join(f"<td>{escape(said)}</td>" for said in badge(choice))
         + "</tr>"
         for choice, colour in zip(found, COLOURS, strict=True)
