@@ -95,7 +95,15 @@ def velocity_ellipsoid(chain: Chain, q: npt.ArrayLike) -> Ellipsoid:
     return Ellipsoid(frozen(axes), frozen(radii))
 
 
-def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: float) -> FloatArray:
+def jog(
+    chain: Chain,
+    q: npt.ArrayLike,
+    V: npt.ArrayLike,
+    frame: JogFrame,
+    dt: float,
+    *,
+    bounds: tuple[FloatArray, FloatArray] | None = None,
+) -> FloatArray:
     """(5,) joint rates [rad/s] that move the tool with the twist `V` (6,) [rad/s, m/s].
 
     Of a rotation the arm can do two components, about the axes of pitch and of roll; the third is
@@ -103,6 +111,9 @@ def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: f
     singularity, and what is lost there is lost along the lost direction. A joint that would pass
     its limit within `dt` [s] stops there and the others make up for it as they can. If a joint
     would be too fast all are slowed alike, so the direction is kept.
+
+    bounds: the least and the most (n,) [rad/s] that each joint may have besides, around 0; those of
+    a joint that has mass and comes up to its limit.
 
     Raises InputError for a `q` or `V` that cannot be used, or a `dt` that is not above 0.
     """
@@ -116,6 +127,8 @@ def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: f
     # A joint beyond its limit may come back, and need not.
     most = np.maximum((chain.upper - q) / dt, 0.0)
     least = np.minimum((chain.lower - q) / dt, 0.0)
+    if bounds is not None:
+        least, most = np.maximum(least, bounds[0]), np.minimum(most, bounds[1])
     qd = np.zeros(chain.n)
     free = np.ones(chain.n, dtype=np.bool_)
     while free.any():
