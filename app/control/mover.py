@@ -278,11 +278,17 @@ def _rates(
     bounds: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
     """The joint rates (n,) [rad/s] of a jog."""
+    V = wished_twist(chain, q, jogging)
+    return jog(chain, q, V, JogFrame.BASE, dt, bounds=bounds)
+
+
+def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
+    """What a jog wishes of the tool, (6,) in {S} [rad/s, m/s]."""
     R = forward(chain, q)[:3, :3]
     pitched = pitched_frame(chain, q)
     v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
     omega = jogging.rates[3] * pitched[:, 1] + jogging.rates[4] * pitched[:, 0]
-    return jog(chain, q, np.concatenate((omega, v)), JogFrame.BASE, dt, bounds=bounds)
+    return np.concatenate((omega, v))
 
 
 def _told(state: State, contact: Contact | None) -> State:

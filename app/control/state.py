@@ -71,6 +71,7 @@ class Reason(Enum):
     OUT_OF_REACH = "out of reach"
     POSITION_CHANGED = "position changed"
     IN_LINE = "links in line"
+    SINGULAR = "singular"
     AXIS_LIMIT = "axis limit"
     SLIDE_LIMIT = "slide limit"
     GRIPPER_LIMIT = "gripper limit"

@@ -32,6 +32,10 @@ STRONGEST_DAMPING: Final = 0.05
 unit wish stay below 1.21 / WELL_CONDITIONED, not far above what they are where damping begins."""
 
 
+SLOW: Final = 1e-3
+"""[rad/s], over the length: a wish that no joint is too slow for. [s] A time that is short."""
+
+
 class JogFrame(Enum):
     """Whose axes a jog is along; its linear velocity is that of the tool point either way."""
 
@@ -140,6 +144,27 @@ def jog(
         qd[worst] = min(max(qd[worst], least[worst]), most[worst])
         free[worst] = False
     return qd / _excess(chain, qd)
+
+
+def followed(
+    chain: Chain, q: FloatArray, V: FloatArray, frame: JogFrame, edge: float | None = None
+) -> float:
+    """The share of the twist `V` (6,) that a jog at `q` (n,) [rad] follows, from 0 to 1.
+
+    However fast it is. edge: so far from a limit [rad] a joint does not go towards it; None leaves
+    limits aside.
+    """
+    J, wanted = _task(chain, q, V, frame)
+    size = float(wanted @ wanted)
+    if size == 0.0:
+        return 1.0
+    if edge is None:
+        return float(wanted @ (J @ _damped(J, wanted))) / size
+    least = np.where(q - chain.lower > edge, -chain.speed, 0.0)
+    most = np.where(chain.upper - q > edge, chain.speed, 0.0)
+    slow = SLOW / math.sqrt(size)
+    qd = jog(chain, q, slow * V, frame, SLOW, bounds=(least, most))
+    return float(wanted @ (J @ qd)) / (slow * size)
 
 
 def tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:

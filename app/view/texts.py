@@ -83,6 +83,7 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
     Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
     Reason.IN_LINE: lambda _: "upper arm and forearm are in one line",
+    Reason.SINGULAR: lambda _: "no joint moves the tool that way from here: go another way first",
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
