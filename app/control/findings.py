@@ -76,9 +76,10 @@ def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
     """What keeps a jog with the twist ``V`` (6,) in {S} from going on at ``q`` (n,) [rad]."""
     if followed(chain, q, V, JogFrame.BASE) < HARDLY:
         return (Finding(Reason.SINGULAR),)
-    if followed(chain, q, V, JogFrame.BASE, AT_LIMIT) > FREELY:
-        return ()
     near = limit_distances(chain, q) <= AT_LIMIT
+    # Looked at only where it matters: a tick has other things to do.
+    if not near.any() or followed(chain, q, V, JogFrame.BASE, AT_LIMIT) > FREELY:
+        return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(
         Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis)
