@@ -120,7 +120,8 @@ def _parser() -> argparse.ArgumentParser:
                 "--badges",
                 action="store_true",
                 help='each solution with its way from "q" in the line (default: the zero posture) '
-                "as distance_rad and time_s, and its smallest_singular_value",
+                "as distance_rad and time_s, its smallest_singular_value, and in contact the two "
+                "parts that would meet there, or null",
             )
     add_workspace_options(
         commands.add_parser(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from app import tolerances
 from app.control.state import Finding, Reason
 from app.geometry.arrays import FloatArray
@@ -12,12 +14,23 @@ from app.kinematics.chain import Chain
 from app.kinematics.projection import Projection
 from app.kinematics.reading import Reading
 from app.kinematics.tracker import Tracked
+from app.kinematics.velocity import JogFrame, followed, limit_distances
 
 POSITION_WORTH_TELLING = 5e-5
 """[m] Half of the arm's stated precision of 0.1 mm."""
 
 ANGLE_WORTH_TELLING = math.radians(0.05)
 """[rad] Half of the last digit the panel shows."""
+
+
+HARDLY = 0.05
+"""Share of a jog that does not move the tool to speak of."""
+
+FREELY = 0.9
+"""Share of a jog from which on nothing is missed."""
+
+AT_LIMIT = math.radians(0.5)
+"""A joint so near to its limit holds a jog up."""
 
 
 def of_joints(chain: Chain, q: FloatArray) -> tuple[Finding, ...]:
@@ -49,12 +62,29 @@ def of_projection(
     if in_place and pitch_gave_way:
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
     if findings:
+        if best.reach:
+            findings.append(Finding(Reason.IN_LINE))
         for axis in best.limits:
             q, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
             findings.append(
                 Finding(Reason.AXIS_LIMIT, float(min(lower, upper, key=lambda b: abs(b - q))), axis)
             )
     return tuple(findings)
+
+
+def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
+    """What keeps a jog with the twist ``V`` (6,) in {S} from going on at ``q`` (n,) [rad]."""
+    if followed(chain, q, V, JogFrame.BASE) < HARDLY:
+        return (Finding(Reason.SINGULAR),)
+    near = limit_distances(chain, q) <= AT_LIMIT
+    # Looked at only where it matters: a tick has other things to do.
+    if not near.any() or followed(chain, q, V, JogFrame.BASE, AT_LIMIT) > FREELY:
+        return ()
+    ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
+    return tuple(
+        Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis)
+        for axis in np.flatnonzero(near).tolist()
+    )
 
 
 def of_tracked(chain: Chain, tracked: Tracked, reading: Reading) -> tuple[Finding, ...]:

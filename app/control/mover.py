@@ -162,7 +162,8 @@ class Mover:
         share = min(state.speed, self._share(chain, state))
         for _ in range(SLOWINGS):
             if state.jogging is not None:
-                rates = share * _rates(chain, motion.q, state.jogging, dt)
+                bounds = self._any.stoppable(motion.q)
+                rates = share * _rates(chain, motion.q, state.jogging, dt, bounds)
                 ahead = self._any.at_rate(motion, rates, dt)
             elif state.servo is not None:
                 late = min(state.t - state.servo.t, JOG_TIME)
@@ -269,13 +270,25 @@ def _bent(arm: Arm, elbow: str) -> Limits:
     return replace(limits, lower=lower, upper=upper)
 
 
-def _rates(chain: Chain, q: FloatArray, jogging: Jogging, dt: float) -> FloatArray:
+def _rates(
+    chain: Chain,
+    q: FloatArray,
+    jogging: Jogging,
+    dt: float,
+    bounds: tuple[FloatArray, FloatArray],
+) -> FloatArray:
     """The joint rates (n,) [rad/s] of a jog."""
+    V = wished_twist(chain, q, jogging)
+    return jog(chain, q, V, JogFrame.BASE, dt, bounds=bounds)
+
+
+def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
+    """What a jog wishes of the tool, (6,) in {S} [rad/s, m/s]."""
     R = forward(chain, q)[:3, :3]
     pitched = pitched_frame(chain, q)
     v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
     omega = jogging.rates[3] * pitched[:, 1] + jogging.rates[4] * pitched[:, 0]
-    return jog(chain, q, np.concatenate((omega, v)), JogFrame.BASE, dt)
+    return np.concatenate((omega, v))
 
 
 def _told(state: State, contact: Contact | None) -> State:

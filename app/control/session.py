@@ -26,9 +26,9 @@ from app.control.arm import Arm
 from app.control.arrangement import dressed, removed, shifted
 from app.control.checks import check
 from app.control.choices import Choice, choice, choices, wish, wish_on
-from app.control.findings import of_joints, of_projection, of_tracked
+from app.control.findings import of_jog, of_joints, of_projection, of_tracked
 from app.control.grip import gripped
-from app.control.mover import Mover
+from app.control.mover import Mover, wished_twist
 from app.control.pouring import Pouring
 from app.control.state import (
     Finding,
@@ -333,12 +333,13 @@ class Session:
         if state.t >= state.jogging.until:
             # Braked as a jog, in step, the tool stays on its way.
             jogging = None if state.motion.at_rest else replace(state.jogging, rates=STILL)
+        held = of_jog(chain, state.setpoint, wished_twist(chain, state.setpoint, state.jogging))
         return replace(
             state,
             goal=goal,
             target=JointTarget(goal),
             branch=branch_of(chain, goal),
-            findings=contact,
+            findings=contact + held,
             jogging=jogging,
         )
 

@@ -70,6 +70,8 @@ class Reason(Enum):
     ACROSS_GAP = "across a gap"
     OUT_OF_REACH = "out of reach"
     POSITION_CHANGED = "position changed"
+    IN_LINE = "links in line"
+    SINGULAR = "singular"
     AXIS_LIMIT = "axis limit"
     SLIDE_LIMIT = "slide limit"
     GRIPPER_LIMIT = "gripper limit"

@@ -13,6 +13,7 @@ import numpy as np
 from app.errors import RobotDescriptionError
 from app.exchange.mechanism import Joint, Link, Material, Mechanism, Shape
 from app.geometry.arrays import FloatArray, frozen
+from app.robot.description import check_description
 from app.robot.visual import Visual, rods, visuals_of
 
 MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
@@ -31,8 +32,7 @@ def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     Raises RobotDescriptionError when the file cannot be read or has a joint that no exported
     format has a word for.
     """
-    if not path.is_file():
-        raise RobotDescriptionError(f"There is no robot description at {path}.")
+    check_description(path)
     import yourdfpy
 
     try:

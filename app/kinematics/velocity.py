@@ -32,6 +32,10 @@ STRONGEST_DAMPING: Final = 0.05
 unit wish stay below 1.21 / WELL_CONDITIONED, not far above what they are where damping begins."""
 
 
+SLOW: Final = 1e-3
+"""[rad/s], over the length: a wish that no joint is too slow for. [s] A time that is short."""
+
+
 class JogFrame(Enum):
     """Whose axes a jog is along; its linear velocity is that of the tool point either way."""
 
@@ -95,7 +99,15 @@ def velocity_ellipsoid(chain: Chain, q: npt.ArrayLike) -> Ellipsoid:
     return Ellipsoid(frozen(axes), frozen(radii))
 
 
-def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: float) -> FloatArray:
+def jog(
+    chain: Chain,
+    q: npt.ArrayLike,
+    V: npt.ArrayLike,
+    frame: JogFrame,
+    dt: float,
+    *,
+    bounds: tuple[FloatArray, FloatArray] | None = None,
+) -> FloatArray:
     """(5,) joint rates [rad/s] that move the tool with the twist `V` (6,) [rad/s, m/s].
 
     Of a rotation the arm can do two components, about the axes of pitch and of roll; the third is
@@ -103,6 +115,9 @@ def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: f
     singularity, and what is lost there is lost along the lost direction. A joint that would pass
     its limit within `dt` [s] stops there and the others make up for it as they can. If a joint
     would be too fast all are slowed alike, so the direction is kept.
+
+    bounds: the least and the most (n,) [rad/s] that each joint may have besides, around 0; those of
+    a joint that has mass and comes up to its limit.
 
     Raises InputError for a `q` or `V` that cannot be used, or a `dt` that is not above 0.
     """
@@ -116,6 +131,8 @@ def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: f
     # A joint beyond its limit may come back, and need not.
     most = np.maximum((chain.upper - q) / dt, 0.0)
     least = np.minimum((chain.lower - q) / dt, 0.0)
+    if bounds is not None:
+        least, most = np.maximum(least, bounds[0]), np.minimum(most, bounds[1])
     qd = np.zeros(chain.n)
     free = np.ones(chain.n, dtype=np.bool_)
     while free.any():
@@ -127,6 +144,27 @@ def jog(chain: Chain, q: npt.ArrayLike, V: npt.ArrayLike, frame: JogFrame, dt: f
         qd[worst] = min(max(qd[worst], least[worst]), most[worst])
         free[worst] = False
     return qd / _excess(chain, qd)
+
+
+def followed(
+    chain: Chain, q: FloatArray, V: FloatArray, frame: JogFrame, edge: float | None = None
+) -> float:
+    """The share of the twist `V` (6,) that a jog at `q` (n,) [rad] follows, from 0 to 1.
+
+    However fast it is. edge: so far from a limit [rad] a joint does not go towards it; None leaves
+    limits aside.
+    """
+    J, wanted = _task(chain, q, V, frame)
+    size = float(wanted @ wanted)
+    if size == 0.0:
+        return 1.0
+    if edge is None:
+        return float(wanted @ (J @ _damped(J, wanted))) / size
+    least = np.where(q - chain.lower > edge, -chain.speed, 0.0)
+    most = np.where(chain.upper - q > edge, chain.speed, 0.0)
+    slow = SLOW / math.sqrt(size)
+    qd = jog(chain, q, slow * V, frame, SLOW, bounds=(least, most))
+    return float(wanted @ (J @ qd)) / (slow * size)
 
 
 def tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:

@@ -33,6 +33,9 @@ SLACK = 1e-9
 
 DONE = (Result.Working, Result.Finished)
 
+CALM = 0.7
+"""Of acceleration and jerk, what a joint that is led along a bound brakes with."""
+
 LEAST_SHARE = 1e-3
 """Of the speed; slower than that takes ages and is a hold."""
 
@@ -168,6 +171,18 @@ class Limiter:
             wanted = np.where(beyond, 0.0, wanted)
             synchronization = Synchronization.No
         return self.stop(now, dt)
+
+    def stoppable(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The least and the most rates (n,) [rad/s] that joints at ``q`` (n,) can lose in time.
+
+        Braking takes v^2 / 2a + v a / 2j, or v^(3/2) / j^(1/2) where the jerk alone bounds it.
+        """
+        a, j = CALM * self.limits.acceleration, CALM * self.limits.jerk
+        rooms = np.maximum((q - self.limits.lower, self.limits.upper - q), 0.0)
+        soft = a * a / (2.0 * j)
+        long = np.sqrt(soft * soft + 2.0 * a * rooms) - soft
+        least, most = np.where(rooms > 4.0 * soft * soft / a, long, np.cbrt(j * rooms * rooms))
+        return -least, most
 
     def pause(self, now: Motion, goal: FloatArray, dt: float) -> Motion:
         """The motion ``dt`` [s] on when it brakes on its way to ``goal``, so that it can go on."""

@@ -19,6 +19,7 @@ from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.turns import in_limits_turn
 from app.robot.conduit import Hinge, Stretch, read_stretches
+from app.robot.description import check_description
 from app.robot.visual import Visual, rods, visuals_of
 from robot_description import URDF_PATH
 
@@ -125,8 +126,7 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     Raises:
         RobotDescriptionError: the file cannot be read, or lacks what an arm needs; says what.
     """
-    if not path.is_file():
-        raise RobotDescriptionError(f"There is no robot description at {path}.")
+    check_description(path)
     import yourdfpy
 
     try:
@@ -155,6 +155,12 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     notes += [
         f"Joint {j.name!r} is {j.type} and stays at zero." for j in others if j not in fingers
     ]
+    if tool is None and links[0] not in TOOL_FRAMES:
+        notes += [
+            f"Joint {j.name!r} is taken for that of a gripper; {links[0]!r} is the tool."
+            for j in fingers
+            if j.mimic is None
+        ]
     bodies, missing = _bodies(urdf, path, frames)
     return RobotModel(
         name=urdf.robot.name,
@@ -165,7 +171,7 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
         stretches=read_stretches(
             path.parent / CONDUITS, lambda start, end: _hinge(bodies, chain, start, end)
         ),
-        notes=(*notes, *(f"There is no mesh at {mesh}." for mesh in missing)),
+        notes=(*notes, *(f"There is no mesh at {mesh}." for mesh in dict.fromkeys(missing))),
     )
 
 

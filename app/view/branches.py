@@ -17,7 +17,7 @@ import viser
 from app.control.choices import Choice
 from app.control.commands import TakeBranch
 from app.control.state import State
-from app.kinematics.branch import BRANCHES
+from app.kinematics.branch import BRANCHES, Branch
 from app.robot.model import RobotModel
 from app.view.controls import Listen
 from app.view.scene import Colour, GhostNodes
@@ -27,6 +27,9 @@ COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (2
 """One for each of BRANCHES, told apart by people of every kind of sight; the table has them too."""
 
 OPACITY = 0.25
+
+NONE, OTHERS = "None", "All others"
+"""Whose ghosts are shown, beside that of one branch alone."""
 
 INTERVAL = 1.0
 """[s] Between two looks at the branches while the arm moves and none is shown: a look costs more
@@ -54,16 +57,17 @@ class BranchList:
         self._seen = state
         self._seen_at = -math.inf
         self._ghosts: list[GhostNodes] = []
-        # The box is ticked in a thread of viser's.
+        # Ghosts are chosen in a thread of viser's.
         self._lock = threading.Lock()
         found = find(state)
-        self._table = server.gui.add_html(_rows(found))
-        self._box = server.gui.add_checkbox(
-            "Ghosts of the others",
-            initial_value=False,
-            hint="Shows the arm on each other branch; click one and the arm goes there",
+        self._table = server.gui.add_html(_rows(found, state.branch))
+        self._wanted = server.gui.add_dropdown(
+            "Ghosts",
+            (NONE, OTHERS, *(str(branch) for branch in BRANCHES)),
+            initial_value=NONE,
+            hint="Shows the arm as it would stand; click a ghost and the arm goes there",
         )
-        self._box.on_update(lambda _: self._show())
+        self._wanted.on_update(lambda _: self._show())
         for branch in BRANCHES:
             button = server.gui.add_button(
                 f"Take {branch}", hint="The tool where it is wished, the arm on this branch"
@@ -75,7 +79,7 @@ class BranchList:
 
         At once when the arm is at rest or a person watches the ghosts; else after INTERVAL.
         """
-        watched = self._box.value or not state.moving
+        watched = self._wanted.value != NONE or not state.moving
         if state is self._seen or not (watched or now - self._seen_at >= INTERVAL):
             return
         self._seen, self._seen_at = state, now
@@ -87,14 +91,16 @@ class BranchList:
 
     def _draw(self, state: State) -> None:
         found = self._find(state)
-        rows = _rows(found)
+        rows = _rows(found, state.branch)
         if rows != self._table.content:
             self._table.content = rows
-        if self._box.value and not self._ghosts:
+        wanted = self._wanted.value
+        if wanted != NONE and not self._ghosts:
             # Made when first wanted: three more arms are half of what a page loads.
             self._ghosts = [self._ghost(number) for number in range(len(BRANCHES))]
         for ghost, choice in zip(self._ghosts, found, strict=False):
-            visible = self._box.value and choice.badge.branch != state.branch
+            branch = choice.badge.branch
+            visible = wanted in (OTHERS, str(branch)) and branch != state.branch
             ghost.root.visible = visible
             if visible:
                 ghost.move(self._model.joint_angles(choice.badge.q, state.gripper))
@@ -108,11 +114,13 @@ class BranchList:
         return ghost
 
 
-def _rows(found: tuple[Choice, ...]) -> str:
+def _rows(found: tuple[Choice, ...], now: Branch) -> str:
+    """A row a branch, that of ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
     rows = "".join(
-        f"<tr data-branch='{choice.badge.branch}'><th><i style='background:rgb{colour}'></i>"
-        f"{choice.badge.branch}</th>"
+        f"<tr data-branch='{choice.badge.branch}'"
+        f"{' aria-current=true' if choice.badge.branch == now else ''}>"
+        f"<th><i style='background:rgb{colour}'></i>{choice.badge.branch}</th>"
         + "".join(f"<td>{escape(said)}</td>" for said in badge(choice))
         + "</tr>"
         for choice, colour in zip(found, COLOURS, strict=True)

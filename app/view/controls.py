@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +15,9 @@ from app.errors import InputError, KatanaError
 
 WORTH_SENDING = 2e-6
 """[deg, mm] Rounding on the way to radians and back is less."""
+
+FINEST = 100.0
+"""Parts of a degree or mm that a slider's ends are told in."""
 
 READ_IN = 10.0
 """[s] Why something is not done goes away by itself, or the reasons would cover the scene."""
@@ -83,6 +87,12 @@ def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSlid
     )
     listen(speed, lambda: cmd.SpeedScale(speed.value / 100.0))
     return speed
+
+
+def ends(lower: float, upper: float) -> tuple[float, float]:
+    """Of a slider between limits [deg, mm]: numbers a person can read, and never beyond them."""
+    low = math.ceil(FINEST * (lower - WORTH_SENDING)) / FINEST
+    return low, math.floor(FINEST * (upper + WORTH_SENDING)) / FINEST
 
 
 def set_value(handle: Any, value: object) -> None:

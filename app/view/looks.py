@@ -64,9 +64,18 @@ def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
     if cloud is not None:
         names = tuple(cut.value for cut in Cut)
         cuts = gui.add_dropdown(
-            "Reachability", names, initial_value=Cut.HIDDEN.value, hint=cloud.legend
+            "Reachability",
+            names,
+            initial_value=Cut.HIDDEN.value,
+            hint="Where the tool can be: the map given with --workspace",
         )
-        cuts.on_update(lambda _: cloud.show(Cut(cuts.value)))
+        legend = gui.add_html(cloud.legend, visible=False)
+
+        @cuts.on_update
+        def _(_: viser.GuiEvent[Any]) -> None:
+            cut = Cut(cuts.value)
+            legend.visible = cut is not Cut.HIDDEN
+            cloud.show(cut)
 
 
 def add_themes(gui: viser.GuiApi) -> None:

@@ -12,7 +12,7 @@ from app.control import commands as cmd
 from app.control.joints import Joints
 from app.control.ledger import Entry
 from app.control.state import State
-from app.view.controls import Listen, add_motion, listener, set_slider
+from app.view.controls import Listen, add_motion, ends, listener, set_slider
 from app.view.follower import READOUT_INTERVAL
 from app.view.ledger import LedgerList
 from app.view.looks import add_themes
@@ -23,9 +23,6 @@ GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Reset()}
 
 STEPS = 400
 """Of a slider from end to end, at least."""
-
-FINEST = 100.0
-"""[1/mm, 1/deg] The ends of a slider are rounded to as much, inside the limits."""
 
 
 class MachinePanel:
@@ -79,8 +76,9 @@ class MachinePanel:
 
     def _slider(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
         joints = self._joints
-        low = math.ceil(FINEST * shown(joints, axis, float(joints.lower[axis]))) / FINEST
-        high = math.floor(FINEST * shown(joints, axis, float(joints.upper[axis]))) / FINEST
+        low, high = ends(
+            *(shown(joints, axis, float(limit[axis])) for limit in (joints.lower, joints.upper))
+        )
         slides = joints.slides[axis]
         slider = self._gui.add_slider(
             # With its number, as sentences have it; no name can pass for that of another control.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from html import escape
 
 import numpy as np
 import viser
@@ -18,7 +19,7 @@ from app.kinematics.reading import Reading
 from app.robot.model import RobotModel
 from app.view import readout
 from app.view.branches import BranchList, Find
-from app.view.controls import add_motion, listener, set_slider, set_value
+from app.view.controls import add_motion, ends, listener, set_slider, set_value
 from app.view.follower import READOUT_INTERVAL
 from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
@@ -106,10 +107,13 @@ class Panel:
         set_slider(self._speed, 100.0 * state.speed)
         set_value(self._tool, state.tool)
         set_value(self._reading, READINGS[state.reading])
+        meaning = _meaning(state.reading)
+        if meaning != self._meaning.content:
+            self._meaning.content = meaning
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
         chain = self._model.arm.chain
-        lower, upper = (float(math.degrees(limit[axis])) for limit in (chain.lower, chain.upper))
+        lower, upper = ends(*(math.degrees(limit[axis]) for limit in (chain.lower, chain.upper)))
         slider = self._gui.add_slider(
             f"Axis {axis + 1}",
             min=lower,
@@ -152,9 +156,9 @@ class Panel:
             "Reading",
             tuple(READINGS.values()),
             initial_value=READINGS[state.reading],
-            hint="What counts when five axes cannot do it all. "
-            + " ".join(f"{READINGS[each]}: {READING_HINTS[each]}." for each in Reading),
+            hint="What counts when five axes cannot do it all",
         )
+        self._meaning = self._gui.add_html(_meaning(state.reading))
         self._on_person(self._reading, lambda: cmd.SetReading(_reading(self._reading.value)))
         position = self._gui.add_vector3(
             "x, y, z",
@@ -193,6 +197,10 @@ def typed_pose(
     """The pose (4, 4) in {S} of numbers as people type them: mm, and degrees roll, pitch, yaw."""
     R = so3.from_rpy(*(math.radians(angle) for angle in angles))
     return se3.from_rotation_translation(R, 1e-3 * np.array(position))
+
+
+def _meaning(reading: Reading) -> str:
+    return f"<div class='k450'><p class='hint'>{escape(READING_HINTS[reading])}</p></div>"
 
 
 def _reading(name: str) -> Reading:

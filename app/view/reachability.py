@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from html import escape
 
 import numpy as np
 import viser
@@ -14,6 +15,10 @@ from app.workspace.colors import share_colors
 
 FILL = 0.2
 """Radius of a point to the edge of its voxel: the arm is seen between them."""
+
+
+STOPS = 9
+"""Colours of the scale; a browser draws those between them."""
 
 
 class Cut(Enum):
@@ -43,11 +48,17 @@ class ReachabilityCloud:
 
     @property
     def legend(self) -> str:
-        """What the colours mean, in a sentence."""
+        """What the colours mean, as HTML: a scale, and its ends in words."""
         top = self._stored.share.max(initial=0.0)
+        stops = ", ".join(
+            f"rgb({red}, {green}, {blue})"
+            for red, green, blue in share_colors(np.linspace(0.0, 1.0, STOPS)).tolist()
+        )
         return (
-            f"Where the tool {self._stored.tool} can be. Colour: how freely it can be turned "
-            f"there, from violet to yellow, {top:.0%} of all pitches and rolls"
+            "<div class='k450'><p class='scale'>"
+            f"How freely {escape(self._stored.tool)} can be turned there"
+            f"<i style='background: linear-gradient(to right, {stops})'></i>"
+            f"0 %<span>{100.0 * top:.0f} % of all pitches and rolls</span></p></div>"
         )
 
     def show(self, cut: Cut) -> None:

@@ -14,7 +14,7 @@ from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.velocity import limit_distances, singular_values
 from app.robot.model import RobotModel
-from app.view.texts import headline, mood, room, sentence, signed
+from app.view.texts import ROOM, condition, degrees, headline, mood, room, sentence, signed
 
 STATIC = Path(app.__file__).resolve().parent.parent / "static"
 
@@ -48,13 +48,19 @@ def _at_once(chain: Chain, q: FloatArray) -> str:
     rows = (
         ("singular", "smallest singular value", f"{values[-1]:.3f}"),
         ("manipulability", "manipulability", f"{math.prod(values):.3f}"),
+        ("condition", "condition", condition(values)),
         ("limit", "nearest limit", room(nearest, float(distances[nearest]))),
     )
-    return "<table class='at-once'>{}</table>".format(
+    every = "".join(
+        f"<td{' class=nearest' if number == nearest else ''}>{degrees(angle, 0)}</td>"
+        for number, angle in enumerate(distances.tolist())
+    )
+    return "<table class='at-once'>{}</table>{}".format(
         "".join(
             f"<tr><th>{escape(name)}</th><td data-now='{key}'>{escape(value)}</td></tr>"
             for key, name, value in rows
-        )
+        ),
+        f"<table class='rooms' data-now='limits'><tr><th>{escape(ROOM)}</th>{every}</tr></table>",
     )
 
 

@@ -9,6 +9,7 @@ from app.collision.clearance import STOP
 from app.control.choices import Choice
 from app.control.findings import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from app.control.state import Finding, Reason, State, Status
+from app.geometry.arrays import FloatArray
 from app.kinematics.reading import Reading
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
@@ -81,6 +82,8 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     ),
     Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
     Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
+    Reason.IN_LINE: lambda _: "upper arm and forearm are in one line",
+    Reason.SINGULAR: lambda _: "no joint moves the tool that way from here: go another way first",
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
@@ -116,9 +119,9 @@ READINGS: dict[Reading, str] = {
 }
 
 READING_HINTS: dict[Reading, str] = {
-    Reading.POSE: "the tool point goes where it is wished, and the tool turns as near as it can",
-    Reading.PITCH: "the tool keeps the wished pitch, and stops where it cannot",
-    Reading.POSITION: "the tool point goes where it is wished, with the nearest pitch it can have",
+    Reading.POSE: "The tool point goes where it is wished, and the tool turns as near as it can.",
+    Reading.PITCH: "The tool keeps the wished pitch, and stops where it cannot.",
+    Reading.POSITION: "The tool point goes where it is wished, with the nearest pitch it can have.",
 }
 
 BRANCH_HEADINGS = ("branch", "off by", "way there", "singular")
@@ -156,6 +159,19 @@ def told(finding: Finding) -> str:
 def room(number: int, angle: float) -> str:
     """How far an axis counted from 0 is from its nearer limit [rad]."""
     return f"{axis(number)}: {degrees(angle)} left"
+
+
+ROOM = "axes 1 to 5"
+"""Before how far each axis is from its nearer limit."""
+
+FLAT = 1e6
+"""Condition from which on rounding says how far from a singularity the arm is."""
+
+
+def condition(values: FloatArray) -> str:
+    """Largest over smallest of singular values ``values`` (n,), falling; without end in a
+    singularity."""
+    return "∞" if values[0] >= FLAT * values[-1] else _short(float(values[0] / values[-1]))
 
 
 def badge(choice: Choice) -> tuple[str, str, str]:

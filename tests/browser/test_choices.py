@@ -97,7 +97,7 @@ def test_a_person_clicks_the_ghost_of_a_branch(
     page.wait_until(lambda: page.slider_value("Axis 3") > 0.0, "the sliders at home")
     # Told together with the sliders: by now it does not say so of the posture before.
     page.wait_until(lambda: "On target" in page.panel_text(), "the arm at home", seconds=20.0)
-    page.frame.get_by_text("Ghosts of the others", exact=True).click()
+    page.choose("Ghosts", "front-down")
     elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
     page.wait_ready((elbow,))
     page.keep(artefacts / "app-ghosts.png")

@@ -252,6 +252,40 @@ def test_a_jog_stops_before_a_limit(session: Session, state: State) -> None:
         assert chain.within_limits(state.setpoint, slack=0.0)
 
 
+def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None:
+    """From the stretched arm axis 2 soon is at its limit, and the wrist has to make up for it."""
+    chain = session.arm.chain
+    state = session.begin(np.zeros(5), 0.0, 0.0)
+    height = point(chain, state.setpoint)[2]
+    for _ in range(160):
+        state = run(session, state, [cmd.Jog(np.array([0.0, 0.0, -0.25, 0.0, 0.0]))])
+        before, height = height, point(chain, state.setpoint)[2]
+        assert height < before + 1e-5
+    assert state.setpoint[1] == pytest.approx(chain.upper[1], abs=2e-3)
+    assert height < -0.1
+
+
+@pytest.mark.parametrize(
+    ("q", "rates", "told"),
+    [
+        ([0.0] * 5, [-0.2, 0.0, 0.0, 0.0, 0.0], (Reason.SINGULAR, None)),
+        ([0.0] * 5, [0.0, 0.2, 0.0, 0.0, 0.0], None),
+        ([0.0, -1.2, 1.6, 0.3, 3.0], [0.0, 0.0, 0.0, 0.0, 0.5], (Reason.AXIS_LIMIT, 4)),
+        ([0.0, -1.2, 1.6, 0.3, 3.0], [0.0, 0.0, 0.0, 0.0, -0.5], None),
+    ],
+)
+def test_a_jog_that_is_held_up_says_by_what(
+    session: Session, q: list[float], rates: list[float], told: tuple[Reason, int | None] | None
+) -> None:
+    state = session.begin(session.arm.chain.clamp(np.array(q)), 0.0, 0.0)
+    for _ in range(30):
+        state = run(session, state, [cmd.Jog(np.array(rates))])
+    assert [(f.reason, f.axis) for f in state.findings] == ([] if told is None else [told])
+    assert state.moving
+    # Who lets go misses nothing any more.
+    assert run(session, state, [], 200).findings == ()
+
+
 @pytest.mark.parametrize("rates", [[0.1] * 4, [math.nan] * 5, "fast", [[0.1] * 5]])
 def test_a_jog_that_is_none_is_refused(rates: object) -> None:
     with pytest.raises(InputError, match="jog"):

@@ -122,6 +122,18 @@ def test_rates_are_reached_and_brake_before_a_limit(limiter: Limiter) -> None:
     assert np.allclose(motion.qd, slow)
 
 
+def test_what_can_be_stopped_in_time_stops_close_before_the_limit(limiter: Limiter) -> None:
+    rng = np.random.default_rng(8)
+    for room in np.geomspace(1e-4, 3.0, 60):
+        ends = np.where(rng.random(5) < 0.5, LIMITS.lower, LIMITS.upper)
+        q = ends + np.where(ends == LIMITS.lower, room, -room)
+        q = np.clip(q, LIMITS.lower + 1e-4, LIMITS.upper - 1e-4)
+        for rates, end in zip(limiter.stoppable(q), (LIMITS.lower, LIMITS.upper), strict=True):
+            way = (limiter.halt(Motion(q, rates, np.zeros(5))) - q) / (end - q)
+            assert (way > 0.5).all()
+            assert (way < 1.0).all()
+
+
 def test_nothing_moves_without_time_or_reason(limiter: Limiter) -> None:
     motion = Motion.rest(np.zeros(5))
     assert limiter.towards(motion, LIMITS.upper, 0.0) is motion

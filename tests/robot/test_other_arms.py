@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ import yourdfpy
 from app.control import commands as cmd
 from app.control.session import Session
 from app.errors import RobotDescriptionError
+from app.exchange.urdf_mechanism import load_mechanism
 from app.geometry import se3, so3
 from app.kinematics.arm import arm_of
 from app.kinematics.branch import branch_of
@@ -242,3 +244,33 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
     other = load(path)
     np.testing.assert_allclose(other.T_base_shoulder, own.T_base_shoulder, atol=1e-15)
     np.testing.assert_allclose(so3.log(other.arm.chain.M[:3, :3]), 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("no markup", "its XML is broken, syntax error: line 1"),
+        ("<robot name='r'>\n <link name='a'>\n", "its XML is broken, no element found: line 3"),
+        ("<sdf/>", "its outermost element is <sdf>, not <robot>"),
+        ("<robot/>", "its <robot> has no name"),
+        ("<?xml version='1.0' encoding='klingon'?><robot/>", "its XML is broken, unknown encoding"),
+    ],
+)
+@pytest.mark.parametrize("read", [load, load_mechanism])
+def test_what_is_no_robot_description_is_told_as_it_is(
+    read: Callable[[Path], object], text: str, said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotDescriptionError, match=said):
+        read(path)
+
+
+def test_a_joint_behind_a_tool_that_nobody_named_is_told(tmp_path: Path) -> None:
+    more = """<link name="more"/><joint name="sixth" type="revolute"><parent link="fingertips"/>
+        <child link="more"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+    path = tmp_path / "six.urdf"
+    path.write_text(PINCHER.read_text().replace("</robot>", more))
+    (note,) = load(path).notes
+    assert note == "Joint 'sixth' is taken for that of a gripper; 'fingertips' is the tool."
+    assert load(path, "fingertips").notes == ()

@@ -23,6 +23,7 @@ from app.view.texts import (
     REASONS,
     STATUS,
     badge,
+    condition,
     degrees,
     headline,
     millimetres,
@@ -117,6 +118,14 @@ def test_a_contact_is_told_with_both_parts_and_the_distance(state: State) -> Non
 )
 def test_parts_are_named_as_people_name_them(name: str, said: str) -> None:
     assert part(name) == said
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [((1.2, 0.6), "2.0"), ((1.2, 0.03), "40"), ((1.2, 1e-9), "∞"), ((1.2, 0.0), "∞")],
+)
+def test_the_condition_has_no_digits_of_rounding(values: tuple[float, float], said: str) -> None:
+    assert condition(np.array(values)) == said
 
 
 def test_the_nearest_limit_is_told_with_its_axis() -> None:

@@ -1,0 +1,55 @@
+"""The read-out tells of every axis and of all that the velocities come to, for any posture."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.control.session import Session
+from app.kinematics.velocity import condition_number, limit_distances, manipulability
+from app.robot.model import RobotModel
+from app.view.controls import ends
+from app.view.readout import page
+
+
+def test_every_axis_tells_how_far_its_limit_is_and_the_nearest_stands_out(
+    model: RobotModel, session: Session
+) -> None:
+    random, chain = np.random.default_rng(2), model.arm.chain
+    for q in random.uniform(chain.lower, chain.upper, (20, 5)):
+        told = page(model, replace(session.begin(session.ready, 0.0, 0.0), q=q))
+        (rooms,) = re.findall(r"data-now='limits'>(.*?)</table>", told)
+        cells = re.findall(r"<td( class=nearest)?>(\d+)°</td>", rooms)
+        distances = np.degrees(limit_distances(chain, q))
+        assert [int(degrees) for _, degrees in cells] == [round(x) for x in distances.tolist()]
+        assert [bool(mark) for mark, _ in cells] == (distances == distances.min()).tolist()
+
+
+def test_the_measures_of_velocity_are_those_of_the_kinematics(
+    model: RobotModel, session: Session
+) -> None:
+    chain, state = model.arm.chain, session.begin(session.ready, 0.0, 0.0)
+    told = page(model, state)
+    assert f"<td data-now='condition'>{condition_number(chain, state.q):.0f}</td>" in told
+    assert f"<td data-now='manipulability'>{manipulability(chain, state.q):.3f}</td>" in told
+
+
+def test_in_a_singularity_the_condition_has_no_end(model: RobotModel, session: Session) -> None:
+    assert "<td data-now='condition'>∞</td>" in page(model, session.begin(np.zeros(5), 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("limits", "shown"),
+    [
+        ((-108.861981, 108.861981), (-108.86, 108.86)),
+        # Through radians and back.
+        ((-173.35000000000002, 165.64999999999998), (-173.35, 165.65)),
+    ],
+)
+def test_the_ends_of_a_slider_are_short_and_inside(
+    limits: tuple[float, float], shown: tuple[float, float]
+) -> None:
+    assert ends(*limits) == shown
