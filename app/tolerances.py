@@ -26,6 +26,9 @@ GIMBAL_LOCK: Final = 1e-9
 FAMILY_ANGLE: Final = 1e-4
 FAMILY_LENGTH: Final = 1e-5
 
+# [rad] What a right angle written as 1.57 is off by, twice over: no offset of a real arm.
+COARSE_ANGLE: Final = 2e-3
+
 # [rad, m] Up to here nothing of the above is worth a word.
 FAMILY_EXACT: Final = 1e-9
 

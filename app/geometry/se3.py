@@ -120,7 +120,7 @@ def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
             f"{name} is {np.abs(M[:3, 3]).max():.2g} m away; give positions up to "
             f"{tolerances.FARTHEST:.0e} m."
         )
-    R = so3.validated(M[:3, :3], f"The rotation of {name}")
+    R = so3.validated(M[:3, :3], f"The rotation of {name[:1].lower()}{name[1:]}")
     clean: Rows = from_rotation_translation(R, M[:3, 3]).tolist()
     return clean
 

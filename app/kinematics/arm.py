@@ -224,14 +224,16 @@ def arm_of(chain: Chain) -> FiveAxisArm:
 
 def _refuse_skewed(omega: list[FloatArray]) -> float:
     """The greatest angle [rad] by which an axis is off; raises when that is more than rounding."""
-    faults, skew = [], 0.0
+    faults, skew, coarse = [], 0.0, True
     for name, needed, off in _skews(omega):
         skew = max(skew, off)
         if off > tolerances.FAMILY_ANGLE:
             faults.append(f"{name} must be {needed} and is {math.degrees(off):.3g} deg off")
+            coarse = coarse and off <= tolerances.COARSE_ANGLE
     if faults:
         raise RobotDescriptionError(
             f"The closed-form kinematics do not cover this arm: {'; '.join(faults)}."
+            + (" Should they be right angles, write 1.570796 for 1.57." if coarse else "")
         )
     return skew
 

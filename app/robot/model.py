@@ -130,10 +130,15 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     import yourdfpy
 
     try:
-        urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
-        frames = {link: np.asarray(urdf.get_transform(link)) for link in urdf.link_map}
+        # What is not finite is told below.
+        with np.errstate(invalid="ignore"):
+            urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+            frames = {link: np.asarray(urdf.get_transform(link)) for link in urdf.link_map}
     except Exception as error:
         raise RobotDescriptionError(f"{path} is not a robot description: {error}") from error
+    for joint in urdf.joint_map.values():
+        if joint.origin is not None and not np.isfinite(joint.origin).all():
+            raise RobotDescriptionError(f"Joint {joint.name!r} has an origin that is not finite.")
 
     links = _tools(urdf, path, tool)
     driven = _driven_joints(urdf, links[0])

@@ -1,6 +1,6 @@
 """The branches to choose from: what each would give and cost, and two ways to take one.
 
-A table and a button a branch in the panel; and, when a person asks to see them, the arm as it would
+A table and buttons in the panel; and, when a person asks to see them, the arm as it would
 stand, to be clicked.
 """
 
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable
-from functools import partial
 from html import escape
 
 import viser
@@ -68,11 +67,12 @@ class BranchList:
             hint="Shows the arm as it would stand; click a ghost and the arm goes there",
         )
         self._wanted.on_update(lambda _: self._show())
-        for branch in BRANCHES:
-            button = server.gui.add_button(
-                f"Take {branch}", hint="The tool where it is wished, the arm on this branch"
-            )
-            listen(button, partial(TakeBranch, branch))
+        take = server.gui.add_button_group(
+            "Take",
+            tuple(str(branch) for branch in BRANCHES),
+            hint="The tool where it is wished, the arm on this branch",
+        )
+        listen(take, lambda: TakeBranch(Branch.parse(take.value)))
 
     def follow(self, state: State, now: float) -> None:
         """Show what the branches come to from ``state`` at time ``now`` [s].
@@ -110,7 +110,7 @@ class BranchList:
         name = f"/branch/{branch}"
         ghost = GhostNodes(self._server, self._model, name, COLOURS[number], OPACITY)
         for shape in ghost.shapes:
-            self._listen(shape, partial(TakeBranch, branch))
+            self._listen(shape, lambda: TakeBranch(branch))
         return ghost
 
 

@@ -15,6 +15,7 @@ from app.view.machine_nodes import MachineNodes
 from app.view.machine_panel import MachinePanel
 from app.view.paint import PaintNodes
 from app.view.room import furnish
+from app.view.texts import title
 
 
 class MachineView(Follower):
@@ -33,7 +34,7 @@ class MachineView(Follower):
         self._machine = machine
         self._sink = sink
         furnish(server)
-        server.gui.set_panel_label(machine.mechanism.name)
+        server.gui.set_panel_label(title(machine.mechanism.name))
         look = camera(machine.mechanism)
         server.initial_camera.position = look.eye
         server.initial_camera.look_at = look.target

@@ -137,6 +137,12 @@ def mood(state: State) -> str:
     return "moving" if moves else state.status.value
 
 
+def title(robot: str) -> str:
+    """Of a page that shows the robot of this name."""
+    words = robot.replace("_", " ").strip()
+    return words[:1].upper() + words[1:]
+
+
 def headline(state: State) -> str:
     """Two or three words for the state of the arm."""
     if state.moving and state.status is Status.OK:
@@ -161,8 +167,8 @@ def room(number: int, angle: float) -> str:
     return f"{axis(number)}: {degrees(angle)} left"
 
 
-ROOM = "axes 1 to 5"
-"""Before how far each axis is from its nearer limit."""
+ROOM = "to each limit"
+"""Before how far each axis is from its nearer one."""
 
 FLAT = 1e6
 """Condition from which on rounding says how far from a singularity the arm is."""

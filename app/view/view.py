@@ -33,6 +33,7 @@ from app.view.programs import ProgramsPanel, Steering
 from app.view.reachability import ReachabilityCloud
 from app.view.scene import Colour, Gap, GhostNodes
 from app.view.scenery import Scenery
+from app.view.texts import title
 from app.view.tint import Tint
 from app.view.traces import Traces
 
@@ -85,6 +86,7 @@ class View(Follower):
         """
         super().__init__(server, board, frame_rate)
         besides = Besides() if besides is None else besides
+        server.gui.set_panel_label(title(model.name))
         self._model = model
         self._mailbox = mailbox
         props = load_props()

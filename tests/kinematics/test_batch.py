@@ -128,9 +128,9 @@ def test_no_pose_has_no_solution(chain: Chain) -> None:
     [
         (lambda T: T * np.nan, "Pose 5000 has nan"),
         (lambda T: T + np.diag([0.0, 0.0, 0.0, 1e-3]), "Pose 5000 has the last row"),
-        (lambda T: T @ np.diag([1.0, 1.0, 1.1, 1.0]), "Pose 5000 is not a rotation"),
-        (lambda T: T @ np.diag([1.0, 1.0, -1.0, 1.0]), "Pose 5000 is a reflection"),
-        (lambda T: T @ np.diag([1.0, 1e200, 1.0, 1.0]), "Pose 5000 is not a rotation"),
+        (lambda T: T @ np.diag([1.0, 1.0, 1.1, 1.0]), "rotation of pose 5000 is not a rotation"),
+        (lambda T: T @ np.diag([1.0, 1.0, -1.0, 1.0]), "rotation of pose 5000 is a reflection"),
+        (lambda T: T @ np.diag([1.0, 1e200, 1.0, 1.0]), "rotation of pose 5000 is not a rotation"),
         (lambda T: np.where(np.arange(16).reshape(4, 4) == 7, 1.7e308, T), "Pose 5000 is 1.7e"),
     ],
 )
@@ -138,7 +138,7 @@ def test_the_first_pose_that_is_none_is_named(chain: Chain, spoilt: object, word
     T = forward_batch(chain, np.zeros((6000, 5)))
     assert callable(spoilt)
     T[5000] = spoilt(T[5000])
-    with pytest.raises(InputError, match=words.replace("Pose", ".*Pose")):
+    with pytest.raises(InputError, match=words):
         inverse_batch(chain, T)
 
 

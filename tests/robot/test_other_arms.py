@@ -204,6 +204,8 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
         ),
         ('<axis xyz="1 0 0"/>', '<axis xyz="nan 0 0"/>', "'wrist_rotate' is not .* axis has nan"),
         ('lower="-1.97222205" ', "", "shoulder"),
+        ('<origin xyz="0.05 0 0.15"/>', '<origin xyz="0 inf 0"/>', "'elbow' has an origin"),
+        ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.0008 0 0"/>', "write 1.570796 for 1.57"),
     ],
 )
 def test_an_arm_of_another_kind_is_refused_with_the_reason(

@@ -30,6 +30,7 @@ from app.view.texts import (
     part,
     room,
     sentence,
+    title,
 )
 from app.view.view import GHOST_COLOURS
 
@@ -178,3 +179,10 @@ def test_no_negative_zero() -> None:
     assert degrees(-1e-9) == "0.0°"
     assert millimetres(-1e-9) == "0.0 mm"
     assert degrees(-0.5, 0) == "−29°"
+
+
+@pytest.mark.parametrize(
+    ("robot", "said"), [("katana450", "Katana450"), ("youbot_arm", "Youbot arm"), ("", "")]
+)
+def test_a_page_is_named_after_its_robot(robot: str, said: str) -> None:
+    assert title(robot) == said
