@@ -267,6 +267,16 @@ def test_a_call_looks_for_a_bounded_number_of_poses(
     assert EFFORT // 2 < most <= EFFORT + 1
 
 
+@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("far", [1e3, 1e9, 1e300])
+def test_a_drag_without_measure_has_an_end(chain: Chain, reading: Reading, far: float) -> None:
+    since = ToolTarget.at(chain, READY)
+    target = ToolTarget(far * np.array([0.4, 0.8, 0.4]), since.pitch, since.roll)
+    best = arrived(chain, READY, target, since, reading).best
+    assert np.isfinite(best.position_error)
+    assert math.atan2(best.T[1, 3], best.T[0, 3]) == pytest.approx(math.atan2(0.8, 0.4), abs=1e-3)
+
+
 def test_a_pitch_that_no_hop_leads_to_turns_nothing_away(chain: Chain) -> None:
     """With axes 2, 3 and 4 at their ends the pitch ends too, whatever the place would gain."""
     rng = np.random.default_rng(8)
