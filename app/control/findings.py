@@ -11,17 +11,10 @@ from app import tolerances
 from app.control.state import Finding, Reason
 from app.geometry.arrays import FloatArray
 from app.kinematics.chain import Chain
-from app.kinematics.projection import Projection
+from app.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING, Projection
 from app.kinematics.reading import Reading
 from app.kinematics.tracker import Tracked
 from app.kinematics.velocity import JogFrame, followed, limit_distances
-
-POSITION_WORTH_TELLING = 5e-5
-"""[m] Half of the arm's stated precision of 0.1 mm."""
-
-ANGLE_WORTH_TELLING = math.radians(0.05)
-"""[rad] Half of the last digit the panel shows."""
-
 
 HARDLY = 0.05
 """Share of a jog that does not move the tool to speak of."""
@@ -62,8 +55,10 @@ def of_projection(
     if in_place and pitch_gave_way:
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
     if findings:
+        if best.axis1:
+            findings.append(Finding(Reason.AXIS_1))
         if best.reach:
-            findings.append(Finding(Reason.IN_LINE))
+            findings.append(Finding(Reason.LINKS))
         for axis in best.limits:
             q, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
             findings.append(

@@ -17,7 +17,7 @@ from app import tolerances
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.geometry.se3 import Rows
-from app.kinematics.arm import Five
+from app.kinematics.arm import Five, FiveAxisArm
 from app.kinematics.branch import BRANCHES, Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
@@ -68,11 +68,10 @@ class Solution:
     @property
     def exact(self) -> bool:
         """Whether the arm takes the asked pose there, to rounding, that of its file included."""
-        arm = Solver.of(self._chain).arm
-        rounding = 2.0 * (arm.skew * arm.reach + arm.gap)
+        length, turn = _rounding(Solver.of(self._chain).arm, self._rows)
         return (
-            self.position_error <= tolerances.SAME_POSITION + rounding
-            and self.rotation_error <= tolerances.SAME_ROTATION + 4.0 * arm.skew
+            self.position_error <= tolerances.SAME_POSITION + length
+            and self.rotation_error <= tolerances.SAME_ROTATION + turn
         )
 
     def _measured(self) -> tuple[float, float]:
@@ -86,6 +85,23 @@ class Solution:
 
     def __repr__(self) -> str:
         return f"Solution(angles={self.angles}, branch={self.branch})"
+
+
+def _rounding(arm: FiveAxisArm, rows: Rows) -> tuple[float, float]:
+    """How much [m], [rad] a pose is missed by for what is rounding in the file of the arm.
+
+    Each of four axes may be off by `skew`, and what hangs on them by a `length`. theta1 is told by
+    a place sqrt(rho^2 - d^2) outward of axis 1, which turns it by that length to this distance;
+    nearer than the length it is not known. A tool point beside the roll axis turns with it.
+    """
+    length = 4.0 * (arm.skew * arm.reach + arm.gap)
+    if length == 0.0:
+        return 0.0, 0.0
+    x, y = arm.pose(np.array(rows))[:2, 3].tolist()
+    rho, d = math.hypot(x, y), abs(arm.d)
+    outward = math.sqrt(abs(rho - d) * (rho + d) + length * (length + 2.0 * d))
+    turn = 4.0 * arm.skew + length / outward
+    return length + turn * arm.off_axis, turn
 
 
 class FourSolutions(Sequence[Solution]):

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from app import tolerances
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
-from app.kinematics.arm import arm_of
+from app.kinematics.arm import FiveAxisArm, arm_of
 from app.kinematics.asked import Asked
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
@@ -26,6 +27,12 @@ from app.kinematics.limited import LimitedArm
 from app.kinematics.reading import Reading
 from app.kinematics.stance import Stance, nearest_stance
 from app.kinematics.turns import in_limits_turn, nearest_turn, wrapped
+
+POSITION_WORTH_TELLING: Final = 5e-5
+"""[m] Half of the arm's stated precision of 0.1 mm."""
+
+ANGLE_WORTH_TELLING: Final = math.radians(0.05)
+"""[rad] Half of the last digit a person is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +44,9 @@ class Projection:
     `T`. yaw_error [rad]: between the asked tool's roll axis and the arm's plane, which no five-axis
     arm can follow. pitch_error [rad]: between the two roll axes within that plane, or the two
     pitches where the reading has the pitch count and not the yaw.
-    limits: indices (from 0) of the axes whose limit keeps the arm from coming nearer. reach: links
-    in one line keep it from coming nearer.
+    What keeps the arm from coming nearer: limits: indices (from 0) of the axes whose limit does.
+    axis1: axis 1 is in the way, since the branch has no place across it, or the plane passes beside
+    it. reach: the links do, which reach no farther that way.
     """
 
     T: FloatArray
@@ -49,6 +57,7 @@ class Projection:
     yaw_error: float
     pitch_error: float
     limits: tuple[int, ...]
+    axis1: bool
     reach: bool
 
 
@@ -83,7 +92,7 @@ def project(
     if within_limits:
         return measured(chain, T, asked, stance)
     q = nearest_turn(chain, in_limits_turn(chain, q), hint)
-    return replace(measured(chain, T, asked, stance, q), limits=())
+    return measured(chain, T, asked, stance, q)
 
 
 def measured(
@@ -91,29 +100,54 @@ def measured(
 ) -> Projection:
     """What `stance` makes of `T` (4, 4) = T_S_tool [m], which `asked` is.
 
-    q: its joint angles (5,) [rad] where they are to be in other turns than those inside the limits.
+    q: its joint angles (5,) [rad] where limits do not count.
     """
     arm, in_plane = arm_of(chain), stance.in_plane
+    limits: tuple[int, ...] = ()
     if q is None:
         q = np.minimum(np.maximum(arm.joints(stance.alpha), chain.lower), chain.upper)
+        limits = tuple(_binding(chain, q, stance))
     reached = forward(chain, q)
+    position_error = math.dist(reached[:3, 3], T[:3, 3])
     theta1 = stance.alpha[0]
     outward, sideways, down = asked.heading(theta1)
     flat = math.hypot(outward, down)
-    pitch_error = abs(wrapped(arm.pitch(stance.alpha) - asked.pitch(theta1)))
+    yaw_error, pitch_error = math.atan2(abs(sideways), flat), 0.0
+    if asked.reading is not Reading.POSE or flat > tolerances.ON_AXIS:
+        pitch_error = abs(wrapped(arm.pitch(stance.alpha) - asked.pitch(theta1)))
+    axis1 = position_error > tolerances.SAME_POSITION and _axis_1_binds(arm, asked, stance)
+    # A yaw that is given up changes the pitch that is nearest.
+    pitched = asked.reading is not Reading.POSE or yaw_error <= tolerances.SAME_ROTATION
+    missed = max(position_error, pitch_error if pitched else 0.0) > tolerances.SAME_POSITION
     return Projection(
         T=frozen(reached),
         q=frozen(q),
         branch=stance.branch,
-        position_error=math.dist(reached[:3, 3], T[:3, 3]),
+        position_error=position_error,
         rotation_error=so3.angle(reached[:3, :3], T[:3, :3]),
-        yaw_error=math.atan2(abs(sideways), flat),
-        pitch_error=pitch_error
-        if asked.reading is not Reading.POSE or flat > tolerances.ON_AXIS
-        else 0.0,
-        limits=tuple(_binding(chain, q, stance)),
-        reach=in_plane.posture_bound and in_plane.posture.stretched,
+        yaw_error=yaw_error,
+        pitch_error=pitch_error,
+        limits=limits,
+        axis1=axis1,
+        reach=(in_plane.posture_bound and in_plane.posture.stretched)
+        or (missed and not limits and not axis1),
     )
+
+
+def _axis_1_binds(arm: FiveAxisArm, asked: Asked, stance: Stance) -> bool:
+    """Whether the asked point is across axis 1 from where the branch ends, or where it cannot turn.
+
+    A turn of axis 1 moves a tool point beside it outward or inward alone.
+    """
+    x, y, _ = arm.tool_point(stance.alpha)
+    dx, dy = asked.tool[0] - x, asked.tool[1] - y
+    c, s = math.cos(stance.alpha[0]), math.sin(stance.alpha[0])
+    outward, missed_outward, missed_aside = c * x + s * y, c * dx + s * dy, c * dy - s * dx
+    r = outward - arm.beside(arm.pitch(stance.alpha), stance.alpha[4])[0]
+    side = 1.0 if stance.branch.shoulder == "front" else -1.0
+    ends = abs(r) <= tolerances.ON_AXIS and side * missed_outward < -tolerances.SAME_POSITION
+    beside = abs(outward) <= tolerances.ON_AXIS and abs(missed_aside) > tolerances.SAME_POSITION
+    return ends or beside
 
 
 def _binding(chain: Chain, q: FloatArray, stance: Stance) -> Iterator[int]:

@@ -23,7 +23,8 @@ from app.kinematics.reading import Reading
 from app.kinematics.turns import wrapped
 
 _TURNS: Final = 100
-"""Most steps of the iterations that end by themselves, each step much nearer than the last."""
+"""Most steps of the iterations that end by themselves, each step much nearer than the last: all but
+those where the pitch asked for changes sides with theta1."""
 
 
 _SLOW: Final = 0.9
@@ -119,9 +120,10 @@ def _stances(
     a, d = arm.a + outward, asked.aside(arm)
     settled = not approach or d == 0.0 or asked.on_axis
     roll_hint = None if hint is None else hint[4]
-    for first, first_bound in _theta1(limited, asked, branch, hint):
-        theta1, bound = first, first_bound
+    for first in _theta1(limited, asked, branch, hint):
+        turn = first
         for _ in range(_TURNS):
+            theta1, bound = turn
             c, s = math.cos(theta1), math.sin(theta1)
             u, v = asked.x * c + asked.y * s - a, up - asked.z
             wanted = asked.seen_from(theta1).tilted(arm.tilt)
@@ -132,10 +134,11 @@ def _stances(
             if settled:
                 break
             # The tool point at pu is nearest to the asked one with theta1 turned to face it so.
-            aligned, held = _fitted(limits[0], asked.aligned(arm, pu + a))
+            turn = _fitted(limits[0], asked.aligned(arm, pu + a))
+            aligned, held = turn
             if (bound and held) or abs(aligned - theta1) <= tolerances.ALIGNED:
+                bound = held
                 break
-            theta1, bound = aligned, held
         if found is not None:
             alpha = (theta1, *found.posture[:3], found.psi)
             yield Stance(

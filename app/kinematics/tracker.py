@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
@@ -24,10 +24,14 @@ from app.kinematics.arm import Five, FiveAxisArm
 from app.kinematics.asked import Asked
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
-from app.kinematics.in_plane import InPlane
 from app.kinematics.limited import LimitedArm
-from app.kinematics.planar import Interval, Posture
-from app.kinematics.projection import Projection, measured
+from app.kinematics.planar import Interval
+from app.kinematics.projection import (
+    ANGLE_WORTH_TELLING,
+    POSITION_WORTH_TELLING,
+    Projection,
+    measured,
+)
 from app.kinematics.reading import Reading
 from app.kinematics.stance import Stance, nearest_stance
 from app.kinematics.tool import ToolTarget
@@ -42,6 +46,10 @@ STRIDE: Final = 0.02
 
 LONGEST_WAY: Final = 32
 """Strides along one drag; a longer one takes longer strides."""
+
+FAR: Final = 16.0
+"""[1] Of the arm's reach: of a hand that is farther away its direction alone counts on the way, so
+that every way has an end."""
 
 EFFORT: Final = 18
 """Nearest poses sought in one call. What is farther is reached in the next: the joints need several
@@ -84,11 +92,14 @@ class Tracked:
 
     @property
     def status(self) -> Tracking:
-        """HELD when a better pose lies beyond a gap, OK when nothing is given up."""
+        """HELD when a better pose lies beyond a gap, OK when nothing worth telling is given up."""
         if self.ahead is not None:
             return Tracking.HELD
-        given_up = max(self.best.position_error, self.best.rotation_error)
-        return Tracking.LIMITED if given_up > WORTH_A_LEAP else Tracking.OK
+        given_up = (
+            self.best.position_error > POSITION_WORTH_TELLING
+            or self.best.rotation_error > ANGLE_WORTH_TELLING
+        )
+        return Tracking.LIMITED if given_up else Tracking.OK
 
     def leap_ahead(self) -> tuple[int, float]:
         """The axis (from 0) that would leap farthest to the pose ahead, and how far [rad]."""
@@ -124,7 +135,7 @@ def track(
         )
     # One hop at least, so that there is an end.
     effort = max(EFFORT - _effort(ahead), 1)
-    for stop in () if since is None else _way(since, target):
+    for stop in () if since is None else _way(limited.arm, since, target):
         wish = stop.asked(limited.arm, reading)
         pursuit = _Pursuit(limited, wish, nearest_stance(limited, wish, branch, alpha))
         found = pursuit.follow(alpha, EFFORT_A_STRIDE)
@@ -160,8 +171,14 @@ def _projection(chain: Chain, target: ToolTarget, asked: Asked, stance: Stance) 
     return measured(chain, target.pose(chain, sign * stance.alpha[0]), asked, stance)
 
 
-def _way(since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
+def _near(arm: FiveAxisArm, target: ToolTarget) -> ToolTarget:
+    far = math.hypot(*target.position) / (FAR * arm.reach)
+    return target if far <= 1.0 else replace(target, position=target.position / far)
+
+
+def _way(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
     """The stops of the drag, without its ends."""
+    since, target = _near(arm, since), _near(arm, target)
     strides = max(
         math.dist(since.position, target.position) / STRIDE,
         abs(target.pitch - since.pitch) / HOP,
@@ -200,7 +217,11 @@ class _Pursuit:
             self.ended = not worthwhile or _within(HOP * (1.0 - WORTH_A_HOP), alpha, hop.alpha)
             if worthwhile or (found is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
                 found, alpha, miss = hop, hop.alpha, hop_miss
-        return _standing(alpha, self.best.branch) if found is None else found
+            else:
+                # It stands, for what holds the hop.
+                found = hop._replace(alpha=alpha)
+        assert found is not None
+        return found
 
 
 def _effort(stance: Stance) -> int:
@@ -214,13 +235,7 @@ def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: Stance) -> Stan
         return best
     miss, miss_best = (_misses(arm, asked, angles) for angles in (alpha, best.alpha))
     away = _nearer(miss, miss_best, tolerances.SAME_POSITION)
-    return _standing(alpha, best.branch) if away else best
-
-
-def _standing(alpha: Five, branch: Branch) -> Stance:
-    """Where no hop leads nearer: any axis at its limit may be what holds it."""
-    in_plane = InPlane(Posture(*alpha[1:4]), alpha[4], 0.0, True, True)
-    return Stance(alpha, branch, 0.0, 0.0, True, in_plane)
+    return best._replace(alpha=alpha) if away else best
 
 
 def _hop(limited: LimitedArm, alpha: Five, asked: Asked, branch: Branch) -> Stance:
@@ -279,8 +294,10 @@ def _misses(arm: FiveAxisArm, asked: Asked, alpha: Five) -> tuple[float, ...]:
 
 
 def _nearer(a: tuple[float, ...], b: tuple[float, ...], by: float) -> bool:
-    """Whether the misses `a` are less than `b`, by more than `by`."""
+    """Whether the misses `a` are less than `b` by more than `by`, and none before it is more."""
     for miss_a, miss_b in zip(a, b, strict=True):
-        if abs(miss_a - miss_b) > by:
-            return miss_a < miss_b
+        if miss_a < miss_b - by:
+            return True
+        if miss_a > miss_b + min(by, tolerances.SAME_POSITION):
+            return False
     return False

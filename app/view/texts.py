@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 from app.collision.clearance import STOP
 from app.control.choices import Choice
-from app.control.findings import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from app.control.state import Finding, Reason, State, Status
 from app.geometry.arrays import FloatArray
+from app.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from app.kinematics.reading import Reading
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
@@ -82,7 +82,10 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     ),
     Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
     Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
-    Reason.IN_LINE: lambda _: "upper arm and forearm are in one line",
+    Reason.AXIS_1: lambda _: (
+        "axis 1 is in the way: drag round it, or choose another pose under Branches"
+    ),
+    Reason.LINKS: lambda _: "its links reach no farther that way",
     Reason.SINGULAR: lambda _: "no joint moves the tool that way from here: go another way first",
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",

@@ -183,7 +183,7 @@ def test_each_reading_keeps_its_promise_and_says_what_it_gives_up(
     state = take(session, state, cmd.SetReading(reading), cmd.SetPose(T))
     assert state.reading is reading
     assert given_up <= set(reasons(state))
-    assert set(reasons(state)) <= given_up | {Reason.AXIS_LIMIT, Reason.IN_LINE}
+    assert set(reasons(state)) <= given_up | {Reason.AXIS_LIMIT, Reason.LINKS}
     if kept == "position":
         assert np.allclose(point(arm, state.goal), FAR_OUT, atol=1e-9)
     else:

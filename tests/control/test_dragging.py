@@ -16,13 +16,14 @@ from app.control import commands as cmd
 from app.control.arm import NO_GRIPPER, Arm
 from app.control.choices import wish
 from app.control.session import Session
-from app.control.state import State, Status, ToolTarget
+from app.control.state import Reason, State, Status, ToolTarget
 from app.geometry.arrays import FloatArray
 from app.kinematics.arm import arm_of
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitch_and_roll
+from app.kinematics.projection import POSITION_WORTH_TELLING
 from app.kinematics.reading import Reading
 from app.robot.model import load
 from tests.kinematics.family import random_member, random_pose
@@ -42,6 +43,8 @@ OTHERS = 500
 GRABS = (1, 5, 25)
 """Moves of the hand between taking hold and letting go; in every fourth trip it turns the rings
 too."""
+
+CAUSES = {Reason.ACROSS_GAP, Reason.AXIS_LIMIT, Reason.AXIS_1, Reason.LINKS}
 
 MOST_TICKS = 30
 """To take the goal to where the hand went; the arm needs many more to go there."""
@@ -135,6 +138,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
             ticks += 1
         assert isinstance(state.target, ToolTarget)
         check_goal(chain, before, state, state.target)
+        check_findings(chain, state, state.target)
         state = check_tick(chain, session, state)
         assert state.branch == branch
         yield state
@@ -160,6 +164,14 @@ def check_goal(chain: Chain, before: State, state: State, target: ToolTarget) ->
         if b < a - ROUNDING:
             break
     assert chain.within_limits(state.goal, slack=0.0)
+
+
+def check_findings(chain: Chain, state: State, target: ToolTarget) -> None:
+    """Whatever is given up is told, and with a cause that a person can act on."""
+    reasons = {finding.reason for finding in state.findings}
+    given_up = math.dist(tool(chain, state.goal), target.position) > POSITION_WORTH_TELLING
+    assert reasons or not given_up
+    assert not reasons or reasons & CAUSES
 
 
 def check_tick(

@@ -124,7 +124,7 @@ def test_out_of_reach_the_goal_is_the_nearest_point_and_the_gap_is_told(
     (gap,) = (f for f in state.findings if f.reason is Reason.OUT_OF_REACH)
     assert gap.amount == pytest.approx(np.linalg.norm(far) - lengths, abs=1e-9)
     # What binds is the reach of the links; no axis is at a limit.
-    assert [f.reason for f in state.findings] == [Reason.OUT_OF_REACH, Reason.IN_LINE]
+    assert [f.reason for f in state.findings] == [Reason.OUT_OF_REACH, Reason.LINKS]
     assert state.status is Status.LIMITED
 
 
@@ -147,7 +147,7 @@ def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
     away = run(session, away, [cmd.Settle()])
     assert isinstance(away.target, JointTarget)
     assert away.target.q is away.goal
-    assert reasons(away) == {Reason.OUT_OF_REACH, Reason.IN_LINE}
+    assert reasons(away) == {Reason.OUT_OF_REACH, Reason.LINKS}
     # The next wish starts from what the arm does, and clears the reason.
     back = run(session, away, [cmd.TurnTool(*pitch_and_roll(session.arm.chain, away.goal))])
     assert np.allclose(back.goal, away.goal, atol=1e-6)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from app.geometry import se3, so3
+from app.geometry import screws, se3, so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.arm import arm_of
 from app.kinematics.branch import BRANCHES, branch_of
@@ -211,6 +212,30 @@ def test_a_tool_point_beside_the_roll_axis_is_solved(rng: np.random.Generator) -
         q = rng.uniform(chain.lower, chain.upper)
         solutions = inverse(beside, forward(beside, q))
         assert any(s.exact and same(s.q, q, 1e-6) for s in solutions)
+
+
+def test_what_is_rounding_in_a_file_leaves_a_solution_exact(rng: np.random.Generator) -> None:
+    """Also by axis 1, where theta1 makes much of it; a yaw that is off is none of it."""
+    for number in range(200):
+        chain, _ = random_member(rng)
+        if number % 2:
+            chain = chain.with_tool(chain.M @ random_pose(rng, 0.03))
+        S = np.array(chain.S)
+        for k in range(5):
+            skew = so3.exp(10.0 ** rng.uniform(-8.0, -5.0) * rng.normal(size=3))
+            S[:, k] = screws.revolute(skew @ S[:3, k], screws.point_on(S[:, k]))
+        chain = dataclasses.replace(chain, S=S)
+        arm = arm_of(chain)
+        q = rng.uniform(chain.lower, chain.upper)
+        T = forward(chain, q)
+        solutions = inverse(chain, T)
+        off = [np.abs(np.angle(np.exp(1j * (s.q - q)))).max() for s in solutions]
+        assert solutions[int(np.argmin(off))].exact
+        T_C_K = arm.pose(T)
+        level = math.hypot(*T_C_K[:2, 0])
+        if math.hypot(*T_C_K[:2, 3]) > 0.2 * arm.reach + abs(arm.d) and level > 0.1:
+            T[:3, :3] = so3.exp(0.01 / level * arm.T_C_S[2, :3]) @ T[:3, :3]
+            assert not any(s.exact for s in inverse(chain, T))
 
 
 def test_every_finite_pose_has_finite_angles(rng: np.random.Generator) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -19,6 +20,7 @@ from app.kinematics.reading import Reading
 from app.kinematics.stance import Stance, nearest_stance
 from app.kinematics.tool import ToolTarget
 from app.kinematics.tracker import EFFORT, HOP, Tracked, Tracking, leap, track
+from tests.kinematics.family import random_member, random_pose
 
 READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
 FRONT_UP = Branch("front", "up")
@@ -265,6 +267,41 @@ def test_a_call_looks_for_a_bounded_number_of_poses(
         track(chain, q, target, branch=branch_of(chain, q), reading=reading, since=since)
         most = max(most, sought - before)
     assert EFFORT // 2 < most <= EFFORT + 1
+
+
+@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("far", [1e3, 1e9, 1e300])
+def test_a_drag_without_measure_has_an_end(chain: Chain, reading: Reading, far: float) -> None:
+    since = ToolTarget.at(chain, READY)
+    target = ToolTarget(far * np.array([0.4, 0.8, 0.4]), since.pitch, since.roll)
+    best = arrived(chain, READY, target, since, reading).best
+    assert np.isfinite(best.position_error)
+    assert math.atan2(best.T[1, 3], best.T[0, 3]) == pytest.approx(math.atan2(0.8, 0.4), abs=1e-3)
+
+
+def test_out_of_reach_no_turn_is_worth_a_step_away() -> None:
+    """Beside the roll axis a hop may turn the tool and lose a little of the place."""
+    rng = np.random.default_rng(2)
+    chain, _ = random_member(rng)
+    middle, half = rng.uniform(-0.5, 0.5, 5), rng.uniform(1.0, 2.6, 5)
+    chain = dataclasses.replace(chain, lower=middle - half, upper=middle + half)
+    chain = chain.with_tool(chain.M @ random_pose(rng, 0.03))
+    q = rng.uniform(chain.lower, chain.upper)
+    branch, since = branch_of(chain, q), ToolTarget.at(chain, q)
+    way = rng.normal(size=3)
+    way *= 10.0 ** rng.uniform(-4.0, -1.6) / np.linalg.norm(way)
+    since = dataclasses.replace(since, position=3.0 * since.position)
+    for k in range(12):
+        pitch, roll = 0.3 * rng.normal(size=2) if k % 3 == 0 else (0.0, 0.0)
+        target = ToolTarget(
+            since.position + (way if k < 6 else -way), since.pitch + pitch, since.roll + roll
+        )
+        was = math.dist(forward(chain, q)[:3, 3], target.position)
+        tracked = track(chain, q, target, branch=branch, since=since)
+        while tracked.since is not None:
+            tracked = track(chain, tracked.best.q, target, branch=branch, since=tracked.since)
+        assert tracked.best.position_error <= was + 1e-8
+        q, since = tracked.best.q, target
 
 
 def test_a_pitch_that_no_hop_leads_to_turns_nothing_away(chain: Chain) -> None:

@@ -1,0 +1,155 @@
+"""What is named as binding binds, and nothing else does."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+
+import numpy as np
+import pytest
+
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.arm import arm_of
+from app.kinematics.branch import Branch
+from app.kinematics.chain import Chain
+from app.kinematics.forward import forward
+from app.kinematics.projection import Projection, project
+from app.kinematics.reading import Reading
+from tests.kinematics.conftest import katana
+from tests.kinematics.family import Offsets, member, random_member
+
+CASES = 1000 if os.environ.get("KATANA450_LONG") else 40
+
+SAME = 1e-7
+"""[m], [rad] What a widening gains less by is rounding."""
+
+
+def limited_member(seed: int, *, lateral: bool) -> Chain:
+    rng = np.random.default_rng(seed)
+    chain, _ = random_member(rng, lateral=lateral)
+    middle, half = rng.uniform(-1.0, 1.0, 5), rng.uniform(0.6, 2.4, 5)
+    return dataclasses.replace(chain, lower=middle - half, upper=middle + half)
+
+
+CHAINS = {
+    "katana": katana(),
+    "member": limited_member(1, lateral=False),
+    "lateral member": limited_member(2, lateral=True),
+}
+
+
+def widened(chain: Chain, axes: FloatArray, by: float) -> Chain:
+    return dataclasses.replace(chain, lower=chain.lower - by * axes, upper=chain.upper + by * axes)
+
+
+def random_target(chain: Chain, rng: np.random.Generator) -> FloatArray:
+    """Anywhere, far away, near axis 1, next to limits, or within the limits but turned."""
+    arm = arm_of(chain)
+    kind = rng.integers(5)
+    if kind >= 3:
+        q = rng.uniform(chain.lower, chain.upper)
+        if kind == 3:
+            q = np.where(rng.random(5) < 0.7, rng.choice((chain.lower, chain.upper)), q)
+        T = np.array(forward(chain, q))
+        T[:3, :3] = T[:3, :3] @ so3.exp(rng.normal(scale=0.3, size=3))
+        T[:3, 3] += rng.normal(scale=0.02, size=3)
+        return T
+    position = rng.normal(size=3) * arm.reach * (0.4, 5.0, 0.4)[kind]
+    if kind == 2:
+        position[:2] *= 10.0 ** rng.uniform(-6.0, 0.0)
+    T_C = se3.from_rotation_translation(so3.exp(2.0 * rng.normal(size=3)), position)
+    return se3.inverse(arm.T_C_S) @ T_C
+
+
+def misses(p: Projection, reading: Reading) -> tuple[float, ...]:
+    """What counts most first; of a pitch that no posture has, as POSITION."""
+    if reading is Reading.POSE:
+        return p.position_error, p.rotation_error
+    if reading is Reading.PITCH and p.pitch_error <= SAME:
+        return p.pitch_error, p.position_error
+    return p.position_error, p.pitch_error
+
+
+def gained(before: tuple[float, ...], after: tuple[float, ...], least: float) -> int:
+    """1 where `after` is nearer, -1 where it is farther, by more than `least`; else 0."""
+    for miss, miss_after in zip(before, after, strict=True):
+        if abs(miss - miss_after) > least:
+            return 1 if miss_after < miss else -1
+    return 0
+
+
+@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("name", CHAINS)
+def test_what_is_named_binds_and_nothing_else(name: str, reading: Reading) -> None:
+    chain, rng = CHAINS[name], np.random.default_rng(7)
+    limited = idle = 0
+    for _ in range(CASES):
+        T = random_target(chain, rng)
+        p = project(chain, T, reading=reading)
+        missed = misses(p, reading)
+        named = np.zeros(5)
+        named[list(p.limits)] = 1.0
+
+        other = project(widened(chain, 1.0 - named, 1e-4), T, reading=reading, branch=p.branch)
+        assert gained(missed, misses(other, reading), SAME) <= 0
+        if max(missed) > SAME and (reading is not Reading.POSE or p.yaw_error <= SAME):
+            assert p.limits or p.axis1 or p.reach
+        pitched = reading is not Reading.PITCH or p.pitch_error <= SAME
+        if p.position_error > SAME and pitched and not p.limits:
+            free = project(chain, T, reading=reading, branch=p.branch, within_limits=False)
+            assert gained(missed, misses(free, reading), SAME) <= 0
+
+        # The roll counts least, and depends on its own limit alone.
+        named[4] *= reading is Reading.POSE
+        if named.any() and not p.axis1:
+            wide = project(widened(chain, named, 1e-3), T, reading=reading, branch=p.branch)
+            gain = gained(missed, misses(wide, reading), 1e-10)
+            assert gain >= 0
+            limited += 1
+            idle += gain == 0
+    assert limited > 0.3 * CASES
+    # Next to axis 1 a turn of it gains next to nothing.
+    assert idle <= 0.01 * limited
+
+
+@pytest.mark.parametrize("reading", Reading)
+def test_the_limit_of_the_roll_is_named_where_it_binds(reading: Reading) -> None:
+    chain, rng = CHAINS["katana"], np.random.default_rng(8)
+    named = 0
+    roll = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+    for _ in range(CASES):
+        T = random_target(chain, rng)
+        p = project(chain, T, reading=reading)
+        wide = project(widened(chain, roll, 1e-3), T, reading=reading, branch=p.branch)
+        beyond = not chain.lower[4] - 1e-9 <= wide.q[4] <= chain.upper[4] + 1e-9
+        assert (4 in p.limits) == beyond
+        named += beyond
+    assert named > 0
+
+
+def test_axis_1_is_named_where_the_branch_ends_on_it() -> None:
+    """The tool is asked for behind the arm, and axis 1 cannot turn so far."""
+    most = np.array([0.8, 2.3, 2.3, 2.3, 0.8])
+    chain = dataclasses.replace(katana(), lower=-most, upper=most)
+    T = se3.from_rotation_translation(np.eye(3), [-0.2, 0.01, 0.3])
+    for elbow in ("up", "down"):
+        p = project(chain, T, branch=Branch("front", elbow))
+        assert p.axis1
+        assert math.hypot(*p.T[:2, 3]) < 1e-9
+        across = project(chain, T, branch=Branch("back", elbow))
+        assert not across.axis1
+        assert across.position_error < 1e-9
+
+
+def test_axis_1_is_named_where_the_plane_passes_beside_it() -> None:
+    offsets = Offsets(0.03, 0.05, (0.2, 0.2, 0.15), (0.0, 0.0, 0.0), 0.0, (1, 1, 1, 1, 1))
+    chain = member(offsets, np.eye(4), np.eye(4))
+    for rho, inside in ((0.02, True), (0.06, False)):
+        T = se3.from_rotation_translation(np.eye(3), [rho, 0.0, 0.25])
+        for reading in Reading:
+            p = project(chain, T, reading=reading)
+            assert p.axis1 == inside
+            assert not p.reach
+            assert (p.position_error > 1e-3) == inside
