@@ -122,6 +122,7 @@ class _Line:
         self._drags: set[str] = set()
         self._told_at = float("-inf")
         self._due = float("-inf")
+        self._unwelcome = False
         window = hub.window(key)
         who = window.person.name if window is not None else "a window without our page"
         self._firewall = Firewall(guard, who, self._drags, self._drive, self._steer, hub.clock())
@@ -143,6 +144,10 @@ class _Line:
             # A farewell would wait behind pictures that nobody fetches any more.
             self._upstream.transport.abort()
             self._hub.hide(self._flow)
+        # Only now, or a picture could come after it.
+        if self._unwelcome:
+            with suppress(WebSocketDisconnect, WebSocketDisconnected):
+                await self._browser.close(1008)
 
     async def _down(self) -> None:
         """Pictures, as fast as the browser sees them."""
@@ -181,7 +186,7 @@ class _Line:
                 await self._upstream.send(data)
             elif verdict.ruling is Ruling.CLOSE or not await self._answer(verdict):
                 log.warning("Closed a browser that sent too much that no page sends.")
-                await self._browser.close(1008)
+                self._unwelcome = True
                 return
 
     async def _answer(self, verdict: Verdict) -> bool:

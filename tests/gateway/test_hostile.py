@@ -166,6 +166,28 @@ def test_who_goes_on_sending_what_no_page_sends_is_closed(server: AppServer) -> 
     asyncio.run(attack())
 
 
+def test_who_is_closed_while_pictures_come_hears_no_more(server: AppServer) -> None:
+    """The scene is on its way to each of them when it is closed."""
+
+    async def knock(cookie: str) -> None:
+        path = f"/viser?page={page_name()}"
+        with suppress(ConnectionClosed):
+            async with websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL]) as bad:
+                for _ in range(200):
+                    await bad.send(b"\xff")
+                await asyncio.wait_for(bad.wait_closed(), 10.0)
+
+    async def crowd() -> None:
+        cookie = enter(server.url)
+        for _ in range(40):
+            await asyncio.gather(*(knock(cookie) for _ in range(8)))
+
+    asyncio.run(crowd())
+    assert server.running
+    assert "sent too much" in server.output
+    assert "Traceback" not in server.output
+
+
 def test_after_all_that_the_arm_still_obeys_a_good_browser(server: AppServer) -> None:
     async def obey() -> None:
         async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
