@@ -14,7 +14,7 @@ from app.kinematics.chain import Chain
 from app.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING, Projection
 from app.kinematics.reading import Reading
 from app.kinematics.tracker import Tracked
-from app.kinematics.velocity import JogFrame, followed, limit_distances
+from app.kinematics.velocity import followed, limit_distances
 
 HARDLY = 0.05
 """Share of a jog that does not move the tool to speak of."""
@@ -69,11 +69,11 @@ def of_projection(
 
 def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
     """What keeps a jog with the twist ``V`` (6,) in {S} from going on at ``q`` (n,) [rad]."""
-    if followed(chain, q, V, JogFrame.BASE) < HARDLY:
+    if followed(chain, q, V) < HARDLY:
         return (Finding(Reason.SINGULAR),)
     near = limit_distances(chain, q) <= AT_LIMIT
     # Looked at only where it matters: a tick has other things to do.
-    if not near.any() or followed(chain, q, V, JogFrame.BASE, AT_LIMIT) > FREELY:
+    if not near.any() or followed(chain, q, V, AT_LIMIT) > FREELY:
         return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(

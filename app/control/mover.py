@@ -160,11 +160,14 @@ class Mover:
             return limiter.pause(motion, state.goal, dt)
         chain = self._arm.chain_to(state.tool)
         share = min(state.speed, self._share(chain, state))
+        rates = None
+        if state.jogging is not None:
+            V = wished_twist(chain, motion.q, state.jogging)
+            bounds = self._any.stoppable(motion.q)
+            rates = jog(chain, motion.q, V, JogFrame.BASE, dt, bounds=bounds)
         for _ in range(SLOWINGS):
-            if state.jogging is not None:
-                bounds = self._any.stoppable(motion.q)
-                rates = share * _rates(chain, motion.q, state.jogging, dt, bounds)
-                ahead = self._any.at_rate(motion, rates, dt)
+            if rates is not None:
+                ahead = self._any.at_rate(motion, share * rates, dt)
             elif state.servo is not None:
                 late = min(state.t - state.servo.t, JOG_TIME)
                 now = chain.clamp(state.servo.q + late * state.servo.qd)
@@ -268,18 +271,6 @@ def _bent(arm: Arm, elbow: str) -> Limits:
         else:
             upper[2] = seam
     return replace(limits, lower=lower, upper=upper)
-
-
-def _rates(
-    chain: Chain,
-    q: FloatArray,
-    jogging: Jogging,
-    dt: float,
-    bounds: tuple[FloatArray, FloatArray],
-) -> FloatArray:
-    """The joint rates (n,) [rad/s] of a jog."""
-    V = wished_twist(chain, q, jogging)
-    return jog(chain, q, V, JogFrame.BASE, dt, bounds=bounds)
 
 
 def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:

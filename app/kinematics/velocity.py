@@ -146,15 +146,13 @@ def jog(
     return qd / _excess(chain, qd)
 
 
-def followed(
-    chain: Chain, q: FloatArray, V: FloatArray, frame: JogFrame, edge: float | None = None
-) -> float:
-    """The share of the twist `V` (6,) that a jog at `q` (n,) [rad] follows, from 0 to 1.
+def followed(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = None) -> float:
+    """The share of the twist `V` (6,) in {S} that a jog at `q` (n,) [rad] follows, from 0 to 1.
 
     However fast it is. edge: so far from a limit [rad] a joint does not go towards it; None leaves
     limits aside.
     """
-    J, wanted = _task(chain, q, V, frame)
+    J, wanted = _task(chain, q, V, JogFrame.BASE)
     size = float(wanted @ wanted)
     if size == 0.0:
         return 1.0
@@ -163,7 +161,7 @@ def followed(
     least = np.where(q - chain.lower > edge, -chain.speed, 0.0)
     most = np.where(chain.upper - q > edge, chain.speed, 0.0)
     slow = SLOW / math.sqrt(size)
-    qd = jog(chain, q, slow * V, frame, SLOW, bounds=(least, most))
+    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(least, most))
     return float(wanted @ (J @ qd)) / (slow * size)
 
 
