@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from urllib.parse import urlsplit
 
 from app.api import answers, requests
-from app.cli.programs_options import URL
 from app.client import Client, connect
 from app.client.files import LostError
 from app.errors import ConfigurationError, KatanaError
@@ -91,13 +90,15 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
         with connect(options.url, "Look", options.token):
             pass
     except LostError:
-        if options.url != URL:
+        if not _may_start_at(options.url):
             raise
     else:
         yield options.url
         return
     port = str(urlsplit(options.url).port)
-    command = [sys.executable, "-m", "app", "serve", "--port", port, "--urdf", str(options.urdf)]
+    # -P: Python does not search the current folder, where an `app.py` of the user's may lie.
+    python = [sys.executable, "-P", "-m", "app"]
+    command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
     server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
@@ -108,6 +109,12 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
     finally:
         server.terminate()
         server.wait()
+
+
+def _may_start_at(url: str) -> bool:
+    """Return whether a server of ours can be started there: this machine, by number, and plain."""
+    parts = urlsplit(url)
+    return parts.scheme == "http" and parts.hostname == "127.0.0.1" and parts.port is not None
 
 
 def _wait_for(server: subprocess.Popen[str]) -> None:

@@ -87,7 +87,10 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "--seed", type=int, default=0, help="of the ways round what is in between (default: 0)"
     )
     parser.add_argument(
-        "--url", default=URL, help="of the server that has the arm (default: %(default)s)"
+        "--url",
+        default=URL,
+        help="of the server that has the arm (default: %(default)s); where none answers on this "
+        "machine, one is started",
     )
     parser.add_argument("--token", default="", help="of an access link, where one is asked for")
     parser.add_argument(
