@@ -140,6 +140,8 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
             raise RobotDescriptionError(f"There is no mesh at {source}.")
         if source.suffix.lower() in CONVERTED and source not in shapes:
             shapes[source] = shapes_of(Visual(np.eye(4), np.ones(3), source))
+            if not shapes[source]:
+                raise RobotDescriptionError(f"{source} holds no triangles. Export the mesh anew.")
     shown = dict.fromkeys(source for _, element, source in used if element.tag == "visual")
     names = _names(root, [shape.material for source in shown for shape in shapes.get(source, ())])
     # A mesh that is only copied is one file for both uses.

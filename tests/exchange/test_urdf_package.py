@@ -322,7 +322,24 @@ def test_a_robot_without_meshes_has_a_package_too() -> None:
     )
 
 
-NO_MESH = '<visual><geometry><mesh filename="no.stl"/></geometry></visual>'
+@pytest.mark.parametrize("kind", ["glb", "urdf"])
+@pytest.mark.parametrize("suffix", [".glb", ".dae", ".xyz"])
+def test_an_unreadable_mesh_is_named_in_words_of_ours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str, kind: str
+) -> None:
+    mesh = tmp_path / f"arm{suffix}"
+    mesh.write_bytes(b"junk")
+    path = tmp_path / "x.urdf"
+    path.write_text(f'<robot name="x"><link name="a">{MESH.format(mesh.name)}</link></robot>')
+    assert main(["export", kind, "--urdf", str(path), "--out", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err == (
+        f"katana450: {mesh} cannot be read as a mesh: the file is corrupt, or {suffix} is not "
+        "understood. Export it anew, for example as binary STL.\n"
+    )
+
+
+MESH = '<visual><geometry><mesh filename="{}"/></geometry></visual>'
+NO_MESH = MESH.format("no.stl")
 
 
 @pytest.mark.parametrize(
