@@ -61,7 +61,7 @@ MANIFEST = """\
 
 
 class Maintainer(NamedTuple):
-    """Whom `package.xml` names as responsible for the package."""
+    """The person that `package.xml` names as responsible for the package."""
 
     name: str
     email: str
@@ -69,7 +69,7 @@ class Maintainer(NamedTuple):
 
 UNSTATED_LICENSE = "TODO: License declaration"
 UNSTATED_MAINTAINER = Maintainer("TODO: Maintainer", "todo@todo.todo")
-"""What ROS's own package generator writes where nothing is known; its tools warn about them."""
+"""Placeholders that ROS's own package generator writes where nothing is known."""
 
 
 class _Part(NamedTuple):
