@@ -8,6 +8,10 @@ from typing import Final
 # rotation: single-precision numbers and rounded text pass, a scale or a shear does not.
 ROTATION_INPUT: Final = 1e-6
 
+# The same for a matrix that a person or another program prints with four decimals or more: the
+# rounding is at most 1.8e-4. It is taken where requests come in, and nowhere behind.
+ROTATION_PRINTED: Final = 1e-3
+
 # How far from orthonormal (root mean square of six misfits) a rotation is that a few products of
 # rotations in double precision made: the nearest one would only exchange this rounding for its own.
 ROTATION_EXACT: Final = 4e-15

@@ -41,9 +41,13 @@ class Done(Answer, frozen=True, kw_only=True):
     """The request of that id is accepted.
 
     ``ticket``: for one that moves the arm; it is heeded in states whose ticket is no smaller.
+    ``rotation_misfit``: for one with a pose ``T``, how far the columns of its rotation were off
+    orthonormal, as the largest entry of R^T R - I. The nearest rotation is used, so four printed
+    decimals are enough; more than 1e-3 is refused.
     """
 
     ticket: int | None = None
+    rotation_misfit: float | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):

@@ -14,11 +14,20 @@ from app.exchange.glb import glb_files
 from app.exchange.mechanism import Mechanism
 from app.exchange.trajectory_file import Motion, load_motion
 from app.exchange.urdf_mechanism import load_mechanism
-from app.exchange.urdf_package import package_files
+from app.exchange.urdf_package import (
+    UNSTATED_LICENSE,
+    UNSTATED_MAINTAINER,
+    Maintainer,
+    package_files,
+)
 from app.exchange.vrml import vrml_files
+from robot_description import URDF_PATH
 
 MOVES = ("vrml", "glb")
 """Formats a motion survives in."""
+
+OWN_LICENSE = "MIT"
+"""Licence of the Katana450's description, as of this project."""
 
 POSED = ("vrml", "c", "glb")
 """Formats that stand in a pose."""
@@ -33,12 +42,14 @@ def export(options: argparse.Namespace) -> int:
         raise InputError(f"A file of {kind} holds no run; html does.")
     if options.pose and kind not in POSED:
         raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED)} do.")
+    if kind != "urdf" and (options.license or options.maintainer):
+        raise InputError(f"A file of {kind} states no licence and no maintainer; urdf does.")
     mechanism, notes = load_mechanism(options.urdf)
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)
     values = mechanism.values(options.pose)
     motion = None if options.trajectory is None else load_motion(options.trajectory, mechanism)
-    made = _made(kind, mechanism, values, motion, options.urdf)
+    made = _package(options) if kind == "urdf" else _made(kind, mechanism, values, motion)
     folder: Path = options.out
     try:
         for path in {(folder / name).parent for name in made}:
@@ -56,13 +67,32 @@ def _made(
     mechanism: Mechanism,
     values: Mapping[str, float],
     motion: Motion | None,
-    urdf: Path,
 ) -> Mapping[str, bytes]:
     match kind:
         case "vrml":
             return vrml_files(mechanism, values, motion)
         case "c":
             return c_files(mechanism, values)
-        case "glb":
-            return glb_files(mechanism, values, motion)
-    return package_files(urdf)
+    return glb_files(mechanism, values, motion)
+
+
+def _package(options: argparse.Namespace) -> Mapping[str, bytes]:
+    """Return the ROS package; report what its `package.xml` leaves for the user to state."""
+    own = options.urdf.resolve() == URDF_PATH.resolve()
+    license_name = options.license or (OWN_LICENSE if own else UNSTATED_LICENSE)
+    maintainer = Maintainer(*options.maintainer) if options.maintainer else UNSTATED_MAINTAINER
+    unstated = [
+        word
+        for word, missing in (
+            ("--license", license_name == UNSTATED_LICENSE),
+            ("--maintainer", maintainer == UNSTATED_MAINTAINER),
+        )
+        if missing
+    ]
+    if unstated:
+        print(
+            f"katana450: package.xml has a TODO for {' and '.join(unstated)}; give "
+            f"{'it' if len(unstated) == 1 else 'them'} before you publish the package.",
+            file=sys.stderr,
+        )
+    return package_files(options.urdf, license_name, maintainer)

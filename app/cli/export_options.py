@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 FORMATS = {
@@ -32,6 +33,18 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         help="values of the driven joints in rad or m with commas between, gripper last, such as "
         "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
     )
+    parser.add_argument(
+        "--license",
+        metavar="NAME",
+        help="urdf: licence of the robot that package.xml states, such as Apache-2.0 (default: MIT "
+        "for the Katana450, unstated for another mechanism)",
+    )
+    parser.add_argument(
+        "--maintainer",
+        type=named_address,
+        metavar="'NAME <EMAIL>'",
+        help="urdf: who package.xml names as responsible for the package (default: unstated)",
+    )
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument(
         "--trajectory",
@@ -49,6 +62,14 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
 
 def _listed() -> str:
     return "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+
+
+def named_address(text: str) -> tuple[str, str]:
+    """Return name and email of ``NAME <EMAIL>``."""
+    found = re.fullmatch(r"\s*([^<>]*[^<>\s])\s*<([^<>@\s]+@[^<>@\s]+)>\s*", text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"'NAME <EMAIL>', not {text!r}")
+    return found[1], found[2]
 
 
 def joint_values(text: str) -> tuple[float, ...]:

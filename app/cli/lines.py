@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from collections.abc import Callable, Mapping
@@ -22,6 +23,9 @@ from app.kinematics.projection import project
 from app.robot.collision import standing_around, world_of
 from app.robot.model import load
 from app.robot.props import load_props
+
+LONGEST_SHOWN = 40
+"""Characters of a wrong value that an error repeats."""
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
@@ -49,11 +53,14 @@ class Kinematics:
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """``{"q": [n rad], "tool"}`` to ``{"T": 4x4}`` [m]."""
         chain = self._chain(request, {"q", "tool"})
-        q = chain.check_q(_numbers(request, "q"))
+        q = chain.check_q(_numbers(request, "q", 1))
         return {"T": (self._T_frame_shoulder @ forward(chain, q)).tolist()}
 
     def ik(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """``{"T": 4x4, "tool"}`` to every solution for the nearest pose five axes can do.
+
+        A T that was printed with four decimals or more is taken for the nearest rotation;
+        ``rotation_misfit`` is how far its columns were off orthonormal.
 
         The residuals say how far that pose is from ``T``, limits of the joints left aside:
         ``within_limits`` tells of each solution whether the arm can go there. With badges there are
@@ -61,8 +68,9 @@ class Kinematics:
         value, and the two parts in contact there with the finger joint at 0, if any are.
         """
         chain = self._chain(request, {"T", "tool", "q"} if self._badges else {"T", "tool"})
-        start = chain.check_q(request.get("q", [0.0] * chain.n))
-        T = se3.validated(_numbers(request, "T"), "T")
+        start = chain.check_q(_numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
+        given = _numbers(request, "T", 2)
+        T = se3.printed(given, "T")
         T_shoulder = se3.inverse(self._T_frame_shoulder) @ T
         nearest = project(chain, T_shoulder, within_limits=False).T
         # With axes that do not cross, not every branch reaches every pose.
@@ -80,6 +88,7 @@ class Kinematics:
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
             "residual_rad": max(so3.angle(T_shoulder[:3, :3], T_q[:3, :3]) for T_q in reached),
+            "rotation_misfit": so3.misfit(np.array(given)[:3, :3]),
         }
 
     def _badge(self, badge: Badge) -> dict[str, Any]:
@@ -95,36 +104,87 @@ class Kinematics:
         unknown = set(request) - keys
         if unknown:
             raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
-        return self._arm.chain_to(request.get("tool", self._arm.default_tool))
+        tool = request.get("tool", self._arm.default_tool)
+        if not isinstance(tool, str):
+            raise InputError(f"'tool' is {_shown(tool)}; there is no tool of that name.")
+        return self._arm.chain_to(tool)
 
 
-def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> None:
-    """Answer each line as it comes; a bad one gets ``{"error": ...}`` and the rest go on."""
+def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> int:
+    """Answer each line as it comes and return the exit status.
+
+    A bad line gets ``{"error": ...}`` with its number, counted from 1, and the rest continue. The
+    status is 1 when there were requests and none could be answered, else 0.
+    """
+    if source is None and isinstance(sys.stdin, io.TextIOWrapper):
+        # Bytes that are not UTF-8 spoil their own line, not the run.
+        sys.stdin.reconfigure(encoding="utf-8", errors="replace")
     source, sink = source or sys.stdin, sink or sys.stdout
+    asked = answered = 0
     for number, line in enumerate(source, start=1):
         if not line.strip():
             continue
+        asked += 1
         try:
             reply = answer(_request(line))
+            answered += 1
         except InputError as error:
             reply = {"error": f"line {number}: {error}"}
         print(json.dumps(reply, allow_nan=False), file=sink, flush=True)
+    return int(asked > answered == 0)
 
 
 def _request(line: str) -> Mapping[str, Any]:
+    if line.startswith("\ufeff"):
+        raise InputError(
+            "This is not JSON: it begins with a byte order mark (BOM). Save the file as UTF-8 "
+            "without one."
+        )
     try:
-        request = json.loads(line)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"This is not JSON: {error}") from error
+        request = json.loads(line.strip())
+    except json.JSONDecodeError as error:
+        raise InputError(f"This is not JSON: {error.msg} at column {error.colno}.") from error
+    except ValueError as error:
+        raise InputError("This is not JSON: a number in it has too many digits.") from error
+    except RecursionError as error:
+        raise InputError("This is not JSON: it is nested too deeply.") from error
     if not isinstance(request, dict):
-        raise InputError(f"A request is a JSON object, not a {type(request).__name__}.")
+        raise InputError(f"This is {_shown(request)}; a request is a JSON object.")
     return request
 
 
-def _numbers(request: Mapping[str, Any], key: str) -> Any:
+def _numbers(request: Mapping[str, Any], key: str, depth: int) -> Any:
+    """Return the value of ``key``: lists of JSON numbers, nested ``depth`` deep.
+
+    Raises InputError with the place of what is none; shapes are left to the caller.
+    """
     if key not in request:
         raise InputError(f"The key {key!r} is missing.")
+    _check_numbers(request[key], key, depth)
     return request[key]
+
+
+def _check_numbers(value: Any, place: str, depth: int) -> None:
+    if depth:
+        if not isinstance(value, list):
+            what = "numbers" if depth == 1 else "rows"
+            raise InputError(f"{place} is {_shown(value)}; it must be a list of {what}.")
+        for k, each in enumerate(value):
+            _check_numbers(each, f"{place}[{k}]", depth - 1)
+        if depth == 2 and len({len(row) for row in value}) > 1:
+            raise InputError(f"The rows of {place} have different lengths; its shape must be 4x4.")
+    elif isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{place} is {_shown(value)}; give plain finite numbers.")
+    elif isinstance(value, int) and abs(value) > sys.float_info.max:
+        raise InputError(f"{place} is too large; give plain finite numbers.")
+
+
+def _shown(value: Any) -> str:
+    """Return how JSON calls ``value``, shortened."""
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else "a list"
+    text = json.dumps(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def _distance(a: FloatArray, b: FloatArray) -> float:

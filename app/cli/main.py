@@ -83,8 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             in_base_frame=in_base_frame,
             badges=options.command == "ik" and options.badges,
         )
-        answer_lines(kinematics.fk if options.command == "fk" else kinematics.ik)
-        return 0
+        return answer_lines(kinematics.fk if options.command == "fk" else kinematics.ik)
     except KatanaError as error:
         print(f"katana450: {error}", file=sys.stderr)
         return 1

@@ -7,15 +7,14 @@ numbers of its vertices, of its normals and of its texture points, which no link
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from importlib import resources
 
 import numpy as np
-import numpy.typing as npt
 
-from app.errors import InputError
 from app.exchange.mechanism import FIELD_OF_VIEW, Joint, Link, Mechanism, camera
 from app.exchange.names import distinct
+from app.exchange.rows import distinct_rows
 from app.geometry.arrays import FloatArray
 
 TEMPLATES = ("viewer.c", "Makefile", "CMakeLists.txt")
@@ -57,8 +56,8 @@ def c_files(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, byte
 
 def _part(link: Link, name: str) -> dict[str, str]:
     """The header and the source of one link."""
-    vertices, at = _distinct_rows([shape.vertices for shape in link.shapes], DIGITS)
-    normals, along = _distinct_rows([shape.normals for shape in link.shapes], NORMAL_DIGITS)
+    vertices, at = distinct_rows([shape.vertices for shape in link.shapes], DIGITS)
+    normals, along = distinct_rows([shape.normals for shape in link.shapes], NORMAL_DIGITS)
     firsts = np.cumsum([0] + [len(shape.vertices) for shape in link.shapes])
     faces = np.concatenate(
         [shape.faces + first for shape, first in zip(link.shapes, firsts, strict=False)]
@@ -95,11 +94,11 @@ def _part(link: Link, name: str) -> dict[str, str]:
     surfaces, first = [], 0
     for shape in link.shapes:
         material = shape.material
-        gleam = (1.0 - material.rough) * (0.3 + 0.5 * material.metallic)
         colour = ", ".join(_single(part) for part in material.colour)
         surfaces.append(
             f"    {{{first}, {len(shape.faces)}, {{{colour}, 1.0f}}, "
-            f"{_single(round(gleam, 4))}, {_single(round(96.0 * (1.0 - material.rough), 2))}}}, "
+            f"{_single(round(material.gleam, 4))}, "
+            f"{_single(round(96.0 * (1.0 - material.rough), 2))}}}, "
             f"/* {_comment(material.name)} */"
         )
         first += len(shape.faces)
@@ -281,17 +280,6 @@ def _moved(mechanism: Mechanism, joint: Joint) -> str:
         x, y, z = (f"{_double(part)} * {value}" for part in joint.axis)
         return f"glTranslated({x}, {y}, {z});"
     return f"glRotated(DEGREES * {value}, {_triple(joint.axis)});"
-
-
-def _distinct_rows(
-    parts: Sequence[FloatArray], digits: int
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Rounded rows, each once, and which of them each of the given ones is."""
-    rows = np.round(np.concatenate(parts), digits) + 0.0
-    if not np.isfinite(rows).all():
-        raise InputError("A shape has coordinates that are no finite numbers.")
-    found, index = np.unique(rows, axis=0, return_inverse=True)
-    return found, index.reshape(-1).astype(np.int64)
 
 
 def _float_rows(rows: FloatArray) -> Iterator[str]:

@@ -28,6 +28,11 @@ class Material(NamedTuple):
     metallic: float = 0.0
     rough: float = 0.6
 
+    @property
+    def gleam(self) -> float:
+        """Grey of the highlight 0..1, in formats that know no metal: smooth metal has the most."""
+        return (1.0 - self.rough) * (0.3 + 0.5 * self.metallic)
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:

@@ -14,7 +14,7 @@ from app.errors import RobotDescriptionError
 from app.exchange.mechanism import Joint, Link, Material, Mechanism, Shape
 from app.geometry.arrays import FloatArray, frozen
 from app.robot.description import check_description
-from app.robot.visual import Visual, rods, visuals_of
+from app.robot.visual import Visual, rods, unreadable_mesh, visuals_of
 
 MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
 """Types of joint that are understood, and whether each slides."""
@@ -163,7 +163,7 @@ def shapes_of(visual: Visual) -> Sequence[Shape]:
     try:
         scene = trimesh.load_scene(visual.source)
     except Exception as error:
-        raise RobotDescriptionError(f"{visual.source} is no mesh: {error}") from error
+        raise unreadable_mesh(visual.source) from error
     shapes = []
     for node in scene.graph.nodes_geometry:
         T_file, name = scene.graph[node]

@@ -201,13 +201,11 @@ def _shape(shape: Shape, T: FloatArray, names: Names, told: set[Material]) -> No
 
 
 def _material(material: Material) -> Node:
-    """VRML's lamps know no metal; a smooth surface gleams, a metal one more."""
-    gleam = (1.0 - material.rough) * (0.3 + 0.5 * material.metallic)
     return Node(
         "Material",
         (
             ("diffuseColor", _rounded(material.colour, 4)),
-            ("specularColor", _rounded([gleam] * 3, 4)),
+            ("specularColor", _rounded([material.gleam] * 3, 4)),
             ("shininess", round(min(max(1.0 - material.rough, 0.0), 1.0), 4)),
         ),
     )

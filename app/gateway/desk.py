@@ -10,7 +10,7 @@ from app.control import commands as cmd
 from app.gateway import tell
 from app.gateway.hub import Hub, Window
 from app.gateway.placing import Placing
-from app.geometry import se3
+from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.branch import Branch
 
@@ -53,7 +53,7 @@ class Desk:
         if command is None:
             self._arrange(window, request)
             return answers.Done()
-        return answers.Done(ticket=hub.move(window, command))
+        return answers.Done(ticket=hub.move(window, command), rotation_misfit=_misfit(request))
 
     def _arrange(self, window: Window, request: requests.AnyRequest) -> None:
         """What is about who drives, and how."""
@@ -96,7 +96,7 @@ class Desk:
             case requests.Servo(q=q, qd=qd):
                 return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
             case requests.Pose(T=T, frame=frame):
-                return cmd.SetPose(self._in_shoulder(frame) @ se3.validated(T))
+                return cmd.SetPose(self._in_shoulder(frame) @ se3.printed(T))
             case requests.Position(p=p, frame=frame):
                 return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
             case requests.Turn(pitch=pitch, roll=roll):
@@ -146,3 +146,10 @@ class Desk:
             case "loop":
                 return tell.loop(hub.present().lateness)
         return tell.state(hub)
+
+
+def _misfit(request: requests.AnyRequest) -> float | None:
+    """Return `so3.misfit` of the pose in ``request``; None where it has none."""
+    if isinstance(request, requests.Pose | requests.Place | requests.Attach) and request.T:
+        return so3.misfit(np.array(request.T)[:3, :3])
+    return None

@@ -53,11 +53,11 @@ class Placing:
                 if known is not None
                 else replace(thing, T=free_place(thing, arm.state.things))
             )
-        T = np.array(asked.T)
+        T = se3.printed(asked.T, f"The pose of {asked.name!r}")
         if asked.frame is requests.Frame.SHOULDER:
             T = arm.robot.T_base_shoulder @ T
         if thing.fixed:
-            T = arm.surroundings.into_hand(se3.validated(T), arm.state.x)
+            T = arm.surroundings.into_hand(T, arm.state.x)
         return replace(thing, T=T)
 
     def _shaped(self, asked: requests.Place, known: Thing | None) -> Thing:
@@ -113,7 +113,7 @@ class Placing:
             return cmd.Attach(asked.name, to)
         if to is not Mount.HAND:
             raise InputError("T is where on the hand it is to be; to put it elsewhere, `place` it.")
-        T = hand.T_palm_tool @ se3.validated(asked.T)
+        T = hand.T_palm_tool @ se3.printed(asked.T)
         return cmd.Place(replace(thing, T=T, fixed=True))
 
     def _out_of_the_hand(self, name: str) -> Thing | None:

@@ -96,17 +96,29 @@ def log(T: FloatArray) -> FloatArray:
     return np.concatenate((w, p - 0.5 * Wp + c * (W @ Wp)))
 
 
-def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
-    """A clean copy of the pose `T` (4, 4): rotation made orthonormal, last row exact.
+def validated(
+    T: npt.ArrayLike, name: str = "The pose", tolerance: float = tolerances.ROTATION_INPUT
+) -> FloatArray:
+    """Return a clean copy of the pose `T` (4, 4): rotation made orthonormal, last row exact.
 
-    Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, its
-    rotation is none, or it is too far away to be computed with.
+    Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, it is
+    too far away to be computed with, or `so3.misfit` of its rotation exceeds ``tolerance``.
     """
-    return np.array(validated_rows(T, name))
+    return np.array(validated_rows(T, name, tolerance))
 
 
-def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
-    """What `validated` returns, as nested lists of floats."""
+def printed(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
+    """Return the pose that `T` (4, 4) means when it was printed with four decimals or more.
+
+    Its rotation is the one nearest to the printed numbers. Raises InputError as `validated`.
+    """
+    return validated(T, name, tolerances.ROTATION_PRINTED)
+
+
+def validated_rows(
+    T: npt.ArrayLike, name: str = "The pose", tolerance: float = tolerances.ROTATION_INPUT
+) -> Rows:
+    """Return what `validated` does, as nested lists of floats."""
     if type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4):
         rows: Rows = T.tolist()
         if _is_clean(rows):
@@ -120,7 +132,9 @@ def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
             f"{name} is {np.abs(M[:3, 3]).max():.2g} m away; give positions up to "
             f"{tolerances.FARTHEST:.0e} m."
         )
-    R = so3.validated(M[:3, :3], f"The rotation of {name[:1].lower()}{name[1:]}")
+    # A name of one letter is a symbol.
+    label = name if len(name) == 1 else name[:1].lower() + name[1:]
+    R = so3.validated(M[:3, :3], f"The rotation of {label}", tolerance)
     clean: Rows = from_rotation_translation(R, M[:3, 3]).tolist()
     return clean
 

@@ -158,20 +158,28 @@ def quaternion_product(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
     )
 
 
-def validated(R: npt.ArrayLike, name: str = "The rotation") -> FloatArray:
-    """The rotation nearest to `R` (3, 3), as a copy.
+def misfit(R: npt.ArrayLike) -> float:
+    """Return the largest entry of |R^T R - I| of `R` (3, 3); inf or NaN where that overflows."""
+    M = np.asarray(R, dtype=np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.abs(M.T @ M - np.eye(3)).max())
 
-    Raises InputError when `R` is not finite, has another shape, or is farther from a rotation than
-    single-precision rounding explains.
+
+def validated(
+    R: npt.ArrayLike, name: str = "The rotation", tolerance: float = tolerances.ROTATION_INPUT
+) -> FloatArray:
+    """Return the rotation nearest to `R` (3, 3), as a copy.
+
+    Raises InputError when `R` is not finite, has another shape, or its `misfit` exceeds
+    ``tolerance``; the default allows for single-precision rounding.
     """
     M = finite_array(R, (3, 3), name)
-    with np.errstate(over="ignore", invalid="ignore"):
-        misfit = float(np.abs(M.T @ M - np.eye(3)).max())
-    # What overflowed is infinite or NaN.
-    if not misfit <= tolerances.ROTATION_INPUT:
+    off = misfit(M)
+    # An overflow gives infinity or NaN.
+    if not off <= tolerance:
         raise InputError(
-            f"{name} is not a rotation: its columns are off orthonormal by {misfit:.2g} "
-            f"(allowed: {tolerances.ROTATION_INPUT:.0e}); remove scale and shear from it."
+            f"{name} is not a rotation: its columns are off orthonormal by {off:.2g} "
+            f"(allowed: {tolerance:.0e}); remove scale and shear from it."
         )
     U, _, Vt = np.linalg.svd(M)
     nearest: FloatArray = U @ Vt

@@ -56,11 +56,20 @@ class Visual:
             try:
                 mesh = trimesh.load_scene(self.source).to_mesh()
             except Exception as error:
-                raise RobotDescriptionError(f"{self.source} is no mesh: {error}") from error
+                raise unreadable_mesh(self.source) from error
         else:
             mesh = self.source.copy()
         mesh.apply_transform(self.T_body_visual @ np.diag([*self.scale, 1.0]))
         return mesh
+
+
+def unreadable_mesh(source: Path) -> RobotDescriptionError:
+    """Return the error for a mesh file that its reader refuses, whatever the reader says."""
+    kind = source.suffix or "its format"
+    return RobotDescriptionError(
+        f"{source} cannot be read as a mesh: the file is corrupt, or {kind} is not understood. "
+        "Export it anew, for example as binary STL."
+    )
 
 
 def visuals_of(

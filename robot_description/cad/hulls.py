@@ -17,6 +17,7 @@ from manifold3d import Manifold
 
 from robot_description.cad.build import MESHES, MILLIMETRE, PARTS, Built
 from robot_description.cad.part import Part
+from robot_description.cad.shoulder import RING_FOOT
 from robot_description.cad.solid import Axis
 
 COLLISION = MESHES.parent / "collision"
@@ -36,11 +37,15 @@ class Cut:
         axis: the planes are square to it.
         planes: where they are [mm], rising; n planes make n + 1 pieces.
         pieces: further cuts by the piece's number, counted from 0 along the axis.
+        enclosed: numbers of the pieces that a neighbour's hull encloses at every angle of the joint
+            between. They get no hull: nothing else can reach them, and programs that check a link
+            on the table against its child would see the two overlap for ever.
     """
 
     axis: Axis
     planes: tuple[float, ...]
     pieces: Mapping[int, Cut] = field(default_factory=dict)
+    enclosed: frozenset[int] = frozenset()
 
 
 UNCUT = Cut("x", ())
@@ -50,11 +55,15 @@ CUTS: dict[str, Cut] = {
     "base_link": Cut("z", (11.05,)),
     # Flange | ring and connector, cable box | column and collar; beside them the gland.
     "arm_base_link": Cut("y", (61.9,), {0: Cut("z", (18.9, 42.1), {1: Cut("y", (46.0,))})}),
-    # Right disc | neck and skirt, below the two cheeks | eye, below the left disc.
+    # Right disc | neck in the bore of the column, ring and skirt, below the two cheeks | eye, below
+    # the left disc.
     "pan_link": Cut(
         "y",
         (-49.2, 51.75),
-        {1: Cut("z", (-29.5,), {1: Cut("y", (0.0,))}), 2: Cut("z", (-38.0,))},
+        {
+            1: Cut("z", (RING_FOOT, -29.5), {2: Cut("y", (0.0,))}, enclosed=frozenset({0})),
+            2: Cut("z", (-38.0,)),
+        },
     ),
     # Bellows on their shaft | tube | terminal box | tube | elbow cover on its shaft; two glands.
     "upper_arm_link": Cut(
@@ -94,7 +103,7 @@ def whole(part: Part) -> Manifold:
 
 
 def pieces(solid: Manifold, cut: Cut) -> list[Manifold]:
-    """Return ``solid`` cut apart, in the order of the planes; empty pieces are left out."""
+    """Return ``solid`` cut apart, in the order of the planes, without empty and enclosed pieces."""
     found: list[Manifold] = []
     rest = solid
     for number, plane in enumerate((*cut.planes, None)):
@@ -103,13 +112,13 @@ def pieces(solid: Manifold, cut: Cut) -> list[Manifold]:
             rest, here = rest.split_by_plane(NORMALS[cut.axis], plane)
         if number in cut.pieces:
             found += pieces(here, cut.pieces[number])
-        elif not here.is_empty():
+        elif number not in cut.enclosed and not here.is_empty():
             found.append(here)
     return found
 
 
 def hulls_of(part: Part) -> list[Manifold]:
-    """Return the hulls of ``part``: together they hold all of it."""
+    """Return the hulls of ``part``: together they hold all of it that is not enclosed."""
     return [piece.hull() for piece in pieces(whole(part), CUTS.get(part.link, UNCUT))]
 
 

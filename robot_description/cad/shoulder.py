@@ -17,6 +17,7 @@ from robot_description.cad.solid import Range, block, prism, rod
 AXIS_HEIGHT = 201.5
 NECK_DIAMETER, NECK_FOOT = 64.0, 133.0 - AXIS_HEIGHT
 SKIRT_FOOT, SKIRT_TOP = 139.5 - AXIS_HEIGHT, 157.0 - AXIS_HEIGHT
+RING_FOOT, RING_TOP = SKIRT_FOOT - 1.0, SKIRT_FOOT + 0.5
 SKIRT_FOOT_DIAMETER, SKIRT_RIM = 80.0, 3.0
 CHEEK_RADIUS, CHEEK_INSIDE, CHEEK_OUTSIDE = 46.0, 22.5, 47.5
 CHEEK_EDGE_OUTSIDE, CHEEK_EDGE_INSIDE = 6.0, 1.4
@@ -75,7 +76,7 @@ def pan_link() -> Part:
     hub(part, (DISC_START, DISC_END), DISC_DIAMETER, CAP_DIAMETER, CAP_END, star=True)
     screws(part, [(x, CHEEK_OUTSIDE, -37.0) for x in (-36.0, 36.0)], "+y", 5.0)
     screws(part, [(x, -CHEEK_OUTSIDE, -37.0) for x in (-36.0, 36.0)], "-y", 5.0)
-    part.add(STEEL, rod(NECK_DIAMETER + 6.0, SKIRT_FOOT - 1.0, SKIRT_FOOT + 0.5))
+    part.add(STEEL, rod(NECK_DIAMETER + 6.0, RING_FOOT, RING_TOP))
     x, y, z = conduit.SHOULDER.at
     bracket = block((x - 5.0, x + 5.0), (CHEEK_OUTSIDE - 8.0, y - 9.0), (z - 5.0, z + 5.0), 1.2)
     plate = block(

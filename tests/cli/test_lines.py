@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -15,14 +16,19 @@ import numpy as np
 import pytest
 
 from app.cli.main import main
+from app.geometry import so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
 from app.robot.model import RobotModel
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = json.loads((ROOT / "tests" / "golden" / "fk_reference.json").read_text(encoding="utf-8"))
 
 
-def ask(command: str, lines: Sequence[object], *options: str) -> list[dict[str, Any]]:
-    """The answers to ``lines``: strings as they are, anything else as JSON."""
+def ask(
+    command: str, lines: Sequence[object], *options: str, status: int = 0
+) -> list[dict[str, Any]]:
+    """Return the answers to ``lines``: strings as they are, anything else as JSON."""
     text = "".join((x if isinstance(x, str) else json.dumps(x)) + "\n" for x in lines)
     out, err = io.StringIO(), io.StringIO()
     with (
@@ -31,7 +37,7 @@ def ask(command: str, lines: Sequence[object], *options: str) -> list[dict[str, 
         contextlib.redirect_stderr(err),
     ):
         patch.setattr(sys, "stdin", io.StringIO(text))
-        assert main([command, *options]) == 0
+        assert main([command, *options]) == status
     assert err.getvalue() == ""
     return [json.loads(line) for line in out.getvalue().splitlines()]
 
@@ -93,8 +99,52 @@ def test_ik_with_badges_says_what_each_solution_costs() -> None:
     assert from_zero["solutions"][0]["distance_rad"] == pytest.approx(
         np.abs(from_zero["solutions"][0]["q"]).max()
     )
-    (refused,) = ask("ik", [pose | {"q": q}])
+    (refused,) = ask("ik", [pose | {"q": q}], status=1)
     assert "'q'" in refused["error"]
+
+
+@pytest.mark.parametrize("decimals", [6, 5, 4])
+def test_ik_takes_printed_poses(model: RobotModel, decimals: int) -> None:
+    """2,000 of 2,000, each answered within what the rounding implies.
+
+    Next to a stretched elbow a rounded point can be out of reach at its orientation, which then
+    gives way by more than the rounding; ``residual_rad`` reports that.
+    """
+    chain = model.arm.chain
+    poses = [forward(chain, q) for q in random_postures(model, 2000)]
+    answers = ask("ik", [{"T": pose.round(decimals).tolist()} for pose in poses])
+    assert [answer["error"] for answer in answers if "error" in answer] == []
+    rounding = 0.5 * 10.0**-decimals
+    # The nearest rotation is at most this far from the true one [rad].
+    turned = 3.0 / math.sqrt(2.0) * rounding
+    beyond = 0
+    for pose, answer in zip(poses, answers, strict=True):
+        assert answer["rotation_misfit"] <= 2.0 * math.sqrt(3.0) * 1.01 * rounding
+        # A point beside axis 1 turns the plane of the arm by its own displacement over the radius.
+        plane = math.sqrt(2.0) * rounding / math.hypot(pose[0, 3], pose[1, 3])
+        beyond += answer["residual_rad"] > turned + plane + 1e-9
+        for solution in answer["solutions"]:
+            found = forward(chain, solution["q"])
+            assert np.linalg.norm(found[:3, 3] - pose[:3, 3]) <= math.sqrt(3.0) * rounding + 1e-9
+            angle = so3.angle(found[:3, :3], pose[:3, :3])
+            assert angle <= 1.01 * turned + answer["residual_rad"] + 1e-9
+    assert beyond <= 20
+
+
+def random_postures(model: RobotModel, count: int) -> FloatArray:
+    chain = model.arm.chain
+    return np.random.default_rng(450).uniform(chain.lower, chain.upper, (count, chain.n))
+
+
+def test_ik_refuses_a_skewed_rotation_with_the_figure() -> None:
+    T = np.eye(4)
+    T[0, 1] = 9.99e-4
+    (answer,) = ask("ik", [{"T": T.tolist()}])
+    assert answer["rotation_misfit"] == pytest.approx(9.99e-4)
+    T[0, 1] = 1.002e-3
+    (answer,) = ask("ik", [{"T": T.tolist()}], status=1)
+    assert "rotation of T is not a rotation" in answer["error"]
+    assert "off orthonormal by 0.001 (allowed: 1e-03)" in answer["error"]
 
 
 def test_the_base_frame_is_the_shoulder_frame_moved(model: RobotModel) -> None:
@@ -115,9 +165,20 @@ BAD = {
         ({"q": [0, 0, 0, 0]}, "shape"),
         ('{"q": [0, 0, 0, 0, NaN]}', "axis 5"),
         ('{"q": [0, 0, 0, 0, 1e999]}', "axis 5"),
-        ({"q": ["a", 0, 0, 0, 0]}, "numbers"),
+        ({"q": ["a", 0, 0, 0, 0]}, 'q[0] is "a"'),
+        ('{"q": null}', "q is null; it must be a list of numbers"),
+        ('{"q": [0, true, 0, 0, 0]}', "q[1] is true; give plain finite numbers"),
+        ('{"q": [0, 0, null, 0, 0]}', "q[2] is null; give plain finite numbers"),
+        ({"q": [0, 0, 0, 0, 0], "tool": None}, "'tool' is null"),
+        ({"q": [0, 0, 0, 0, 0], "tool": True}, "'tool' is true"),
+        ("null", "This is null; a request is a JSON object"),
+        ("true", "This is true; a request is a JSON object"),
+        ('\ufeff{"q": [0, 0, 0, 0, 0]}', "byte order mark (BOM). Save the file as UTF-8 without"),
+        ('{"q": [0, 0, 0, 0, 0]', "not JSON: Expecting ',' delimiter at column 22"),
+        ('{"q": [' + "1" * 5000 + ", 0, 0, 0, 0]}", "too many digits"),
+        ('{"q": [' + "1" * 400 + ", 0, 0, 0, 0]}", "q[0] is too large"),
         ({"q": [0, 0, 0, 0, 0], "tool": "hammer"}, "tcp, grasp, flange"),
-        ({"q": [0, 0, 0, 0, 0], "tool": {}}, "no tool"),
+        ({"q": [0, 0, 0, 0, 0], "tool": {}}, "'tool' is an object"),
         ({"q": [0, 0, 0, 0, 0], "tol": "tcp"}, "'tol'"),
         ("[" * 100_000, "not JSON"),
     ],
@@ -126,7 +187,10 @@ BAD = {
         ({"T": np.diag([1, 1, 2, 1]).tolist()}, "rotation"),
         ({"T": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]]}, "last row"),
         ('{"T": [[1,0,0,NaN],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}', "nan"),
-        ({"T": None}, "T"),
+        ({"T": None}, "T is null; it must be a list of rows"),
+        ('{"T": [[true,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}', "T[0][0] is true"),
+        ('{"T": [[1,0,0,0],[0,1,0,0],[0,0,1,0],null]}', "T[3] is null"),
+        ('{"T": [[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]]}', "different lengths"),
     ],
 }
 GOOD = {"fk": {"q": [0, 0, 0, 0, 0]}, "ik": {"T": np.eye(4).tolist()}}
@@ -145,6 +209,26 @@ def test_a_bad_line_gets_an_error_and_the_rest_go_on(command: str) -> None:
         assert set(answer) == {"error"}
         assert f"line {2 * number}: " in answer["error"]
         assert said in answer["error"]
+
+
+def test_the_exit_status_is_1_when_every_line_failed() -> None:
+    bad, good = {"q": None}, GOOD["fk"]
+    ask("fk", [bad, "", bad], status=1)
+    ask("fk", [bad, good, bad], status=0)
+
+
+def test_bytes_that_are_not_utf_8_spoil_their_line_alone() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "app", "fk"],
+        input=b'\xff\xfe\n{"q": [0, 0, 0, 0, 0]}\n\xef\xbb\xbf{"q": [0, 0, 0, 0, 0]}\n',
+        capture_output=True,
+        cwd=ROOT,
+        check=True,
+    )
+    first, second, third = map(json.loads, done.stdout.splitlines())
+    assert first["error"].startswith("line 1: This is not JSON")
+    assert "T" in second
+    assert "line 3: This is not JSON: it begins with a byte order mark" in third["error"]
 
 
 def test_empty_lines_are_no_requests() -> None:

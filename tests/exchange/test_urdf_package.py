@@ -1,44 +1,72 @@
-"""The zip of a ROS package: whole, the same each time, and read by others."""
+"""The ROS package as it is exported: whole, the same each time, and loaded by other programs.
+
+No program is given anything but the unpacked files, without a change.
+"""
 
 from __future__ import annotations
 
 import io
+import json
+import os
+import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 import yourdfpy
 
+from app.cli.main import main
 from app.errors import RobotDescriptionError
-from app.exchange.urdf_package import package_files
+from app.exchange.mechanism import Mechanism
+from app.exchange.urdf_package import Maintainer, package_files
 from robot_description import URDF_PATH
-from tests.exchange.conftest import GANTRY
+from tests.exchange.conftest import GANTRY, POSES
+from tests.exchange.tools import needs_pybullet, pybullet, run
+
+LARGEST_ZIP = 800_000
+"""Bytes of the package of the Katana."""
+
+MASS, BOX_MASS = 9.271, 4.471
+"""[kg] Of the whole, and of the link that stands on the table."""
+
+SHAPES = 53
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    ((name, content),) = package_files(URDF_PATH, "MIT").items()
-    assert name == "katana450_description.zip"
+    """The package, as the command writes it and unzip unpacks it."""
     where = tmp_path_factory.mktemp("ros")
-    zipfile.ZipFile(io.BytesIO(content)).extractall(where)
+    assert main(["export", "urdf", "--out", str(where)]) == 0
+    archive = where / "katana450_description.zip"
+    assert archive.stat().st_size < LARGEST_ZIP
+    zipfile.ZipFile(archive).extractall(where)
     return where / "katana450_description"
 
 
-def test_yourdfpy_finds_the_same_robot_in_it(folder: Path) -> None:
-    there = yourdfpy.URDF.load(
-        str(folder / "urdf" / "katana450.urdf"),
-        filename_handler=lambda fname: str(folder.parent / fname.removeprefix("package://")),
-        load_collision_meshes=True,
-    )
-    here = yourdfpy.URDF.load(str(URDF_PATH), load_collision_meshes=True)
+@pytest.fixture(scope="module")
+def urdf(folder: Path) -> Path:
+    return folder / "urdf" / "katana450.urdf"
+
+
+@pytest.fixture(scope="module")
+def model(urdf: Path) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(urdf))
+
+
+def test_yourdfpy_finds_the_same_robot_in_it(urdf: Path) -> None:
+    there = yourdfpy.URDF.load(str(urdf))
+    here = yourdfpy.URDF.load(str(URDF_PATH))
     assert set(there.link_map) == set(here.link_map)
     pose = np.full(len(here.actuated_joint_names), 0.1)
     for robot in (there, here):
         robot.update_cfg(pose)
-    np.testing.assert_allclose(there.scene.bounds, here.scene.bounds, atol=1e-12)
+    # Coordinates of OBJ are rounded to 0.01 mm.
+    np.testing.assert_allclose(there.scene.bounds, here.scene.bounds, atol=0.51e-5)
     for link in here.link_map:
         np.testing.assert_allclose(there.get_transform(link), here.get_transform(link))
     for name, joint in here.joint_map.items():
@@ -46,32 +74,244 @@ def test_yourdfpy_finds_the_same_robot_in_it(folder: Path) -> None:
         assert there.joint_map[name].mimic == joint.mimic
 
 
-def test_mujoco_weighs_the_same_robot(folder: Path) -> None:
-    """It takes package:// for the folder of the URDF's own package."""
-    text = (folder / "urdf" / "katana450.urdf").read_text()
-    (folder / "here.urdf").write_text(text.replace("package://katana450_description/", ""))
-    there = mujoco.MjModel.from_xml_path(str(folder / "here.urdf"))
+def test_mujoco_loads_the_same_robot(model: mujoco.MjModel) -> None:
     here = mujoco.MjModel.from_xml_path(str(URDF_PATH))
-    assert there.nbody == here.nbody
-    assert there.nmesh == here.nmesh
-    np.testing.assert_allclose(there.body_mass, here.body_mass)
-    np.testing.assert_allclose(there.jnt_range, here.jnt_range)
+    assert (model.nbody, model.nmesh, model.ngeom) == (here.nbody, SHAPES, SHAPES)
+    assert model.body_mass.sum() == pytest.approx(MASS, abs=1e-9)
+    np.testing.assert_allclose(model.body_mass, here.body_mass)
+    np.testing.assert_allclose(model.jnt_range, here.jnt_range)
+    np.testing.assert_allclose(model.geom_pos, here.geom_pos, atol=1e-9)
 
 
-def test_its_manifest_is_one(folder: Path) -> None:
+def test_mujoco_finds_no_contact_between_neighbours(model: mujoco.MjModel) -> None:
+    """At zero there is none at all; at any angle of axis 1 none between column and shoulder."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    lower, upper = model.joint("axis_1").range
+    for angle in np.linspace(lower, upper, 100):
+        data.joint("axis_1").qpos[0] = angle
+        mujoco.mj_forward(model, data)
+        assert data.ncon == 0, angle
+
+
+def test_mujoco_lets_the_arm_fall_on_its_hinges(model: mujoco.MjModel) -> None:
+    """A simulation of the file runs: nothing explodes, and axis 1 is not held by friction."""
+    data = mujoco.MjData(model)
+    data.joint("axis_1").qvel[0] = 1.0
+    while data.time < 0.1:
+        mujoco.mj_step(model, data)
+    assert np.isfinite(data.qpos).all()
+    assert data.joint("axis_1").qpos[0] > 0.05
+
+
+LOAD = """
+import json, sys
+import pybullet as bullet
+bullet.connect(bullet.DIRECT)
+robot = bullet.loadURDF(sys.argv[1], useFixedBase=True, flags=bullet.URDF_USE_SELF_COLLISION)
+joints = range(bullet.getNumJoints(robot))
+names = [bullet.getJointInfo(robot, k)[12].decode() for k in joints]
+turning = [k for k in joints if bullet.getJointInfo(robot, k)[2] == bullet.JOINT_REVOLUTE]
+for k, value in zip(turning, json.loads(sys.argv[2]), strict=True):
+    bullet.resetJointState(robot, k, value)
+visuals = bullet.getVisualShapeData(robot)
+places = {names[k]: bullet.getLinkState(robot, k, computeForwardKinematics=1)[4] for k in joints}
+bullet.resetSimulation()
+robot = bullet.loadURDF(sys.argv[1], useFixedBase=True, flags=bullet.URDF_USE_SELF_COLLISION)
+bullet.performCollisionDetection()
+print("\\n" + json.dumps({
+    "places": places,
+    "colours": [[names[v[1]] if v[1] >= 0 else "base_link", *v[7]] for v in visuals],
+    "mass": sum(bullet.getDynamicsInfo(robot, k)[0] for k in joints),
+    "contacts": [c[3:5] for c in bullet.getContactPoints(robot, robot)],
+}))
+"""
+
+
+@needs_pybullet
+def test_pybullet_loads_the_same_robot(
+    tmp_path: Path, urdf: Path, katana: Mechanism, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose = (0.4, -1.187, 1.484, 0.14, 0.5, 0.2, 0.2)
+    monkeypatch.setenv("PYTHONPATH", os.fspath(pybullet() or ""))
+    # Another folder, so that no name is found because of where the test stands.
+    printed = run(sys.executable, "-c", LOAD, urdf, json.dumps(pose), folder=tmp_path)
+    found = json.loads(printed.splitlines()[-1])
+    frames = katana.frames(katana.values(POSES[1]))
+    assert set(found["places"]) == {link.name for link in katana.links[1:]}
+    for link, place in found["places"].items():
+        np.testing.assert_allclose(place, frames[link][:3, 3], atol=1e-6, err_msg=link)
+    assert found["mass"] == pytest.approx(MASS - BOX_MASS, abs=1e-9)
+    assert found["contacts"] == []
+    shown = [
+        [link.name, *(round(part, 4) for part in shape.material.colour)]
+        for link in katana.links
+        for shape in link.shapes
+    ]
+    colours = [[name, *np.round(rgba[:3], 4).tolist()] for name, *rgba in found["colours"]]
+    assert sorted(colours) == sorted(shown)
+
+
+def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
+    folder: Path, urdf: Path
+) -> None:
+    names = [mesh.get("filename", "") for mesh in ET.parse(urdf).getroot().iter("mesh")]
+    files = [name.removeprefix("package://katana450_description/") for name in names]
+    assert {Path(file).suffix for file in files} == {".obj", ".stl"}
+    there = {f"meshes/{path.name}" for path in (folder / "meshes").iterdir()}
+    assert there == {*files, "meshes/materials.mtl"}
+
+
+def test_visuals_have_the_surfaces_and_colours_of_the_arm(urdf: Path, katana: Mechanism) -> None:
+    """As trimesh reads OBJ and MTL, and as the URDF says."""
+    root = ET.parse(urdf).getroot()
+    written = {
+        element.get("name"): [float(part) for part in color.get("rgba", "").split()]
+        for element in root.iterfind("material")
+        for color in element.iterfind("color")
+    }
+    for link in katana.links:
+        (element,) = (e for e in root.iterfind("link") if e.get("name") == link.name)
+        visuals = element.findall("visual")
+        assert len(visuals) == len(link.shapes)
+        for visual, shape in zip(visuals, link.shapes, strict=True):
+            mesh, material = visual.find("geometry/mesh"), visual.find("material")
+            assert mesh is not None
+            assert material is not None
+            name = mesh.get("filename", "").rpartition("/")[2]
+            found: Any = trimesh.load_mesh(urdf.parents[1] / "meshes" / name, process=False)
+            assert found.visual.material.name == material.get("name")
+            np.testing.assert_allclose(
+                found.visual.material.diffuse[:3] / 255.0, shape.material.colour, atol=0.005
+            )
+            np.testing.assert_allclose(
+                written[material.get("name")], [*shape.material.colour, 1.0], atol=1e-4
+            )
+            assert found.area == pytest.approx(shape.area, rel=2e-3)
+            np.testing.assert_allclose(
+                found.bounds,
+                [shape.vertices.min(axis=0), shape.vertices.max(axis=0)],
+                atol=0.51e-5,
+            )
+
+
+def test_the_manifest_states_the_licence_and_no_invented_person(folder: Path) -> None:
     manifest = ET.parse(folder / "package.xml").getroot()
     assert manifest.findtext("name") == "katana450_description"
     assert manifest.findtext("license") == "MIT"
+    assert manifest.findtext("maintainer") == "TODO: Maintainer"
     assert "project(katana450_description NONE)" in (folder / "CMakeLists.txt").read_text()
 
 
-def test_the_same_robot_gives_the_same_bytes_and_no_mesh_twice() -> None:
+@pytest.mark.parametrize(
+    ("words", "licence", "maintainer", "said"),
+    [
+        ((), "TODO: License declaration", ("TODO: Maintainer", "todo@todo.todo"), "--license and"),
+        (
+            ("--license", "BSD & <more>", "--maintainer", 'A "B" C <a@b.org>'),
+            "BSD & <more>",
+            ('A "B" C', "a@b.org"),
+            "",
+        ),
+    ],
+)
+def test_a_package_of_another_robot_states_what_its_exporter_says(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    words: tuple[str, ...],
+    licence: str,
+    maintainer: tuple[str, str],
+    said: str,
+) -> None:
+    assert main(["export", "urdf", "--urdf", str(GANTRY), "--out", str(tmp_path), *words]) == 0
+    warned = capsys.readouterr().err
+    assert ("package.xml has a TODO" in warned) == bool(said)
+    assert said in warned
+    content = zipfile.ZipFile(tmp_path / "gantry_2_description.zip").read(
+        "gantry_2_description/package.xml"
+    )
+    manifest = ET.fromstring(content)
+    assert manifest.findtext("license") == licence
+    (person,) = manifest.findall("maintainer")
+    assert (person.text, person.get("email")) == maintainer
+
+
+def test_other_formats_state_no_licence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", "glb", "--out", str(tmp_path), "--license", "MIT"]) == 1
+    assert "states no licence" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["export", "urdf", "--out", str(tmp_path), "--maintainer", "nobody"])
+    assert "NAME <EMAIL>" in capsys.readouterr().err
+
+
+FOREIGN = """<robot name="two">
+  <material name="red"><color rgba="1 0 0 1"/></material>
+  <mujoco><compiler balanceinertia="true" strippath="false"/></mujoco>
+  <link name="base">
+    <visual name="look"><origin xyz="0 0 1"/>
+      <geometry><mesh filename="both.glb" scale="2 2 2"/></geometry></visual>
+    <visual><geometry><mesh filename="both.glb"/></geometry><material name="red"/></visual>
+    <collision><geometry><mesh filename="both.glb"/></geometry></collision>
+    <collision><geometry><mesh filename="plain.STL"/></geometry></collision>
+  </link>
+  <link name="frame"/><link name="moving"/>
+  <joint name="a" type="fixed"><parent link="base"/><child link="frame"/></joint>
+  <joint name="b" type="continuous"><parent link="base"/><child link="moving"/></joint>
+</robot>"""
+
+
+def test_meshes_of_another_robot_keep_their_places_names_and_colours(tmp_path: Path) -> None:
+    scene: Any = trimesh.Scene()
+    kinds: Any = trimesh.visual
+    for name, colour, x in (("red", (0, 0, 255, 255), 0.0), ("blue", (0, 255, 0, 255), 1.0)):
+        box: Any = trimesh.creation.box(extents=[0.2, 0.2, 0.2])
+        box.apply_translation([x, 0.0, 0.0])
+        material = kinds.material.PBRMaterial(name=name, baseColorFactor=colour)
+        box.visual = kinds.TextureVisuals(material=material)
+        scene.add_geometry(box, node_name=name + str(x), geom_name=name + str(x))
+    scene.export(tmp_path / "both.glb")
+    trimesh.creation.box(extents=[1.0, 1.0, 1.0]).export(tmp_path / "plain.stl")
+    (tmp_path / "plain.stl").rename(tmp_path / "plain.STL")
+    (tmp_path / "two.urdf").write_text(FOREIGN)
+    ((_, content),) = package_files(tmp_path / "two.urdf", "BSD", Maintainer("A", "a@b")).items()
+    zipfile.ZipFile(io.BytesIO(content)).extractall(tmp_path)
+    path = tmp_path / "two_description" / "urdf" / "two.urdf"
+    root = ET.parse(path).getroot()
+    (base, frame, moving) = root.findall("link")
+    visuals = base.findall("visual")
+    assert [visual.get("name") for visual in visuals] == ["look", "look_1", None, None]
+    assert [visual.find("origin") is not None for visual in visuals] == [True, True, False, False]
+    painted = [m.get("name") for visual in visuals for m in visual.findall("material")]
+    # The material that the URDF names overrules the mesh's, as in other programs.
+    assert (sorted(painted[:2], key=str), painted[2:]) == (["blue", "red_2"], ["red", "red"])
+    assert [mesh.get("scale") for mesh in base.iterfind("visual/geometry/mesh")] == [
+        "2 2 2", "2 2 2", None, None,
+    ]  # fmt: skip
+    colours = {m.get("name"): m[0].get("rgba") for m in root.findall("material")}
+    assert colours == {"red": "1 0 0 1", "red_2": "0 0 1 1", "blue": "0 1 0 1"}
+    (compiler,) = root.iter("compiler")
+    assert compiler.attrib == {
+        "balanceinertia": "true",
+        "strippath": "true",
+        "meshdir": "../meshes",
+        "fusestatic": "false",
+    }
+    assert frame.find("inertial/mass[@value='0']") is not None
+    assert moving.find("inertial") is None
+    there = yourdfpy.URDF.load(str(path))
+    np.testing.assert_allclose(there.scene.bounds, [[-0.2, -0.2, -0.1], [2.2, 0.2, 1.2]])
+    assert [mesh.get("filename") for mesh in base.iterfind("collision/geometry/mesh")] == [
+        f"package://two_description/meshes/{tmp_path.name}_{name}"
+        for name in ("both.obj", "plain.STL")
+    ]
+
+
+def test_the_same_robot_gives_the_same_bytes_and_no_file_twice() -> None:
     one, two = package_files(URDF_PATH), package_files(URDF_PATH)
     assert one == two
     names = zipfile.ZipFile(io.BytesIO(one["katana450_description.zip"])).namelist()
     assert len(names) == len(set(names))
-    meshes = {m.get("filename") for m in ET.parse(URDF_PATH).getroot().iter("mesh")}
-    assert len([name for name in names if "/meshes/" in name]) == len(meshes)
 
 
 def test_a_robot_without_meshes_has_a_package_too() -> None:
@@ -82,7 +322,24 @@ def test_a_robot_without_meshes_has_a_package_too() -> None:
     )
 
 
-NO_MESH = '<visual><geometry><mesh filename="no.stl"/></geometry></visual>'
+@pytest.mark.parametrize("kind", ["glb", "urdf"])
+@pytest.mark.parametrize("suffix", [".glb", ".dae", ".xyz"])
+def test_an_unreadable_mesh_is_named_in_words_of_ours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str, kind: str
+) -> None:
+    mesh = tmp_path / f"arm{suffix}"
+    mesh.write_bytes(b"junk")
+    path = tmp_path / "x.urdf"
+    path.write_text(f'<robot name="x"><link name="a">{MESH.format(mesh.name)}</link></robot>')
+    assert main(["export", kind, "--urdf", str(path), "--out", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err == (
+        f"katana450: {mesh} cannot be read as a mesh: the file is corrupt, or {suffix} is not "
+        "understood. Export it anew, for example as binary STL.\n"
+    )
+
+
+MESH = '<visual><geometry><mesh filename="{}"/></geometry></visual>'
+NO_MESH = MESH.format("no.stl")
 
 
 @pytest.mark.parametrize(

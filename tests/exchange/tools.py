@@ -9,6 +9,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import tarfile
 from collections.abc import Sequence
 from contextlib import suppress
@@ -36,6 +37,11 @@ X_ITE = "x_ite@15.0.1"
 
 X_ITE_FOLDER = Path(__file__).parents[2] / ".cache" / X_ITE
 
+PYBULLET = "pybullet==3.2.7"
+"""A simulator of robots, from PyPI; its wheel of 103 MB is too large for the other tests."""
+
+PYBULLET_FOLDER = Path(__file__).parents[2] / ".cache" / PYBULLET
+
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
@@ -60,6 +66,16 @@ def needs(*names: str) -> pytest.MarkDecorator:
     return pytest.mark.skipif(
         bool(packages), reason=f"not here; on Debian and Ubuntu: apt-get install {packages}"
     )
+
+
+def pybullet() -> Path | None:
+    """Return the folder to import it from, if it is there."""
+    return PYBULLET_FOLDER if any(PYBULLET_FOLDER.glob("pybullet*.so")) else None
+
+
+needs_pybullet = pytest.mark.skipif(
+    pybullet() is None, reason=f"{PYBULLET} is not here; `make exchange` brings it"
+)
 
 
 def run(*words: str | Path, folder: Path | None = None, seconds: float = 60.0) -> str:
@@ -97,6 +113,20 @@ def fetch_x_ite() -> None:
         archive.unlink()
 
 
+def fetch_pybullet() -> str:
+    """Bring its wheel, and no other package; return why that was not possible."""
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "install"]
+    place = ["--no-deps", "--only-binary=:all:", "--target", str(PYBULLET_FOLDER), PYBULLET]
+    print("Running:", *pip, *place, flush=True)
+    try:
+        done = subprocess.run(
+            [*pip, *place], check=False, timeout=300.0, capture_output=True, text=True
+        )
+    except subprocess.TimeoutExpired:
+        return "it took more than 300 s"
+    return done.stderr.strip().rpartition("\n")[2]
+
+
 def main() -> None:
     """Say what the tests use; install it first if root can."""
     packages = missing(list(PACKAGES))
@@ -112,6 +142,8 @@ def main() -> None:
     if x_ite() is None and shutil.which("npm"):
         fetch_x_ite()
     print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
+    why = "" if pybullet() else fetch_pybullet()
+    print("PyBullet for the tests:", pybullet() or f"not here; {why}")
     packages = missing(list(PACKAGES))
     print(
         f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"

@@ -27,11 +27,14 @@ from robot_description.cad.hulls import (
     whole,
     with_collisions,
 )
+from robot_description.cad.shoulder import RING_FOOT
 from robot_description.cad.solid import block, rod
 
 STANDOFF = 5.0  # mm
 EXCESS = 0.10  # of the volume
 SKIN = 1e-6  # of the volume
+SLOT = 0.501  # mm, between collar and ring
+CLEARANCE = 0.49  # mm
 ANGLES = 4
 LINKS = [make.__name__ for make in PARTS]
 
@@ -159,12 +162,40 @@ def test_shapes_are_written_to_their_links_alone(tmp_path: Path) -> None:
     assert with_collisions(written, folder) == bare
 
 
-@pytest.mark.parametrize("link", LINKS)
+def outside_hulls(link: str) -> Manifold:
+    return functools.reduce(lambda a, b: a - b, hulls(link), solid(link))
+
+
+@pytest.mark.parametrize("link", [link for link in LINKS if link != "pan_link"])
 def test_hulls_hold_the_whole_link(link: str) -> None:
-    whole_link = solid(link)
-    left = functools.reduce(lambda a, b: a - b, hulls(link), whole_link)
     # Rounding leaves skins where a hull's face is the solid's.
-    assert left.volume() < SKIN * whole_link.volume()
+    assert outside_hulls(link).volume() < SKIN * solid(link).volume()
+
+
+def test_the_column_encloses_what_the_hulls_of_the_shoulder_leave_out() -> None:
+    joint = robot().joint_map["axis_1"]
+    left = outside_hulls("pan_link")
+    for angle in np.linspace(joint.limit.lower, joint.limit.upper, ANGLES):
+        T = np.linalg.inv(turned(joint, float(angle)))
+        for hull in hulls("arm_base_link"):
+            left -= hull.transform(T[:3])
+    # A slot stays between the collar and the ring above it, too narrow for any other link.
+    slot = [p for p in left.decompose() if p.volume() > SKIN * solid("pan_link").volume()]
+    for piece in slot:
+        assert RING_FOOT - SLOT < piece.bounding_box()[2] < piece.bounding_box()[5]
+        assert piece.bounding_box()[5] == pytest.approx(RING_FOOT, abs=1e-6)
+    assert slot
+
+
+def test_shoulder_and_column_do_not_overlap_at_any_angle() -> None:
+    """Programs do not excuse a pair of neighbours when one of them is fixed to the world."""
+    joint = robot().joint_map["axis_1"]
+    for angle in np.linspace(joint.limit.lower, joint.limit.upper, 25):
+        T = turned(joint, float(angle))[:3]
+        for hull in hulls("pan_link"):
+            turned_hull = hull.transform(T)
+            gaps = [turned_hull.min_gap(other, 10.0) for other in hulls("arm_base_link")]
+            assert min(gaps) > CLEARANCE
 
 
 @pytest.mark.parametrize("link", LINKS)
