@@ -42,8 +42,6 @@ def export(options: argparse.Namespace) -> int:
         raise InputError(f"A file of {kind} holds no run; html does.")
     if options.pose and kind not in POSED:
         raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED)} do.")
-    if kind != "urdf" and (options.license or options.maintainer):
-        raise InputError(f"A file of {kind} states no licence and no maintainer; urdf does.")
     mechanism, notes = load_mechanism(options.urdf)
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)

@@ -14,7 +14,7 @@ from app.cli.render_options import add_render_options
 from app.cli.serve_options import add_serve_options
 from app.cli.version import version
 from app.cli.workspace_options import add_workspace_options
-from app.errors import KatanaError
+from app.errors import InputError, KatanaError
 from app.settings import Settings
 from robot_description import URDF_PATH
 
@@ -62,6 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from app.cli import programs
 
             return programs.run(options) if options.command == "run" else programs.demo(options)
+        if (
+            options.command == "export"
+            and options.format != "urdf"
+            and (options.license or options.maintainer)
+        ):
+            raise InputError(
+                f"A file of {options.format} states no licence and no maintainer; urdf does."
+            )
         if options.command == "export" and options.format == "html":
             from app.cli.page import write_page
 

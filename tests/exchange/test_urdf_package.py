@@ -237,8 +237,11 @@ def test_a_package_of_another_robot_states_what_its_exporter_says(
     assert (person.text, person.get("email")) == maintainer
 
 
-def test_other_formats_state_no_licence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "glb", "--out", str(tmp_path), "--license", "MIT"]) == 1
+@pytest.mark.parametrize("kind", ["glb", "html"])
+def test_other_formats_state_no_licence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    assert main(["export", kind, "--out", str(tmp_path / "x.html"), "--license", "MIT"]) == 1
     assert "states no licence" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["export", "urdf", "--out", str(tmp_path), "--maintainer", "nobody"])

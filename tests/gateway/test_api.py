@@ -16,11 +16,10 @@ import numpy.typing as npt
 import pytest
 
 from app.api import answers, requests, schema
-from app.api.fields import Form, Matrix4
+from app.api.fields import Matrix4
 from app.cli.main import main
 from app.client import AsyncClient, Client, RefusedError, aconnect, connect
 from app.client.files import LostError
-from app.geometry import so3
 from app.kinematics.forward import forward
 from app.kinematics.reading import Reading
 from app.kinematics.statics import holding_torques
@@ -66,33 +65,6 @@ def test_a_pose_may_be_in_either_frame(
     assert there.pitch is not None
     there = program.go(requests.Turn(pitch=there.pitch, roll=0.25))
     assert there.roll == pytest.approx(0.25, abs=1e-12)
-
-
-@pytest.mark.parametrize("decimals", [6, 5, 4])
-def test_a_printed_pose_is_taken_and_its_rounding_reported(
-    program: Client, model: RobotModel, decimals: int
-) -> None:
-    T = forward(model.arm.chain, THERE)
-    rounding = 0.5 * 10.0**-decimals
-    printed = T.round(decimals).tolist()
-    accepted = program.ask(requests.Pose(T=printed))
-    assert isinstance(accepted, answers.Done)
-    assert accepted.rotation_misfit is not None
-    assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
-    there = program.go(requests.Pose(T=printed))
-    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=10.0 * rounding)
-
-
-def test_a_thing_is_put_at_a_printed_pose(program: Client) -> None:
-    T = np.eye(4)
-    T[:3, :3] = so3.from_rpy(0.0, 0.0, 0.7)
-    T[:3, 3] = 0.3, -0.3, 0.0
-    printed: Any = T.round(4).tolist()
-    placed = program.ask(requests.Place(name="block", form=Form.BOX, size=[0.02] * 3, T=printed))
-    assert isinstance(placed, answers.Done)
-    assert placed.rotation_misfit is not None
-    assert placed.rotation_misfit > 1e-6
-    program.ask(requests.Remove(name="block"))
 
 
 def test_what_the_arm_cannot_do_comes_with_its_reason(program: Client) -> None:

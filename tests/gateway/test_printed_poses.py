@@ -1,0 +1,50 @@
+"""Poses as people and programs print them, sent to a real server."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.api import answers, requests
+from app.api.fields import Form
+from app.client import Client, RefusedError
+from app.geometry import so3
+from app.kinematics.forward import forward
+from app.robot.model import RobotModel
+
+THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
+
+
+@pytest.mark.parametrize("decimals", [6, 5, 4])
+def test_a_printed_pose_is_taken_and_its_rounding_reported(
+    program: Client, model: RobotModel, decimals: int
+) -> None:
+    T = forward(model.arm.chain, THERE)
+    rounding = 0.5 * 10.0**-decimals
+    printed = T.round(decimals).tolist()
+    accepted = program.ask(requests.Pose(T=printed))
+    assert isinstance(accepted, answers.Done)
+    assert accepted.rotation_misfit is not None
+    assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
+    there = program.go(requests.Pose(T=printed))
+    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=10.0 * rounding)
+
+
+def test_a_thing_is_put_at_a_printed_pose(program: Client) -> None:
+    T = np.eye(4)
+    T[:3, :3] = so3.from_rpy(0.0, 0.0, 0.7)
+    T[:3, 3] = 0.3, -0.3, 0.0
+    printed: Any = T.round(4).tolist()
+    placed = program.ask(requests.Place(name="block", form=Form.BOX, size=[0.02] * 3, T=printed))
+    assert isinstance(placed, answers.Done)
+    assert placed.rotation_misfit is not None
+    assert placed.rotation_misfit > 1e-6
+    program.ask(requests.Remove(name="block"))
+
+
+def test_a_skewed_pose_is_refused_with_the_figure(program: Client) -> None:
+    skewed = ((1.0, 2e-3, 0.0, 0.3), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
+    with pytest.raises(RefusedError, match=r"off orthonormal by 0\.002 \(allowed: 1e-03\)"):
+        program.ask(requests.Pose(T=skewed))
