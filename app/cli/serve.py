@@ -12,7 +12,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from app.cli.front import OPEN, READY, Front, Outfit, start_log
+from app.cli.front import OPEN, READY, Front, Outfit
+from app.cli.log_lines import start_log
 from app.gateway.listen import HERE, listen
 from app.settings import Settings
 from robot_description import URDF_PATH
