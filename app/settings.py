@@ -22,6 +22,7 @@ class Settings:
         frame_rate: most view updates a second [Hz].
         ready: posture the arm starts in and Home returns to [rad].
         silence: time without a sign of life of whoever drives that stops an arm that moves [s].
+        owner_silence: heartbeat timeout of a program's owner, after which the program ends [s].
         access: file of the links by which people come in; without it nobody is asked.
         insecure: other machines may come in unasked.
         tls_cert, tls_key: files of a certificate and its key, for https.
@@ -37,6 +38,7 @@ class Settings:
     frame_rate: float = 60.0
     ready: tuple[float, ...] = tuple(math.radians(angle) for angle in READY_POSTURE_DEG)
     silence: float = 0.25
+    owner_silence: float = 1.0
     access: Path | None = None
     insecure: bool = False
     tls_cert: Path | None = None

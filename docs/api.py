@@ -32,7 +32,7 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 |---|---|
 | **websocket** `/api/v{version}/socket?name=NAME` | requests up, answers and states down |
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
-| **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` of 8 to 64 letters and digits tells programs apart |
+| **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` with a secret key of 16 to 64 letters and digits, chosen by the program, tells programs apart; `X-Name` is the name that others see |
 | **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `look` tells |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .glb or .gltf file, to be placed by the key in the answer |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | what stands around as a .zip ([scenes](scenes.md)); one that is brought waits for a `load` |
@@ -42,7 +42,12 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 Every request is a sign of life. Where the server asks for a link ([access](access.md)) the token
 behind its `#` comes as `Authorization: Bearer TOKEN`, or in the `hello`. A moving arm is stopped when
 whoever holds it falls silent or hangs up; after a stop nothing moves before a `reset` and a new
-command.
+command. A script that a program has the server run ends at rest once nothing is received from that
+program for 1 s (`--owner-silence`).
+
+In a state `stop` is `requested` until the arm itself has shown, newer than the request, that it is
+stopped, and `confirmed` then. `age` is the time since the arm's process last answered: from 0.3 s on
+what else the state says is old, and `GET /health` answers with status 503.
 
 ## From Python
 
@@ -74,7 +79,8 @@ Simulink connect alike: [simulink](simulink.md).
 ## By hand
 
 ```
-curl -H 'X-Program: by-hand-1' -d '{{"do": "joint", "axis": 1, "value": 0.4}}' http://127.0.0.1:8080/api/v{version}/do
+KEY=$(openssl rand -hex 16)  # a secret: whoever knows it speaks for this program
+curl -H "X-Program: $KEY" -H 'X-Name: By hand' -d '{{"do": "joint", "axis": 1, "value": 0.4}}' http://127.0.0.1:8080/api/v{version}/do
 curl http://127.0.0.1:8080/api/v{version}/state
 ```
 

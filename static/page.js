@@ -62,7 +62,7 @@
   function stopped() {
     clearTimeout(asking);
     asking = null;
-    stopButton.classList.remove("asked");
+    draw();
   }
 
   // At once, not when the finger is lifted; a click without a pointer is the Enter key.
@@ -142,10 +142,12 @@
   function draw() {
     if (!status) return;
     body.dataset.mood = status.mood;
-    text("headline", { stopped: "Stopped", starting: "Starting" }[status.mood] ?? status.headline);
-    text("why", status.stopped ? `${status.stopped} Nothing moves until Reset.` : status.why);
+    text("headline", status.headline);
+    text("why", [status.why, status.stopped, status.until].filter(Boolean).join(" "));
+    // A press is done once the arm itself has shown that it is stopped.
+    stopButton.classList.toggle("asked", asking !== null || status.stop === "requested");
     byId("objects-button").hidden = status.role === "viewer";
-    byId("reset").hidden = !status.stopped || status.role === "viewer";
+    byId("reset").hidden = !status.stopped || !status.resets;
     const { mine, holder, windows, asking: wanting } = status;
     const wants = mine && wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);

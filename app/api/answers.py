@@ -137,29 +137,27 @@ class State(Answer, frozen=True, kw_only=True):
 
     Attributes:
         t: when, on the server's clock, which only goes forwards; an arm at rest is as it was then.
-        told: when this was said, on the same clock.
-        ticket: of the last command that is heeded in it.
-        q: (n,) where the arm is, as it says itself.
+        told: when this was said, on the same clock. age: time since the arm's process last
+            answered; from 0.3 s on the state counts as unknown.
+        ticket: of the last command that is heeded in it. q: (n,) where the arm says it is.
         setpoint, qd: (n,) where it is told to be, and how fast that moves.
-        goal: (n,) where it goes, the nearest to what was wished.
-        gripper, gripper_goal: the finger joint.
+        goal: (n,) where it goes, the nearest to what was wished. gripper, gripper_goal: the finger
+            joint.
         tool: the frame that ``T`` (4, 4), ``pitch`` and ``roll`` are of; T in the frame {S}.
-        tool_speed: of the tool point [m/s], by its setpoints.
-        holding: (n,) torques [N m] that hold the arm still there against its own weight; null where
-            its description tells no masses. What it carries besides is not counted.
-        margins: how near the arm is to what it cannot pass.
-        touching: the fingers that touch what may be held. held: what both hold; null with an empty
-            hand.
+        tool_speed: of the tool point [m/s], by its setpoints. holding: (n,) torques [N m] that hold
+            the arm still there against its own weight, without what it carries; null where its
+            description tells no masses.
+        margins: how near the arm is to what it cannot pass. touching: the fingers that touch what
+            may be held. held: what both hold; null with an empty hand.
         branch: shoulder and elbow. reading: which numbers of a target count.
         Where there are only joints, tool to roll, tool_speed, margins, branch and reading are null;
             see ``arm``.
         status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
-        speed: share of full speed.
-        holder: name of who holds the arm. stopped: why nothing moves after a STOP.
-        windows: how many pages and programs are open.
-        water: of the cup; null where there is none.
-        program: the one that is planned or runs, or ran last.
-        fields: of the VRML world, for who watches some.
+        speed: share of full speed. holder: name of who holds the arm.
+        stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
+            newer than the request is stopped, then confirmed.
+        windows: how many pages and programs are open. water: of the cup; null where there is none.
+        program: that is planned or runs, or ran last. fields: of the VRML world that are watched.
     """
 
     t: float
@@ -189,6 +187,8 @@ class State(Answer, frozen=True, kw_only=True):
     speed: float
     holder: str | None
     stopped: str | None
+    stop: str | None
+    age: float
     windows: int
     water: Water | None
     program: Progress | None = None

@@ -84,9 +84,15 @@ def _do(request: Any, answer: Any) -> dict[str, Any]:
                 "name": "X-Program",
                 "in": "header",
                 "required": True,
-                "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{8,64}$"},
-                "description": "Tells programs apart; who knows it speaks for the program.",
-            }
+                "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{16,64}$"},
+                "description": "A secret key that tells programs apart; nobody else is shown it.",
+            },
+            {
+                "name": "X-Name",
+                "in": "header",
+                "schema": {"type": "string", "maxLength": 40},
+                "description": "The name of the program that others see.",
+            },
         ],
         "requestBody": {
             "required": True,

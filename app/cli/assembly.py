@@ -107,7 +107,9 @@ class RunningArm:
         self._mailbox = Mailbox(session.check)
         if scene is not None:
             self._mailbox.put(cmd.Furnish(scene.things, scene.water))
-        self._loop = ControlLoop(session, driver, self._mailbox, MonotonicClock(), settings.rate)
+        self._loop = ControlLoop(
+            session, driver, self._mailbox, MonotonicClock(), settings.rate, settings.silence
+        )
         self._silence = settings.silence
         self._link: ArmEnd | None = None
 
@@ -122,6 +124,11 @@ class RunningArm:
             self._link.close()
         self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence)
         self._link.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether its control loop runs."""
+        return self._loop.running
 
     @property
     def unheard(self) -> float:

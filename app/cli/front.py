@@ -4,18 +4,17 @@ arm is in another, and stops meanwhile."""
 from __future__ import annotations
 
 import gc
-import logging
 import multiprocessing
 import os
 import signal
 import socket
-import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.cli.log_lines import start_log
 from app.errors import ConfigurationError, KatanaError
 from app.settings import Settings
 
@@ -160,9 +159,3 @@ def _serve(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
         close_server(gateway.viser)
         # So that Python, as it ends, puts away what hangs together in circles.
         gc.unfreeze()
-
-
-def start_log() -> None:
-    """What goes wrong, and who drove, on standard error."""
-    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr)
-    logging.getLogger("app").setLevel(logging.INFO)

@@ -33,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 host=options.host,
                 port=options.port,
                 silence=options.silence,
+                owner_silence=options.owner_silence,
                 access=options.access,
                 insecure=options.insecure,
                 tls_cert=options.tls_cert,

@@ -12,7 +12,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from app.cli.front import OPEN, READY, Front, Outfit, start_log
+from app.cli.front import OPEN, READY, Front, Outfit
+from app.cli.log_lines import start_log
 from app.gateway.listen import HERE, listen
 from app.settings import Settings
 from robot_description import URDF_PATH
@@ -44,7 +45,7 @@ def serve(
     scene: Path | None = None,
     objects: Sequence[str] = (),
 ) -> int:
-    """Run the app until SIGINT or SIGTERM; returns the exit status.
+    """Run the app until SIGINT or SIGTERM; returns the exit status, 1 if the control loop ended.
 
     ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
     ``workspace``: file of a reachability map that can be shown. ``scene``, ``objects``: see
@@ -63,9 +64,7 @@ def serve(
     # Held here, so that nobody else takes it while the front is started again.
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(HERE, settings.lines)
-    scheme = "https" if settings.tls_cert is not None else "http"
-    port = listening.getsockname()[1]
-    url = settings.public_url or f"{scheme}://{_shown(settings.host)}:{port}"
+    url = settings.public_url or _address(settings, listening.getsockname()[1])
 
     meshes = () if stored is None else stored.meshes
     outfit = Outfit(settings, urdf, tool, listening, lines, workspace, meshes)
@@ -88,7 +87,7 @@ def serve(
         print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
         ended, began = 0, time.monotonic()
         # A signal that another thread is given does not wake this one from its wait.
-        while not stopping.wait(AWAKE):
+        while arm.running and not stopping.wait(AWAKE):
             if current.running:
                 if time.monotonic() - began > SETTLED and arm.unheard > HUNG:
                     log.error("The page's server has not been heard of for %g s.", HUNG)
@@ -103,6 +102,8 @@ def serve(
             current.stop()
             current, began = Front(outfit), time.monotonic()
             arm.attach(current.pipe)
+        if not stopping.is_set():
+            log.critical("The control loop has ended, so the server ends too: start it again.")
     finally:
         # The arm first: a front whose arm hangs up ends in peace.
         if arm is not None:
@@ -111,7 +112,7 @@ def serve(
         if arm is not None:
             arm.join()
         listening.close()
-    return 0
+    return 0 if stopping.is_set() else 1
 
 
 def _furnished(
@@ -131,6 +132,11 @@ def _furnished(
     for sentence in said:
         print(f"katana450: {sentence}", flush=True)
     return robot, stored
+
+
+def _address(settings: Settings, port: int) -> str:
+    scheme = "https" if settings.tls_cert is not None else "http"
+    return f"{scheme}://{_shown(settings.host)}:{port}"
 
 
 def _shown(host: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from app.settings import Settings
 
-SHORTEST_SILENCE, LONGEST_SILENCE = 0.2, 2.0
+SHORTEST_SILENCE, LONGEST_SILENCE, LONGEST_OWNER_SILENCE = 0.2, 2.0, 10.0
 """[s] Signs of life are 0.1 s apart, and after 3 s the arm is anybody's."""
 
 
@@ -52,6 +52,14 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         f"gives ten a second ({SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
+        "--owner-silence",
+        type=_owner_silence,
+        default=Settings.owner_silence,
+        metavar="SECONDS",
+        help="heartbeat timeout of a program's owner, after which the program ends "
+        f"({SHORTEST_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
+    )
+    parser.add_argument(
         "--access",
         type=Path,
         metavar="FILE",
@@ -89,13 +97,21 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _silence(text: str) -> float:
+    return _seconds(text, LONGEST_SILENCE)
+
+
+def _owner_silence(text: str) -> float:
+    return _seconds(text, LONGEST_OWNER_SILENCE)
+
+
+def _seconds(text: str, longest: float) -> float:
     try:
         seconds = float(text)
     except ValueError:
         seconds = -1.0
-    if not SHORTEST_SILENCE <= seconds <= LONGEST_SILENCE:
+    if not SHORTEST_SILENCE <= seconds <= longest:
         raise argparse.ArgumentTypeError(
-            f"a number of seconds from {SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, not {text!r}"
+            f"a number of seconds from {SHORTEST_SILENCE:g} to {longest:g}, not {text!r}"
         )
     return seconds
 

@@ -6,6 +6,7 @@ and an expiry; what the number stands for is in the file, so striking it out the
 
 from __future__ import annotations
 
+import logging
 import secrets
 import stat
 from dataclasses import dataclass, field
@@ -17,6 +18,8 @@ from itsdangerous import BadSignature, URLSafeSerializer
 from app.control.lease import Role
 from app.errors import ConfigurationError, InputError
 from app.exchange.atomic import write_files, writer_of
+
+log = logging.getLogger(__name__)
 
 SALT = "katana450 access link"
 LONGEST_NAME = 40
@@ -38,9 +41,13 @@ class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass
 class AccessFile:
-    """The links that were given out; read again whenever the file has changed."""
+    """The links that were given out; read again whenever the file has changed.
+
+    A file that cannot be read any more while it is in use takes nobody's link away.
+    """
 
     path: Path
+    _failure: str | None = field(default=None, repr=False)
     _read_at: tuple[int, int, int] | None = field(default=None, repr=False)
     _content: _Content = field(default_factory=lambda: _Content("", {}), repr=False)
 
@@ -87,7 +94,7 @@ class AccessFile:
         """The number and grant of a token that is good at ``now`` [s since the epoch], or None."""
         if len(token) > LONGEST_TOKEN:
             return None
-        self._refresh()
+        self._refresh_or_keep()
         try:
             # itsdangerous compares signatures in constant time.
             payload = self._signer().loads(token)
@@ -101,6 +108,17 @@ class AccessFile:
 
     def _signer(self) -> URLSafeSerializer:
         return URLSafeSerializer(self._content.secret, salt=SALT)
+
+    def _refresh_or_keep(self) -> None:
+        """Read the file again; while that fails the last good links count, which is logged once."""
+        try:
+            self._refresh()
+        except ConfigurationError as error:
+            if self._failure != str(error):
+                self._failure = str(error)
+                log.error("The last good links count until this is mended. %s", error)
+        else:
+            self._failure = None
 
     def _refresh(self) -> None:
         try:

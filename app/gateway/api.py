@@ -21,7 +21,7 @@ from app.gateway import program
 from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, as_json, body_of
 from app.gateway.desk import Desk
 from app.gateway.door import Door, Visitor
-from app.gateway.hub import Hub, Window, key_of
+from app.gateway.hub import Hub, Window
 from app.gateway.uploads import Uploads
 
 log = logging.getLogger(__name__)
@@ -29,8 +29,12 @@ log = logging.getLogger(__name__)
 QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "links")
 """Each is a path of its own."""
 
-PROGRAM = re.compile(r"[A-Za-z0-9_-]{8,64}")
-"""The name of a program that asks by POST; who knows it speaks for the program."""
+PROGRAM = re.compile(r"[A-Za-z0-9_-]{16,64}")
+"""The key of a program that asks by POST: whoever knows it speaks for the program, so nobody else
+is shown it. The name that others see is in NAME."""
+
+KEY, NAME = "x-program", "x-name"
+"""Headers of the key and the name of a program."""
 
 TOO_SOON = 503
 
@@ -66,8 +70,8 @@ class Api:
     def _read(self, at: str) -> Callable[[Request], Awaitable[Response]]:
         async def read(request: Request) -> Response:
             visitor = self._visitor(request)
-            if PROGRAM.fullmatch(request.headers.get("x-program", "")):
-                # Whoever looks is alive.
+            if self._key(request, visitor) in self._posting:
+                # A program that looks is alive; a stranger's look is nothing.
                 self._hub.beat(self._window(request, visitor))
             try:
                 return as_json(self._desk.look(at))
@@ -84,8 +88,11 @@ class Api:
 
     async def _do(self, request: Request) -> Response:
         visitor = self._visitor(request)
-        if not PROGRAM.fullmatch(request.headers.get("x-program", "")):
-            why = "A header X-Program of 8 to 64 letters and digits tells you apart."
+        if not PROGRAM.fullmatch(request.headers.get(KEY, "")):
+            why = (
+                "A header X-Program with a key of 16 to 64 letters and digits of your own tells "
+                "you apart. Keep it to yourself; X-Name has the name that others see."
+            )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.LARGEST)
         try:
@@ -103,7 +110,7 @@ class Api:
     def _visitor(self, request: Request) -> Visitor:
         headers = request.headers
         visitor = self._door.program(
-            headers.get("x-program", ""), headers.get("authorization", ""), request.cookies
+            headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
         )
         if visitor is None:
             raise HTTPException(401, "A token is asked for; `katana450 access give` makes one.")
@@ -111,20 +118,24 @@ class Api:
 
     def _window(self, request: Request, visitor: Visitor) -> Window:
         """That of the program that asks; it closes when nothing is heard of it for a while."""
-        name = request.headers["x-program"]
-        session = visitor.session if self._door.asks else "programs"
-        key = f"{session}/{name}"
+        key = self._key(request, visitor)
         known = self._posting.pop(key, None)
         if known is None:
+            session, _, page = key.partition("/")
             visitor = Visitor(session, visitor.name, visitor.role)
-            window = self._hub.join(visitor, name, lambda _notice: None)
-            assert window.person.key == key_of(visitor, name)
+            window = self._hub.join(visitor, page, lambda _notice: None)
+            assert window.person.key == key
         else:
             window, timer = known
             timer.cancel()
         timer = asyncio.get_running_loop().call_later(LOST_AFTER, self._forget, key)
         self._posting[key] = (window, timer)
         return window
+
+    def _key(self, request: Request, visitor: Visitor) -> str:
+        """What ties the requests of one program together."""
+        session = visitor.session if self._door.asks else "programs"
+        return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
         window, _ = self._posting.pop(key)

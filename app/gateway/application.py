@@ -15,7 +15,7 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from app.api.fields import LONGEST_PRESS
-from app.gateway import control_socket, files, headers, viser_page
+from app.gateway import control_socket, files, headers, status, viser_page
 from app.gateway.api import Api
 from app.gateway.bodies import body_of
 from app.gateway.bucket import Bucket
@@ -85,7 +85,8 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
         return Response(status_code=204)
 
     async def health(_request: Request) -> Response:
-        return PlainTextResponse("ok\n")
+        wrong = status.health(hub)
+        return PlainTextResponse("ok\n" if wrong is None else f"{wrong}\n", 503 if wrong else 200)
 
     async def control(socket: WebSocket) -> None:
         await control_socket.serve(hub, door, socket)

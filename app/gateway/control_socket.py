@@ -71,7 +71,7 @@ async def serve(hub: Hub, door: Door, socket: WebSocket) -> None:
         return
     line = SocketLine(socket)
     control = ControlSocket(hub, line)
-    control.window = window = hub.join(visitor, page, control.tell)
+    control.window = window = hub.join(visitor, page, control.tell, line.arrival)
     try:
         if not await door.while_welcome(lambda: door.visitor(socket.cookies), control.run(window)):
             await line.close(NOT_YOU, "Your link is no good any more.")

@@ -21,8 +21,12 @@ from app.errors import InputError, LeaseError
 from app.gateway.bucket import Bucket
 from app.gateway.desk import Desk
 from app.gateway.hub import Hub, Window
+from app.gateway.liveness import Arrival
 
 log = logging.getLogger(__name__)
+
+ARRIVAL = "katana450.arrival"
+"""Where a websocket's scope has its ``Arrival``."""
 
 NOTICES = 64
 """Answers that may wait for a slow line; of more, the oldest are forgotten."""
@@ -48,6 +52,9 @@ class GoneError(Exception):
 class Line(Protocol):
     """Texts both ways. Each method raises GoneError once the other side is."""
 
+    @property
+    def arrival(self) -> Arrival: ...
+
     async def receive(self) -> str | bytes: ...
 
     async def send(self, text: str) -> None: ...
@@ -60,6 +67,8 @@ class SocketLine:
 
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
+        arrival: Arrival | None = socket.scope.get(ARRIVAL)
+        self.arrival = Arrival(None) if arrival is None else arrival
 
     async def receive(self) -> str | bytes:
         message = await self._socket.receive()

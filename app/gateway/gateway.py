@@ -11,20 +11,24 @@ import threading
 import time
 from asyncio import BaseTransport, Transport
 from contextlib import suppress
-from typing import cast
+from http import HTTPStatus
+from typing import Any, cast
 
 import uvicorn
 import viser
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.http11 import Request
 
 from app.errors import ConfigurationError
 from app.exchange.meshes import Meshes
 from app.gateway.access import AccessFile
 from app.gateway.application import application
+from app.gateway.conversation import ARRIVAL
 from app.gateway.door import LOOPBACK_NAMES, Address, Door, public_origin
 from app.gateway.firewall import LARGEST
 from app.gateway.hub import TICK, Hub
 from app.gateway.listen import reaches_beyond
+from app.gateway.liveness import Arrival, keep_alive
 from app.gateway.motion import Motion
 from app.gateway.program import Lines
 from app.gateway.proxy import Proxy
@@ -70,8 +74,13 @@ class Gateway:
             key = secrets.token_urlsafe(32)
             self.viser: viser.ViserServer = open_server(key)
             self.port: int = self._listening.getsockname()[1]
+            for each in (listening, lines):
+                if each is not None:
+                    keep_alive(each)
             self.address = _address(settings, self._listening)
-            self._hub = Hub(time.monotonic, settings.silence, meshes)
+            self._hub = Hub(
+                time.monotonic, settings.silence, meshes, owner_silence=settings.owner_silence
+            )
             self.steering = Steering(self._hub.performer, lambda: self._loop)
             door = Door(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
@@ -162,6 +171,13 @@ class _BrowserSocket(WebSocketsSansIOProtocol):
         line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, UNREAD)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
+
+    def handle_connect(self, event: Request) -> None:
+        super().handle_connect(event)
+        if self.response.status_code == HTTPStatus.SWITCHING_PROTOCOLS:
+            # The socket itself knows when the newest message arrived.
+            line = self.transport.get_extra_info("socket")
+            cast(dict[str, Any], self.scope)[ARRIVAL] = Arrival(line)
 
 
 def _check_tls(settings: Settings) -> None:

@@ -6,35 +6,24 @@ Lives in the gateway's one thread; what it decides reaches the arm through the m
 from __future__ import annotations
 
 import logging
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from app.api.fields import Rates
 from app.control import commands as cmd
-from app.control.choices import Choice
 from app.control.commands import JOG_TIME
 from app.control.lease import Lease, Person
-from app.control.ledger import Entry
-from app.control.margins import Margins
-from app.control.pouring import Pouring
-from app.control.state import State
-from app.control.things import Surroundings
 from app.errors import LeaseError
-from app.exchange.machine import Machine
 from app.exchange.meshes import Meshes
+from app.gateway.arm import Arm, Behind
 from app.gateway.door import Visitor
+from app.gateway.halting import Presses, Stopped
 from app.gateway.journal import Journal
-from app.gateway.nodes import Nodes
+from app.gateway.liveness import Heartbeat
 from app.gateway.performer import Performer
 from app.gateway.scenes import Scenes
-from app.geometry.arrays import FloatArray
 from app.kinematics.velocity import JogFrame
-from app.programs.bench import Rig
-from app.robot.model import RobotModel
-from app.runtime.board import Snapshot
-from app.runtime.lateness import Lateness
 from app.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -43,95 +32,17 @@ TICK = 0.02
 """[s] Between two looks at whether somebody has fallen silent."""
 
 REMEMBERED = 256
-"""Pages that are known again when they come back, and presses of STOP that are told again."""
-
-
-class Arm(Protocol):
-    """What the gateway asks of the arm; ``Motion`` is one."""
-
-    @property
-    def model(self) -> RobotModel | Machine: ...
-
-    @property
-    def robot(self) -> RobotModel: ...
-
-    @property
-    def nodes(self) -> Nodes: ...
-
-    @property
-    def snapshot(self) -> Snapshot: ...
-
-    @property
-    def state(self) -> State: ...
-
-    @property
-    def ready(self) -> FloatArray: ...
-
-    @property
-    def rig(self) -> Rig: ...
-
-    @property
-    def lateness(self) -> Lateness: ...
-
-    @property
-    def surroundings(self) -> Surroundings: ...
-
-    @property
-    def pouring(self) -> Pouring | None: ...
-
-    @property
-    def holding(self) -> FloatArray | None: ...
-
-    @property
-    def margins(self) -> Margins: ...
-
-    @property
-    def ledger(self) -> Sequence[Entry]: ...
-
-    @property
-    def caught_up(self) -> bool: ...
-
-    @property
-    def busy(self) -> bool: ...
-
-    def beat(self) -> None: ...
-
-    def stop(self) -> None: ...
-
-    def release(self) -> None: ...
-
-    def hold(self) -> None: ...
-
-    def jog(self, rates: Rates, frame: JogFrame) -> None: ...
-
-    def limit(self, share: float) -> None: ...
-
-    def put(self, command: cmd.Command) -> int: ...
-
-    def choices(self) -> tuple[Choice, ...]: ...
-
-
-class Behind(Protocol):
-    """How far a window's picture is behind; ``Flow`` is one."""
-
-    def age(self, t: float) -> float: ...
-
-
-@dataclass(frozen=True)
-class Stopped:
-    """Why nothing moves. ``by`` is nobody when the gateway itself stopped the arm."""
-
-    by: str | None
-    why: str
+"""Pages that are known again when they come back."""
 
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """One open page; ``tell`` leaves it a notice."""
+    """One open page; ``tell`` leaves it a notice, ``heartbeat`` is its newest sign of life."""
 
     person: Person
     number: int
     tell: Callable[[dict[str, Any]], None]
+    heartbeat: Heartbeat
 
 
 class Hub:
@@ -142,9 +53,11 @@ class Hub:
         clock: Callable[[], float],
         hold_after: float = Settings.silence,
         meshes: Meshes | None = None,
+        *,
+        owner_silence: float = Settings.owner_silence,
     ) -> None:
         """``hold_after``: silence of whoever drives [s] that stops an arm that moves. ``meshes``:
-        those there are at first."""
+        those there are at first. ``owner_silence``: see ``Settings``."""
         self.clock = clock
         self._hold_after = hold_after
         self.lease = Lease()
@@ -152,28 +65,36 @@ class Hub:
         self.arm: Arm | None = None
         """None until the arm is there."""
         self.journal = Journal()
-        self.performer = Performer(self)
+        self.performer = Performer(self, owner_silence)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}
         self._pictures: dict[Behind, tuple[str, set[str]]] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
-        self._presses: deque[str] = deque(maxlen=REMEMBERED)
+        self._presses = Presses()
         self._jogged = -JOG_TIME
-        self._looked = clock()
 
     # Coming and going
 
-    def join(self, visitor: Visitor, page: str, tell: Callable[[dict[str, Any]], None]) -> Window:
-        """A page opens its control socket; one that comes back is who it was."""
+    def join(
+        self,
+        visitor: Visitor,
+        page: str,
+        tell: Callable[[dict[str, Any]], None],
+        heartbeat: Heartbeat | None = None,
+    ) -> Window:
+        """A page opens its control socket; one that comes back is who it was.
+
+        ``heartbeat``: its newest sign of life; without one, what ``beat`` says.
+        """
         key = key_of(visitor, page)
         known = self._remembered.pop(key) if key in self._remembered else None
         person, number = known or self._meet(key, visitor)
         self._remembered[key] = (person, number)
         while len(self._remembered) > REMEMBERED:
             self._remembered.pop(next(iter(self._remembered)))
-        window = Window(person, number, tell)
+        window = Window(person, number, tell, heartbeat or Heartbeat(self.clock))
         self._windows[key] = window
         self.beat(window)
         return window
@@ -236,18 +157,20 @@ class Hub:
 
     def stop(self, name: str, press: str | None = None) -> None:
         """Anybody may, at any time. A ``press`` counts once, however often it is told."""
-        if press is not None:
-            if press in self._presses:
-                return
-            self._presses.append(press)
-        self._halt(Stopped(name, f"{name} pressed STOP."))
+        if self._presses.is_new(press):
+            self._halt(Stopped(name, f"{name} pressed STOP."))
 
     def reset(self, window: Window) -> None:
         """End a stop; the arm stays where it is until somebody moves it afresh."""
         self._grasp(window)
-        self.stopped = None
         if self.arm is not None:
             self.arm.release()
+        self.stopped = None
+
+    def may_reset(self, window: Window) -> bool:
+        """Whether ``reset`` is not refused to the window."""
+        holder = self.lease.holder
+        return window.person.role.may_drive and holder in (None, window.person)
 
     def acquire(self, window: Window) -> None:
         self.lease = self.lease.acquire(window.person, self.clock())
@@ -272,9 +195,9 @@ class Hub:
         self._change(self.lease.hand_over(window.person, taker.person, self.clock()))
 
     def beat(self, window: Window) -> None:
-        """A sign of life."""
-        if self.lease.holder == window.person:
-            self.lease = self.lease.hear(window.person, self.clock())
+        """A message of the window is being handled: a sign of life as of when it was received."""
+        window.heartbeat.note()
+        self._hear()
 
     def drive(self, key: str) -> None:
         """The window of ``key`` wants to move the arm by a control of its own.
@@ -309,25 +232,42 @@ class Hub:
     # What time does
 
     def tick(self) -> None:
-        """Look whether whoever drives is still there; to be called every TICK."""
-        t = self.clock()
-        late = t - self._looked > self._hold_after / 2
-        self._looked = t
-        # When this thread was held up itself, what came in the meantime is read first.
-        if not late:
-            self._listen_for_silence(t)
-        if self.arm is not None:
-            self.arm.beat()
-            self.journal.follow(self.arm.ledger, self._who())
-            self._agree_with(self.arm)
+        """Look whether whoever drives is still there, and the arm; to be called every TICK."""
+        t, arm = self.clock(), self.arm
+        self._hear()
+        silent = self._listen_for_silence(t)
+        if arm is not None:
+            # The arm stops by itself where nobody answers for whoever drives.
+            if not silent:
+                arm.beat()
+            self._watch(arm)
+            self.journal.follow(arm.ledger, self._who())
+            self._agree_with(arm)
             self.performer.tick()
+
+    def _hear(self) -> None:
+        """Take over the newest sign of life of whoever drives, by when it was received."""
+        holder = self.lease.holder
+        window = None if holder is None else self._windows.get(holder.key)
+        if window is not None:
+            self.lease = self.lease.hear(window.person, window.heartbeat.newest)
+
+    def _watch(self, arm: Arm) -> None:
+        """Stop an arm whose process does not answer: it stops once it is there again."""
+        age, due = arm.age, self._moves(self.clock()) or not arm.caught_up
+        if self.stopped is None and due and age > 2 * self._hold_after:
+            self._halt(Stopped(None, f"The arm's process did not answer for {age:.1f} s."))
 
     def _agree_with(self, arm: Arm) -> None:
         """What is stopped here is stopped there, and the other way round."""
-        halted = arm.state.halted is not None
-        if self.stopped is not None and not halted:
-            # An arm that came after the stop, or an error that undid it.
-            arm.stop()
+        snapshot = arm.snapshot
+        halted = snapshot.state.halted is not None
+        if self.stopped is not None:
+            self.stopped = self.stopped.seen(snapshot)
+            sent = self.stopped.ticket
+            if not halted and (sent is None or snapshot.ticket >= sent):
+                # An arm that came after the stop, or an error that undid it.
+                self.stopped = self.stopped.requested(arm.stop())
         elif self.stopped is None and halted and arm.caught_up:
             self._halt(Stopped(None, "The arm lost the server and stopped."))
 
@@ -337,14 +277,18 @@ class Hub:
             return self.stopped.by
         return None if self.lease.holder is None else self.lease.holder.name
 
-    def _listen_for_silence(self, t: float) -> None:
+    def _listen_for_silence(self, t: float) -> bool:
+        """Whether whoever drives is silent; an arm that moves is stopped then."""
         holder = self.lease.holder
         if holder is None or self.arm is None:
-            return
+            return False
         silent = self.lease.silence(t) >= self._hold_after
         if silent and self.stopped is None and self._moves(t):
-            self._halt(Stopped(None, f"The line to {holder.name} broke while the arm moved."))
+            there = holder.key in self._windows
+            why = "fell silent" if there else "lost the connection"
+            self._halt(Stopped(None, f"{holder.name} {why} while the arm moved."))
         self._change(self.lease.expire(t))
+        return silent and self.lease.holder is not None
 
     def _moves(self, t: float) -> bool:
         return self.arm is not None and (self.arm.state.moving or t - self._jogged < JOG_TIME)
@@ -358,11 +302,11 @@ class Hub:
     def _halt(self, stopped: Stopped) -> None:
         self._let_go()
         self.performer.stopped()
-        if self.arm is not None:
-            self.arm.stop()
         if self.stopped is None:
             self.stopped = stopped
             log.warning("Stopped: %s", stopped.why)
+        if self.arm is not None:
+            self.stopped = self.stopped.requested(self.arm.stop())
 
     def _let_go(self) -> None:
         for _, drags in self._pictures.values():

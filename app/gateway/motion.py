@@ -154,13 +154,19 @@ class Motion:
         """Tell the arm that somebody watches over it."""
         self._link.beat()
 
-    def stop(self) -> None:
-        """Rest as fast as the arm can; it obeys nothing until it is released."""
-        self._sink.put(cmd.Stop())
+    @property
+    def age(self) -> float:
+        """Time since the arm's process last proved that its control loop runs [s]."""
+        return self._link.age
+
+    def stop(self) -> int:
+        """Rest as fast as the arm can, and obey nothing until it is released; its ticket."""
+        ticket = self._sink.put(cmd.Stop())
         self._let_go()
+        return ticket
 
     def release(self) -> None:
-        """After a stop: obey again. Nothing moves by this."""
+        """After a stop: obey again. Nothing moves by this. Raises InputError when it cannot be."""
         self._sink.put(cmd.Release())
 
     def hold(self) -> None:

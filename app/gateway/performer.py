@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from app.control.lease import Role
 from app.control.state import State
 from app.errors import InputError, KatanaError, LeaseError
 from app.gateway.door import Visitor
+from app.gateway.liveness import Heartbeat
 from app.programs import runner
 from app.programs.bench import Rig
 from app.programs.program import Program, compiled
@@ -29,9 +31,6 @@ if TYPE_CHECKING:
     from app.gateway.hub import Hub, Window
 
 log = logging.getLogger(__name__)
-
-ALONE = 1.0
-"""[s] After which a program ends whose person is gone: a page that reloads is back sooner."""
 
 LONGEST_PLANNING = 120.0
 """[s]"""
@@ -55,11 +54,22 @@ class _Planning:
     given_up: bool = False
 
 
+class _Here(Heartbeat):
+    """A program runs in this thread and so is always there; its owner is watched instead."""
+
+    @property
+    def newest(self) -> float:
+        return self._clock()
+
+
 class Performer:
     """At most one program at a time."""
 
-    def __init__(self, hub: Hub) -> None:
+    def __init__(self, hub: Hub, owner_silence: float) -> None:
+        """``owner_silence``: time without a heartbeat of its owner after which a program ends [s];
+        a page that reloads is back sooner."""
         self._hub = hub
+        self._owner_silence = owner_silence
         self._parts: dict[str, str] = {}
         self._planning: _Planning | None = None
         self._owner: Window | None = None
@@ -162,22 +172,28 @@ class Performer:
             return
         hub, t = self._hub, self._hub.clock()
         owner = self._owner
-        if owner is not None and hub.window(owner.person.key) is not None:
-            self._seen = t
+        window = None if owner is None else hub.window(owner.person.key)
+        if window is not None:
+            self._seen = max(self._seen, window.heartbeat.newest)
         if hub.lease.holder != self._self.person:
             # The next who holds the arm finds one that stands, so nothing is left to be told.
             self._leave_with(Phase.STOPPED, "The arm was taken from it.")
             return
-        if t - self._seen > ALONE:
-            self._end("Whoever started it is gone.")
-            return
-        hub.beat(self._self)
-        arm = hub.arm
         if hub.stopped is not None:
             self._leave_with(Phase.STOPPED, hub.stopped.why)
-        elif arm is not None and arm.caught_up:
+            return
+        if owner is not None and t - self._seen > self._owner_silence:
+            why = "left" if window is None else "fell silent"
+            self._end(f"{owner.person.name} {why}: a program ends with its owner's heartbeats.")
+            return
+        arm = hub.arm
+        if arm is not None and arm.caught_up:
             self._run, commands = runner.step(program, self._run, arm.state, t)
-            self._tell(*commands)
+            try:
+                self._tell(*commands)
+            except InputError as error:
+                self._leave_with(Phase.FAILED, str(error))
+                return
             if self._run.phase is not Phase.RUNNING:
                 self._leave_with(self._run.phase, self._run.why)
 
@@ -234,7 +250,7 @@ class Performer:
             hub.give_up(window)
         program = planning.program
         visitor = Visitor(f"program of {window.person.key}", program.name, Role.OPERATOR)
-        joined = hub.join(visitor, "program", lambda _notice: None)
+        joined = hub.join(visitor, "program", lambda _notice: None, _Here(hub.clock))
         try:
             hub.acquire(joined)
             # What is told first finds out whether the arm is stopped.
@@ -271,7 +287,9 @@ class Performer:
     def _end(self, why: str) -> None:
         assert self._run is not None
         self._run, commands = runner.halted(self._run, why)
-        self._tell(*commands)
+        # A stopped arm takes no commands, nor does one that does not answer.
+        with suppress(LeaseError, InputError):
+            self._tell(*commands)
         self._leave_with(Phase.STOPPED, why)
 
     def _leave_with(self, phase: Phase, why: str) -> None:

@@ -17,10 +17,12 @@ from app.api import answers, requests
 from app.control.lease import BEAT
 from app.errors import InputError
 from app.gateway import tell
+from app.gateway.arm import Arm
 from app.gateway.bucket import Bucket
 from app.gateway.conversation import NONSENSE, Conversation, GoneError, Line, SocketLine
 from app.gateway.door import NOT_YOU, Door, Visitor
-from app.gateway.hub import Arm, Hub, Window
+from app.gateway.hub import Hub, Window
+from app.gateway.liveness import Arrival
 
 log = logging.getLogger(__name__)
 
@@ -167,7 +169,7 @@ async def _serve(hub: Hub, door: Door, line: Line, visitor: Callable[[], Visitor
         await line.close(NOT_YOU, "A token is asked for; `katana450 access give` makes one.")
         return
     program = Program(hub, line)
-    window = hub.join(found, secrets.token_hex(16), program.tell)
+    window = hub.join(found, secrets.token_hex(16), program.tell, line.arrival)
     program.greet(window)
     try:
         if not await door.while_welcome(visitor, program.run(window)):
@@ -182,6 +184,7 @@ class _TcpLine:
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader = reader
         self._writer = writer
+        self.arrival = Arrival(writer.get_extra_info("socket"))
 
     async def receive(self) -> str | bytes:
         try:

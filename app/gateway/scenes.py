@@ -16,7 +16,7 @@ from app.scene.scene import Scene
 from app.water.units import MILLILITRE, ML
 
 if TYPE_CHECKING:
-    from app.gateway.hub import Arm
+    from app.gateway.arm import Arm
 
 KEPT = 4
 """Scenes that were uploaded and not loaded yet."""

@@ -74,6 +74,8 @@ def state(hub: Hub) -> answers.State:
         speed=now.speed,
         holder=None if holder is None else holder.name,
         stopped=None if stopped is None else stopped.why,
+        stop=None if stopped is None else stopped.stage,
+        age=arm.age,
         windows=len(hub.windows),
         water=water(arm.pouring, now),
         program=hub.performer.told(),

@@ -24,12 +24,22 @@ from app.runtime.board import Board, Snapshot
 from app.runtime.lateness import Lateness
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
+from app.runtime.readiness import readable, writable
 from app.runtime.wire import Names, Plans
 
 log = logging.getLogger(__name__)
 
 GONE = (EOFError, OSError)
 """What a pipe raises when there is nobody at its other end."""
+
+PULSE_EVERY = 0.1
+"""[s] Between two words of the arm's process at least, as long as its control loop ticks."""
+
+PULSE = b"."
+"""Says only that the control loop has ticked."""
+
+UNANSWERED = 0.5
+"""[s] Without a word of the arm's process, after which it is given no command but a stop."""
 
 REPORT_EVERY = 1.0
 """[s] Between two reports of how late the ticks are."""
@@ -129,15 +139,20 @@ class ArmEnd:
 
     def _show(self) -> None:
         board = self._loop.board
-        seen, reported = board.snapshot, time.monotonic()
+        seen, reported, ticks = board.snapshot, time.monotonic(), self._loop.ticks
         try:
             ledger = board.ledger
             self._send(News(self._named(seen), ledger, board.lateness))
             last = ledger[-1] if ledger else None
             while not self.cut.is_set():
-                snapshot = board.wait_for_change(seen, REPORT_EVERY)
+                snapshot = board.wait_for_change(seen, PULSE_EVERY)
                 now = time.monotonic()
+                if snapshot is seen and self._loop.ticks == ticks:
+                    # A loop that does not tick gives no sign of life.
+                    continue
+                ticks = self._loop.ticks
                 if snapshot is seen and now - reported < REPORT_EVERY:
+                    self._pipe.send_bytes(PULSE)
                     continue
                 if now - reported >= REPORT_EVERY:
                     reported, board.lateness = now, self._loop.lateness
@@ -175,9 +190,11 @@ class FrontEnd:
         self._pipe = pipe
         self._check = check
         self._sending = threading.Lock()
+        self._unsent: deque[Told] = deque()
         self._number = 0
         self._plans = Plans()
-        first = _heard(pipe, self._plans)
+        first = _loaded(pipe.recv_bytes(), self._plans)
+        self._heard = time.monotonic()
         self.board = Board(first.snapshot, first.lateness)
         self.board.pin(first.snapshot, first.ledger)
         self.cut = threading.Event()
@@ -195,30 +212,69 @@ class FrontEnd:
             return self._number
 
     def put(self, command: cmd.Command) -> int:
-        """Send ``command`` to the arm; returns its ticket. Raises InputError for what cannot be."""
+        """Send ``command`` to the arm; returns its ticket. Raises InputError for what cannot be.
+
+        An arm's process that does not answer is given nothing but a stop.
+        """
         self._check(command)
+        age = self.age
         with self._sending:
+            if isinstance(command, cmd.Stop):
+                # What has not gone yet is dead the moment it comes.
+                self._unsent.clear()
+            elif age > UNANSWERED:
+                raise InputError(
+                    f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
+                )
             self._number += 1
             if isinstance(command, cmd.Follow):
                 self._plans.note(self._number, command.plan)
-            self._send(Told(self._number, command))
+            self._unsent.append(Told(self._number, command))
+            self._flush()
             return self._number
+
+    @property
+    def age(self) -> float:
+        """Time since the newest word of the arm's process [s], which came from a running loop.
+
+        What came and is not read yet counts as new.
+        """
+        if self.cut.is_set():
+            return time.monotonic() - self._heard
+        return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
 
     def beat(self) -> None:
         """Give a sign of life."""
         with self._sending:
-            self._send(Alive())
+            if self._flush():
+                self._send(Alive())
 
-    def _send(self, said: Told | Alive) -> None:
+    def _flush(self) -> bool:
+        """Send what waits; whether nothing waits any more. A full pipe keeps nobody waiting."""
+        while self._unsent and self._send(self._unsent[0]):
+            self._unsent.popleft()
+        return not self._unsent
+
+    def _send(self, said: Told | Alive) -> bool:
         try:
+            if not writable(self._pipe.fileno()):
+                return False
             self._pipe.send(said)
         except GONE:
             self.cut.set()
+        return True
 
     def _listen(self) -> None:
         try:
             while True:
-                news = _heard(self._pipe, self._plans)
+                data = self._pipe.recv_bytes()
+                self._heard = time.monotonic()
+                if self._unsent:
+                    with self._sending:
+                        self._flush()
+                if data == PULSE:
+                    continue
+                news = _loaded(data, self._plans)
                 self.board.lateness = news.lateness
                 seen = self.board.snapshot
                 if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
@@ -237,9 +293,9 @@ def _known(news: Snapshot, seen: Snapshot) -> Snapshot:
     return Snapshot(replace(news.state, things=seen.state.things), news.ticket)
 
 
-def _heard(pipe: Connection, plans: Plans) -> News:
-    """What comes from the arm's end; EOFError when that hangs up."""
-    news = plans.loaded(pipe.recv_bytes())
+def _loaded(data: bytes, plans: Plans) -> News:
+    """What ``data`` from the arm's end says; EOFError when that hangs up."""
+    news = plans.loaded(data)
     if not isinstance(news, News):
         raise EOFError
     return news

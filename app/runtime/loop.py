@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 from collections.abc import Iterable
 from typing import Protocol
 
-from app.control.commands import Command
+from app.control.commands import Command, Stop
 from app.control.ledger import news
 from app.control.state import State
 from app.drivers.driver import Driver
@@ -36,14 +37,22 @@ class ControlLoop:
     """Drain, step, send, publish."""
 
     def __init__(
-        self, session: Rules, driver: Driver, mailbox: Mailbox, clock: Clock, rate: float
+        self,
+        session: Rules,
+        driver: Driver,
+        mailbox: Mailbox,
+        clock: Clock,
+        rate: float,
+        held_up: float = math.inf,
     ) -> None:
-        """``rate``: ticks a second [Hz]."""
+        """``rate``: ticks a second [Hz]. ``held_up``: lateness of a tick [s] that stops an arm
+        which moves: nobody watched over it meanwhile."""
         self._session = session
         self._driver = driver
         self._mailbox = mailbox
         self._clock = clock
         self._period = 1.0 / rate
+        self._held_up = held_up
         t = clock.now()
         sent = driver.start(t)
         self._state = session.begin(sent.q, sent.gripper, t)
@@ -52,6 +61,8 @@ class ControlLoop:
         self._punctuality = Punctuality(self._period)
         self.board = Board(Snapshot(self._state, 0), self.lateness)
         """Where it shows what it does."""
+        self.ticks = 0
+        """Ticks that were completed."""
 
     @property
     def lateness(self) -> Lateness:
@@ -75,6 +86,12 @@ class ControlLoop:
         # An arm at rest wakes nobody: time alone is no news.
         if commands or _differs(before, state):
             self.board.pin(Snapshot(state, ticket), news(before, state))
+        self.ticks += 1
+
+    @property
+    def running(self) -> bool:
+        """Whether the thread runs; False once it has ended, for whatever reason."""
+        return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:
         """Run the ticks in a thread of their own until ``stop``."""
@@ -93,6 +110,9 @@ class ControlLoop:
         while not self._stopping.is_set():
             late = self._clock.now() - due
             self._punctuality.note(late)
+            if late > self._held_up and self._state.moving and self._state.halted is None:
+                log.error("The control loop was %.2f s late while the arm moved: STOP.", late)
+                self._mailbox.put(Stop())
             if late > self._period:
                 # Do not run after lost ticks: the session moves by the time that passed.
                 due += late

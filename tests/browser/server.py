@@ -20,8 +20,8 @@ from typing import Self
 ROOT = Path(__file__).resolve().parents[2]
 # A machine that runs tests and draws their pictures without a graphics card starves its browsers;
 # what they have to say of being alive comes late then.
-APP = (sys.executable, "-m", "app", "serve", "--port", "{port}", "--silence", "2.0")
-ATTENTIVE_APP = APP[:-2]
+ATTENTIVE_APP = (sys.executable, "-m", "app", "serve", "--port", "{port}")
+APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
 # Below the ports that systems hand to outgoing connections, so that none of those can take the

@@ -160,7 +160,7 @@ def test_stop_is_anybodys_and_ends_what_a_program_does(server: AppServer, progra
     program.ask(requests.Joints(q=THERE.tolist()))
     with connect(server.url, "Watcher") as other, pytest.raises(RefusedError, match=r"Test.*holds"):
         other.ask(requests.Home())
-    status, _, _ = ask(f"{server.url}/api/v1/stop", data=b"", X_Program="bystander")
+    status, _, _ = ask(f"{server.url}/api/v1/stop", data=b"", X_Name="bystander")
     assert status == 204
     assert program.look(answers.State).stopped == "bystander pressed STOP."
     with pytest.raises(RefusedError, match="reset it first"):
@@ -186,7 +186,7 @@ def test_a_program_that_falls_silent_stops_the_arm(server: AppServer) -> None:
                 while (await watcher.look(answers.State)).stopped is None:
                     await asyncio.sleep(0.02)
             state = await watcher.look(answers.State)
-            assert state.stopped == "The line to Frozen broke while the arm moved."
+            assert state.stopped == "Frozen fell silent while the arm moved."
             await _freed(watcher)
             await watcher.ask(requests.Reset())
             await watcher.go(requests.Home())
@@ -272,7 +272,7 @@ def test_single_requests_may_be_posted(server: AppServer) -> None:
         assert state["stopped"] is None
         time.sleep(0.05)
     assert state["q"][4] == pytest.approx(0.3, abs=1e-12)
-    status, said = post(server, "another-program", do="home", id="h")
+    status, said = post(server, "another-program-there", do="home", id="h")
     assert (status, said["is"], said["id"]) == (409, "refused", "h")
     assert "holds the arm" in said["why"]
     assert post(server, do="fly")[0] == 422

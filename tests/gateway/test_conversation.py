@@ -10,6 +10,7 @@ from app.control.lease import Role
 from app.gateway.conversation import FAREWELL, GoneError
 from app.gateway.door import Visitor
 from app.gateway.hub import Hub
+from app.gateway.liveness import Arrival
 from app.gateway.program import Program
 
 ASKED = 200
@@ -20,6 +21,7 @@ class Torrent:
 
     def __init__(self) -> None:
         self.left = ASKED
+        self.arrival = Arrival(None)
 
     async def receive(self) -> str:
         if not self.left:

@@ -1,0 +1,57 @@
+"""Whether a socket or pipe can be read or written without waiting, and when data last came."""
+
+from __future__ import annotations
+
+import select
+import socket
+import struct
+from typing import Protocol
+
+LAST_DATA_RECEIVED = 52
+"""Bytes before ``tcpi_last_data_recv`` [ms] in Linux's ``struct tcp_info``."""
+
+
+class Line(Protocol):
+    """A socket, or what asyncio gives of one."""
+
+    def fileno(self) -> int: ...
+
+    def getsockopt(self, level: int, name: int, size: int, /) -> bytes: ...
+
+
+def readable(fd: int) -> bool:
+    """Return whether data, or the other side's end, waits at ``fd``; False where unknown."""
+    return _polled(fd, getattr(select, "POLLIN", 0), unknown=False)
+
+
+def writable(fd: int) -> bool:
+    """Return whether a short message can be written without waiting; True where unknown."""
+    return _polled(fd, getattr(select, "POLLOUT", 0), unknown=True)
+
+
+def data_age(line: Line) -> float:
+    """Return how long ago the kernel received the newest data of a TCP connection [s].
+
+    0 where the system does not tell: data that is being read then counts as new.
+    """
+    option = getattr(socket, "TCP_INFO", None)
+    if option is None or line.fileno() < 0:
+        return 0.0
+    try:
+        about = line.getsockopt(socket.IPPROTO_TCP, option, LAST_DATA_RECEIVED + 4)
+    except OSError:
+        return 0.0
+    if len(about) < LAST_DATA_RECEIVED + 4:
+        return 0.0
+    milliseconds: int = struct.unpack_from("=I", about, LAST_DATA_RECEIVED)[0]
+    return 1e-3 * milliseconds
+
+
+def _polled(fd: int, event: int, *, unknown: bool) -> bool:
+    if fd < 0:
+        return False
+    if not hasattr(select, "poll"):
+        return unknown
+    poll = select.poll()
+    poll.register(fd, event)
+    return any(found & event for _, found in poll.poll(0))

@@ -1,0 +1,73 @@
+"""What the page says of a stop: requested or confirmed by the arm, and who may end it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.browser.test_gateway import bar, mood, take
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="freezes a process")
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+def offers_reset(page: ViserPage) -> bool:
+    return page.page.locator("#reset").is_visible()
+
+
+def wait_headline(page: ViserPage, words: str) -> None:
+    page.wait_until(lambda: bar(page, "headline") == words, words)
+
+
+def test_page_tells_a_requested_stop_from_a_confirmed_one(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    driver, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
+    take(driver)
+    me = bar(driver, "name").partition(",")[0]
+    os.kill(server.pid, signal.SIGSTOP)
+    try:
+        wait_headline(other, "No word from the arm")
+        assert mood(other.page) == "lost"
+        other.page.keyboard.press("Space")
+        for page in (driver, other):
+            wait_headline(page, "Stop requested")
+            assert mood(page.page) == "stopping"
+            assert "The arm has not confirmed it." in bar(page, "why")
+        assert other.page.locator("#stop.asked").count() == 1
+        other.keep(artefacts / "stop-requested.png")
+    finally:
+        os.kill(server.pid, signal.SIGCONT)
+    for page in (driver, other):
+        wait_headline(page, "Stopped")
+        assert mood(page.page) == "stopped"
+    assert other.page.locator("#stop.asked").count() == 0
+    # Only who may end the stop is offered to; the other page names who can.
+    assert offers_reset(driver)
+    assert bar(driver, "why").endswith("Nothing moves until Reset.")
+    assert not offers_reset(other)
+    assert bar(other, "why").endswith(f"Nothing moves until {me} resets it.")
+    other.keep(artefacts / "stop-of-another.png")
+    driver.press_in_bar("Reset")
+    other.wait_until(lambda: mood(other.page) == "ok", "the reset")
+    # With nobody driving everybody here may.
+    driver.press_in_bar("Let go")
+    driver.page.keyboard.press("Space")
+    other.wait_until(lambda: offers_reset(other), "the offer")
+    other.press_in_bar("Reset")
+    other.wait_until(lambda: not offers_reset(other), "the reset")
+    assert driver.errors == []
+    assert other.errors == []

@@ -1,0 +1,148 @@
+"""The arm's process frozen or without its control loop: reported in time, and stopped after it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from app.api import answers, requests
+from app.client import connect
+from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer, free_port
+from tests.gateway.client import ask, controlling
+from tests.gateway.lines import speaking
+from tests.gateway.test_isolation import FAR, under_way
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="finds the server's processes as Linux lists them"
+)
+
+REPORTED = 0.5
+"""[s] By then it is said that no state comes; a busy machine is given as long again."""
+
+# Ends the control thread as soon as the arm moves, as a fault that nobody foresaw would.
+FATAL = """
+import sys
+from app.cli.main import main
+from app.runtime.loop import ControlLoop
+tick = ControlLoop.tick
+def fatal(loop):
+    tick(loop)
+    if loop.board.snapshot.state.moving:
+        raise SystemExit
+if __name__ == "__main__":
+    ControlLoop.tick = fatal
+    sys.exit(main(["serve", "--port", sys.argv[1], "--silence", "2.0"]))
+"""
+
+
+@contextmanager
+def frozen(process: int) -> Iterator[None]:
+    """``process`` does nothing meanwhile."""
+    os.kill(process, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(process, signal.SIGCONT)
+
+
+def state_of(server: AppServer) -> dict[str, object]:
+    state: dict[str, object] = json.loads(ask(f"{server.url}/api/v1/state")[2])
+    return state
+
+
+def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> None:
+    async def act(server: AppServer) -> None:
+        async with controlling(server.url) as control:
+            with connect(server.url, "Driver") as arm:
+                before = await asyncio.to_thread(under_way, arm)
+                assert ask(f"{server.url}/health")[0] == 200
+                with frozen(server.pid):
+                    began = time.monotonic()
+                    await control.wait(headline="No word from the arm")
+                    assert time.monotonic() - began < 2 * REPORTED
+                    status, _, said = ask(f"{server.url}/health")
+                    assert (status, b"No word from the arm" in said) == (503, True)
+                    await control.say("stop")
+                    told = await control.wait(stop="requested")
+                    assert (told["mood"], told["headline"]) == ("stopping", "Stop requested")
+                    assert "not confirmed" in told["why"]
+                    # Longer than a pipe full of heartbeats: nothing blocks, and STOP is answered.
+                    await asyncio.sleep(6.0)
+                    state = arm.look(answers.State)
+                    assert state.stop == "requested"
+                    assert state.age > 6.0
+                    assert control.status["stop"] == "requested"
+                    assert isinstance(arm.ask(requests.Stop()), answers.Done)
+                    assert ask(f"{server.url}/health")[0] == 503
+                told = await control.wait(stop="confirmed")
+                assert (told["mood"], told["headline"]) == ("stopped", "Stopped")
+                await asyncio.sleep(1.0)
+                state = arm.look(answers.State)
+                assert state.stop == "confirmed"
+                assert state.age < 1.0
+                assert not state.moving
+                # It went on from where it was, to where it could brake.
+                assert state.q[0] - before.q[0] < 1.5
+                assert state.q[0] < FAR[0] - 0.2
+                assert ask(f"{server.url}/health")[::2] == (200, b"ok\n")
+
+    with AppServer(ATTENTIVE_APP) as server:
+        asyncio.run(act(server))
+
+
+def test_arm_that_was_frozen_stands_still_and_waits_for_a_reset() -> None:
+    command = (*ATTENTIVE_APP, "--silence", "0.6", "--lines", "0")
+    with AppServer(command) as server, speaking(server, "Driver") as driver:
+        driver.say(do="joints", q=FAR.tolist())
+        while driver.answer(do="look")["q"][0] < 0.2:
+            time.sleep(0.02)
+        with frozen(server.pid):
+            end = time.monotonic() + 10.0
+            while state_of(server)["stopped"] is None:
+                driver.say(do="beat")
+                assert time.monotonic() < end
+                time.sleep(0.1)
+            refused = driver.answer(do="reset")
+            assert "has not answered" in refused["why"]
+        assert "did not answer" in str(state_of(server)["stopped"])
+        end = time.monotonic() + 5.0
+        while (state := state_of(server))["stop"] != "confirmed" or state["moving"]:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        assert driver.answer(do="reset")["is"] == "done"
+        time.sleep(0.5)
+        np.testing.assert_array_equal(state_of(server)["q"], state["q"])
+
+
+def test_server_ends_when_its_control_loop_has_ended() -> None:
+    port = free_port()
+    with subprocess.Popen(
+        [sys.executable, "-c", FATAL, str(port)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            assert process.stdout is not None
+            for line in process.stdout:
+                if "is ready" in line:
+                    break
+            with connect(f"http://127.0.0.1:{port}", "Driver") as arm:
+                arm.ask(requests.Joints(q=FAR.tolist()))
+                assert process.wait(timeout=15.0) == 1
+            assert "control loop has ended" in process.stdout.read()
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)

@@ -1,0 +1,87 @@
+"""A front that is held up again and again: a dead driver's arm stops, a live one's goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import sys
+import time
+from datetime import datetime
+from typing import Any
+
+import pytest
+
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.gateway.client import ask, websocket
+from tests.gateway.test_isolation import FAR
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="finds the server's processes as Linux lists them"
+)
+
+SILENCE = 1.0
+HELD_UP = 0.6
+"""[s] Longer than half the silence, each time."""
+
+LOADED = 3.0
+"""[s] So long that goes on."""
+
+
+# A dead driver's server is awake for less than two looks, a live one's for long enough to tell the
+# arm that it is there.
+@pytest.mark.parametrize(
+    ("alive", "awake"), [(False, 0.01), pytest.param(True, 0.1, marks=pytest.mark.long)]
+)
+def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
+    async def act(server: AppServer) -> None:
+        async with websocket(server.url, "/api/v1/socket?name=Driver") as driver:
+
+            async def beat(seconds: float) -> None:
+                end = time.monotonic() + seconds
+                while time.monotonic() < end:
+                    await driver.send('{"do": "beat"}')
+                    await asyncio.sleep(0.1)
+
+            await driver.send('{"do": "speed", "value": 0.1}')
+            await driver.send(json.dumps({"do": "joints", "q": FAR.tolist()}))
+            await beat(0.5)
+            last = time.time()
+            holding_up = asyncio.create_task(asyncio.to_thread(hold_up, server.front, awake))
+            if alive:
+                await beat(LOADED)
+            await holding_up
+            if alive:
+                await beat(0.3)
+                assert look(server, "state")["stopped"] is None
+                return
+        state = look(server, "state")
+        assert state["stopped"] == "Driver fell silent while the arm moved."
+        halted = [
+            line["when"]
+            for line in look(server, "ledger")["lines"]
+            if line["began"] and line["finding"]["reason"] == "halted"
+        ]
+        took = datetime.fromisoformat(halted[-1]).timestamp() - last
+        # As soon as it is awake again, and not once the load has ended.
+        assert took < SILENCE + 2 * HELD_UP
+
+    with AppServer((*ATTENTIVE_APP, "--silence", str(SILENCE))) as server:
+        asyncio.run(act(server))
+
+
+def hold_up(process: int, awake: float) -> None:
+    end = time.monotonic() + LOADED
+    try:
+        while time.monotonic() < end:
+            os.kill(process, signal.SIGSTOP)
+            time.sleep(HELD_UP)
+            os.kill(process, signal.SIGCONT)
+            time.sleep(awake)
+    finally:
+        os.kill(process, signal.SIGCONT)
+
+
+def look(server: AppServer, at: str) -> Any:
+    return json.loads(ask(f"{server.url}/api/v1/{at}")[2])

@@ -1,0 +1,167 @@
+"""Silence is judged by when messages were received, on a test clock and on real sockets."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from app.control.session import Session
+from app.gateway import status
+from app.gateway.halting import Stopped
+from app.gateway.hub import TICK
+from app.gateway.liveness import Arrival, Heartbeat
+from app.settings import Settings
+from tests.gateway.test_hub import PAGES, Table, moves
+
+LATE = 0.2
+"""[s] Between two looks of a server that is held up: within the silence that is allowed."""
+
+
+class Received(Heartbeat):
+    """A connection whose newest message was received when the test says, and not handled yet."""
+
+    received = 0.0
+
+    @property
+    def newest(self) -> float:
+        return self.received
+
+
+@pytest.fixture
+def table(session: Session) -> Table:
+    return Table(session.begin(session.ready, 0.0, 0.0))
+
+
+def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    table.hub.tick()
+    assert table.arm.beats == 1
+    for _ in range(2):
+        table.t += LATE
+        table.hub.tick()
+    assert not moves(table)
+    # The second look came after the allowed silence, so the arm heard of the first alone.
+    assert table.arm.beats == 2
+
+
+def test_arm_gets_no_heartbeat_for_a_silent_driver_at_rest(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.wait(Settings.silence - TICK)
+    beats = table.arm.beats
+    table.wait(5 * TICK)
+    assert table.arm.beats == beats
+    table.wait(TICK, driver)
+    assert table.arm.beats == beats + 1
+    assert table.hub.stopped is None
+
+
+def test_message_that_waits_for_a_late_server_is_no_silence(table: Table) -> None:
+    heartbeat = Received(lambda: table.t)
+    driver = table.join(PAGES[0], heartbeat=heartbeat)
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    for _ in range(5):
+        table.t += 2.0
+        heartbeat.received = table.t - 0.1
+        table.hub.tick()
+    assert moves(table)
+    # Messages that are handled late count from when they were received.
+    table.t += 0.2
+    table.hub.beat(driver)
+    table.hub.tick()
+    assert not moves(table)
+
+
+def test_reason_tells_a_silent_window_from_a_closed_one(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    table.hub.leave(driver)
+    table.wait(2 * Settings.silence)
+    assert table.hub.stopped is not None
+    assert table.hub.stopped.why == "Window 1 lost the connection while the arm moved."
+
+
+def test_stop_is_requested_until_a_newer_state_is_stopped(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.arm.taken = 0
+    table.arm.moves = True
+    table.hub.drive(driver.person.key)
+    table.hub.stop("Vera")
+    table.wait(0.2, driver)
+    assert stage(table) == ("stopping", "requested")
+    # A state that is stopped, but older than the request, confirms nothing.
+    table.arm.halted = True
+    table.wait(TICK, driver)
+    assert stage(table) == ("stopping", "requested")
+    table.arm.taken = table.arm.stops
+    table.wait(TICK, driver)
+    assert stage(table) == ("stopped", "confirmed")
+    # So does every further press.
+    table.hub.stop("Vera")
+    assert stage(table) == ("stopping", "requested")
+    assert table.arm.stops == 2
+
+
+def stage(table: Table) -> tuple[str, str]:
+    told = status.common(table.hub)
+    return told["mood"], told["stop"]
+
+
+def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.drive(driver.person.key)
+    table.arm.moves = True
+    assert status.health(table.hub) is None
+    table.arm.taken, table.arm.age = 0, 0.4
+    table.wait(TICK, driver)
+    assert status.health(table.hub) == "No word from the arm's process for 0.4 s."
+    told = status.common(table.hub)
+    assert (told["mood"], told["headline"]) == ("lost", "No word from the arm")
+    assert told["stopped"] is None
+    table.arm.age = 0.6
+    table.wait(TICK, driver)
+    assert table.hub.stopped == Stopped(
+        None, "The arm's process did not answer for 0.6 s.", ticket=1, confirmed=False
+    )
+    assert stage(table) == ("stopping", "requested")
+
+
+@pytest.fixture
+def line() -> Iterator[tuple[socket.socket, socket.socket]]:
+    """Both ends of a TCP connection."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        near = socket.create_connection(listening.getsockname())
+        far, _ = listening.accept()
+        with near, far:
+            yield near, far
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs the kernel's time of arrival")
+def test_arrival_is_when_the_kernel_received_the_message(
+    line: tuple[socket.socket, socket.socket],
+) -> None:
+    near, far = line
+    arrival = Arrival(far)
+    time.sleep(0.3)
+    assert time.monotonic() - arrival.newest > 0.25
+    before = time.monotonic()
+    near.sendall(b"heartbeat\n")
+    sent = time.monotonic()
+    time.sleep(0.4)
+    # It waits unread, and is read and handled late: it arrived when it was sent.
+    margin = 0.1
+    for handle in (lambda: None, lambda: far.recv(100), arrival.note):
+        handle()
+        assert before - margin < arrival.newest < sent + margin
+    near.close()
+    time.sleep(0.2)
+    # The end of a connection is no message.
+    assert arrival.newest < sent + margin

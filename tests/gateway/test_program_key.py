@@ -1,0 +1,47 @@
+"""The key of a program that posts is its secret; its name is what others see."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import time
+from typing import Any
+
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.gateway.client import ask
+from tests.gateway.lines import post
+from tests.gateway.test_isolation import FAR
+
+
+def test_nobody_is_shown_the_key_and_no_other_speaks_for_the_program() -> None:
+    with AppServer(ATTENTIVE_APP) as server:
+        key = secrets.token_hex(16)
+
+        def do(**request: Any) -> tuple[int, Any]:
+            status, _, body = ask(
+                f"{server.url}/api/v1/do",
+                data=json.dumps(request).encode(),
+                X_Program=key,
+                X_Name="Sorter",
+            )
+            return status, json.loads(body)
+
+        assert do(do="acquire")[0] == 200
+        pages = [json.loads(ask(f"{server.url}/api/v1/{at}")[2]) for at in ("state", "ledger")]
+        assert pages[0]["holder"] == "Sorter"
+        assert key not in json.dumps(pages)
+        # Its name is no key, whoever sends it.
+        assert post(server, "Sorter", do="home")[0] == 422
+        assert post(server, secrets.token_hex(16), do="home")[0] == 409
+        assert key not in server.output
+        # Looks of strangers, under its name or any other, are no heartbeats of it.
+        assert do(do="joints", q=FAR.tolist())[0] == 200
+        end = time.monotonic() + 10.0
+        while (state := json.loads(ask(f"{server.url}/api/v1/state")[2]))["stopped"] is None:
+            ask(f"{server.url}/api/v1/state", X_Program="Sorter", X_Name="Sorter")
+            ask(f"{server.url}/api/v1/state", X_Program=secrets.token_hex(16))
+            assert time.monotonic() < end
+        assert state["stopped"] == "Sorter fell silent while the arm moved."
+        assert state["q"][0] < FAR[0] - 0.2
+        # Looks open no windows: it and the other that posted are there.
+        assert state["windows"] == 2

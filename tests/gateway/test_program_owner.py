@@ -1,0 +1,112 @@
+"""A program comes to rest when its owner falls silent with the connection still open."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.settings import Settings
+from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
+from tests.gateway.client import ask, websocket
+from tests.gateway.lines import post
+
+SCRIPT = """\
+name: Wave
+speed: 0.2
+steps:
+  - joints: [100, -60, 85, 8, 0]
+  - joints: [-100, -60, 85, 8, 0]
+"""
+
+BRAKING = 2.0
+"""[s] To come to rest, and to be asked about it on a busy machine."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer(ATTENTIVE_APP) as server:
+        yield server
+
+
+def state_of(server: AppServer) -> dict[str, Any]:
+    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
+    return state
+
+
+def wait(server: AppServer, status: str, seconds: float = 30.0) -> dict[str, Any]:
+    """The state once the program is ``status`` and, if it ended, the arm is at rest."""
+    end = time.monotonic() + seconds
+    while True:
+        state = state_of(server)
+        program = state.get("program") or {"status": None}
+        ended = status in ("running", "ready") or not state["moving"]
+        if program["status"] == status and ended:
+            return state
+        assert time.monotonic() < end, program
+        time.sleep(0.02)
+
+
+def reset(server: AppServer) -> None:
+    assert post(server, do="reset")[0] == 200
+    assert post(server, do="release")[0] == 200
+
+
+def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path) -> None:
+    script = tmp_path / "wave.yaml"
+    script.write_text(SCRIPT)
+    command = [sys.executable, "-m", "app", "run", str(script), "--url", server.url]
+    with subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT
+    ) as owner:
+        try:
+            wait(server, "running")
+            time.sleep(1.5 * Settings.owner_silence)
+            # While its heartbeats come the program runs.
+            assert wait(server, "running", 1.0)["moving"]
+            os.kill(owner.pid, signal.SIGSTOP)
+            began = time.monotonic()
+            state = wait(server, "stopped")
+            took = time.monotonic() - began
+        finally:
+            os.kill(owner.pid, signal.SIGCONT)
+            owner.kill()
+    assert took < Settings.owner_silence + BRAKING
+    why = "Terminal fell silent: a program ends with its owner's heartbeats."
+    assert state["program"]["why"] == why
+    # At rest on its way, neither stopped for good nor held by anybody.
+    assert (state["stopped"], state["holder"]) == (None, None)
+    assert 0.05 < state["q"][0] < np.deg2rad(100) - 0.05
+    reset(server)
+
+
+def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> None:
+    async def act() -> tuple[float, dict[str, Any]]:
+        async with websocket(server.url, "/api/v1/socket?name=Owner") as owner:
+
+            async def say(**request: Any) -> None:
+                await owner.send(json.dumps(request))
+
+            await say(do="program", text=SCRIPT)
+            while (await asyncio.to_thread(state_of, server))["program"]["status"] != "ready":
+                await say(do="beat")
+                await asyncio.sleep(0.05)
+            await say(do="steer", order="run")
+            began = time.monotonic()
+            state = await asyncio.to_thread(wait, server, "stopped")
+            return time.monotonic() - began, state
+
+    took, state = asyncio.run(act())
+    assert Settings.owner_silence <= took < Settings.owner_silence + BRAKING
+    assert "Owner fell silent" in state["program"]["why"]
+    reset(server)
