@@ -107,18 +107,18 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
             compiled(parse(LINES), stage.rig, stage.begin(), report=reached.append)
         assert reached[-1] == (phase, 3, 4)
     gaps: list[float] = []
-    begun = time.monotonic()
+    begun = time.thread_time()
 
     def measure() -> None:
         nonlocal begun
-        now = time.monotonic()
+        now = time.thread_time()
         gaps.append(now - begun)
         begun = now
 
     with checked_by(measure):
         compiled(parse(PourDemo().text), stage.rig, stage.begin())
     assert len(gaps) > 1000
-    assert max(gaps) < 0.5
+    assert max(gaps) < 0.25
 
 
 @pytest.fixture
