@@ -13,6 +13,10 @@ class InputError(KatanaError, ValueError):
     """A value handed in cannot be used: not finite, of the wrong shape, not a rotation, ..."""
 
 
+class CancelledError(KatanaError):
+    """A calculation was ended before it had a result."""
+
+
 class BlockedError(InputError):
     """A way that is asked for would bring two things too near to each other."""
 

@@ -9,6 +9,7 @@
   const QUIETLY = "quietly"; // the id of what is asked again until it is had
   const OPEN = "katana450.instruments.open";
   // What of the address is for viser; anything else would be a stranger's wish.
+  const ORDERS = { pause: "Pause", resume: "Resume", halt: "Cancel" };
   const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr|darkMode)$/;
 
   const byId = (id) => document.getElementById(id);
@@ -138,7 +139,7 @@
     return list;
   }
 
-  let drawnActs = "";
+  let [drawnActs, drawnOrders] = ["", ""];
   function draw() {
     if (!status) return;
     body.dataset.mood = status.mood;
@@ -157,6 +158,12 @@
     if (key !== drawnActs) {
       drawnActs = key;
       byId("acts").replaceChildren(...acts());
+    }
+    const orders = status.orders.join();
+    if (orders !== drawnOrders) {
+      drawnOrders = orders;
+      const made = (order) => act(ORDERS[order], { do: "steer", order }, order !== "halt");
+      byId("orders").replaceChildren(...status.orders.map(made));
     }
     const slider = document.querySelector("#speed input");
     if (document.activeElement !== slider) slider.value = Math.round(100 * status.speed);

@@ -107,10 +107,10 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
 class Progress(msgspec.Struct, frozen=True, kw_only=True):
     """The program that is planned or runs, or ran last.
 
-    ``by``: who sent it. ``status``: planning, refused, ready, running, paused, blocked, done,
-    stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and ``share``
-    of its ``task`` is done. ``seconds``: all motions at full speed. ``why``: what is wrong with it.
-    """
+    ``by``: its owner. ``status``: planning, cancelled, refused, ready, running, paused, blocked,
+    done, stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and
+    ``share`` of its ``task`` is done, or of all planning. ``seconds``: all motions at full speed.
+    ``why``: what is wrong with it, or why it was planned anew or not run."""
 
     name: str
     by: str

@@ -270,7 +270,11 @@ class Hold(Request, frozen=True):
 
 
 class Pause(Request, frozen=True):
-    """Come to rest on the way, and keep the target."""
+    """Come to rest on the way, and keep the target.
+
+    Pause, resume and speed also act on a program that runs, for its owner alone: the page or API
+    program that started it. A program that is planned meanwhile starts paused.
+    """
 
 
 class Resume(Request, frozen=True):
@@ -280,8 +284,10 @@ class Resume(Request, frozen=True):
 class Program(Request, frozen=True, kw_only=True):
     """A part of a script, of docs/programs.md; after the last one it is planned.
 
-    All but the last say ``more``. ``speed``: share of the script's own. The state tells when it is
-    planned, or what is wrong with it, line by line.
+    All but the last say ``more``. ``speed``: share of the script's own. The state tells how far the
+    planning is, when it is done, or what is wrong with the script, line by line. The last plan is
+    kept: the same script is ready at once while posture, gripper, tool, scene and water are the
+    same.
     """
 
     text: Annotated[str, Meta(max_length=LARGEST)]
@@ -292,7 +298,11 @@ class Program(Request, frozen=True, kw_only=True):
 class Steer(Request, frozen=True, kw_only=True):
     """Run, step, pause, resume or halt the program that is planned.
 
-    It drives by itself, under its own name; whoever started it stays connected.
+    It drives by itself, under its own name; whoever started it stays connected. While it is being
+    planned, ``run`` and ``step`` take effect afterwards, unless the arm is told to move, hold or
+    stop in between; ``pause`` makes it start paused, and ``halt`` cancels the planning. A program
+    that is to run from another posture or scene than it was planned for is planned anew first. An
+    arm that is paused when a program begins stays paused until ``resume``.
     """
 
     order: Order

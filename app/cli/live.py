@@ -7,11 +7,11 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 from app.api import answers, requests
-from app.client import Client, connect
+from app.client import Client, RefusedError, connect
 from app.client.files import LostError
 from app.errors import ConfigurationError, KatanaError
 from app.programs.script import Script
@@ -28,18 +28,20 @@ HZ = 10.0
 STARTED = 60.0
 """[s] By then a server of ours is there."""
 
-ENDED = ("done", "stopped", "failed")
+ENDED = ("done", "stopped", "failed", "refused", "cancelled")
 
 
 def run_live(text: str, script: Script, options: Namespace) -> int:
     """Run ``text`` on the server at ``options.url``; returns the exit status."""
     with _server(script, options) as url, connect(url, NAME, options.token) as arm:
-        _send(arm, text, options.speed)
-        arm.ask(requests.Steer(order=requests.Order.RUN))
         try:
+            _send(arm, text, options.speed)
+            arm.ask(requests.Steer(order=requests.Order.RUN))
             return _follow(arm)
         except KeyboardInterrupt:
-            arm.ask(requests.Steer(order=requests.Order.HALT))
+            # Before all of the script is sent there is nothing to end.
+            with suppress(RefusedError):
+                arm.ask(requests.Steer(order=requests.Order.HALT))
             print("\nkatana450: the program is ended; the arm holds.", file=sys.stderr)
             return 130
 
@@ -51,6 +53,9 @@ def _send(arm: Client, text: str, speed: float) -> None:
         arm.ask(requests.Program(text=part, more=True))
     arm.ask(requests.Program(text=parts[-1], speed=speed))
     while (now := arm.look(answers.State).program) is not None and now.status == "planning":
+        if now.steps and sys.stderr.isatty():
+            line = f"{now.task}, step {now.step} of {now.steps}, {now.share:4.0%}"
+            print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
         time.sleep(1.0 / HZ)
     if now is None or now.status != "ready":
         raise KatanaError(now.why if now is not None else "The server has forgotten the script.")

@@ -51,6 +51,7 @@ def _arm(
     frame_rate = outfit.settings.frame_rate
     view = View(gateway.viser, model, link.board, navigator, session, frame_rate, besides)
     navigator.tell = gateway.announce
+    navigator.redirected = gateway.steering.redirected
     mechanism, _ = load_mechanism(outfit.urdf)
     nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
     gateway.attach(Motion(model, session, link, navigator, nodes, view.let_go))

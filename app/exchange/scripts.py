@@ -32,6 +32,11 @@ class Scripts:
         self._folder = folder
 
     @property
+    def keeps(self) -> bool:
+        """Whether there is a folder to save in."""
+        return self._folder is not None
+
+    @property
     def paths(self) -> Mapping[str, Path]:
         """By their names; a person's own go before those of the library."""
         found = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}
@@ -53,13 +58,18 @@ class Scripts:
             raise InputError(
                 "There is no folder for scripts: start the server with --programs DIR."
             )
-        if not NAME.fullmatch(name):
-            raise InputError("A script's name has up to 40 letters, digits, blanks, - and _.")
-        path = self._folder / f"{name}{ENDING}"
+        path = self._folder / file_name(name)
         if path.exists():
             raise InputError(f"There is a script {name!r} already; give this one another name.")
         write_files({path: writer_of(text.encode())})
         return path
+
+
+def file_name(name: str) -> str:
+    """Return the file name of a script. Raises InputError for a name that cannot be one."""
+    if not NAME.fullmatch(name):
+        raise InputError("A script's name has up to 40 letters, digits, blanks, - and _.")
+    return f"{name}{ENDING}"
 
 
 def text_of(path: Path) -> str:

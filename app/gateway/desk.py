@@ -49,6 +49,8 @@ class Desk:
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
+        if isinstance(request, requests.Pause | requests.Resume | requests.Speed):
+            window = hub.performer.actor(window)
         command = self._command(request)
         if command is None:
             self._arrange(window, request)

@@ -79,10 +79,12 @@ class Firewall:
         drags: set[str],
         drive: Callable[[], None],
         steer: Callable[[], None],
+        pace: Callable[[], None],
         t: float,
     ) -> None:
-        """``drive`` raises a LeaseError when its person must not move the arm at this moment, and
-        ``steer`` when they must not tell a program what to do.
+        """``drive`` raises a LeaseError when its person must not move the arm at this moment,
+        ``steer`` when they must not tell a program what to do, ``pace`` when they must not pause,
+        resume or slow down what moves.
 
         ``who``: for the log. ``drags``: the gizmos it holds; whoever empties it ends the drags.
         """
@@ -91,6 +93,7 @@ class Firewall:
         self._drags = drags
         self._drive = drive
         self._steer = steer
+        self._pace = pace
         self._flood = Bucket(RATE, BURST, t)
         self._patience = Bucket(FORGIVEN, PATIENCE, t)
         self.dropped: Counter[str] = Counter()
@@ -119,7 +122,7 @@ class Firewall:
             # Its beginning was refused, or it was ended here while the hand went on.
             return Verdict(Ruling.DROP, tuple(self._guard.correction(message)))
         try:
-            (self._steer if self._guard.steers(message) else self._drive)()
+            self._check_may(message)
         except LeaseError as refusal:
             corrections = tuple(self._guard.correction(message))
             return Verdict(Ruling.DROP, corrections, refusal=str(refusal))
@@ -128,6 +131,14 @@ class Firewall:
         elif isinstance(message, wire.TransformControlsDragEndMessage):
             self._drags.discard(message.name)
         return Verdict(Ruling.PASS)
+
+    def _check_may(self, message: Any) -> None:
+        if self._guard.steers(message):
+            self._steer()
+        elif self._guard.paces(message):
+            self._pace()
+        else:
+            self._drive()
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> Verdict:
         self.dropped[kind] += 1

@@ -125,7 +125,8 @@ class _Line:
         self._unwelcome = False
         window = hub.window(key)
         who = window.person.name if window is not None else "a window without our page"
-        self._firewall = Firewall(guard, who, self._drags, self._drive, self._steer, hub.clock())
+        may = self._drive, self._steer, self._pace
+        self._firewall = Firewall(guard, who, self._drags, *may, hub.clock())
 
     async def run(self) -> None:
         """Until either side closes."""
@@ -212,6 +213,12 @@ class _Line:
         if not self._key:
             raise LeaseError("Open the front page to drive the arm.")
         self._hub.drive(self._key)
+
+    def _pace(self) -> None:
+        window = self._hub.window(self._key)
+        if window is None:
+            raise LeaseError("Open the front page to drive the arm.")
+        self._hub.drive(self._hub.performer.actor(window).person.key)
 
     def _steer(self) -> None:
         window = self._hub.window(self._key)

@@ -36,6 +36,10 @@ class Steering:
         """The one that is planned."""
         return self._performer.program
 
+    def redirected(self) -> None:
+        """The arm is told something else: a program that waits for its plan does not run."""
+        self._performer.redirected()
+
     def plan(self, text: str, then: Order | None) -> None:
         """Plan a script, and do ``then``. Raises KatanaError with the reason why not."""
         self._do(lambda: self._performer.plan(text, then))

@@ -17,6 +17,7 @@ from app.collision.clearance import SAME, SAME_DEPTH, STOP
 from app.collision.contact import Contact
 from app.collision.world import LONGEST_WAY, Placed, World
 from app.geometry.arrays import FloatArray
+from app.planning.checkpoint import checkpoint
 
 FINE = 1e-4
 """[m] A piece on which no body travels farther is not halved: the least clearance may be nearer by
@@ -79,6 +80,7 @@ class Room:
         """
         pieces = [(low, high)]
         while pieces:
+            checkpoint()
             low, high = pieces.pop()
             middle = 0.5 * (low + high)
             x = at(middle)
@@ -106,6 +108,7 @@ class Room:
         best: Clearance | None = None
         pieces = [(0.0, 1.0)]
         while pieces:
+            checkpoint()
             low, high = pieces.pop()
             middle = 0.5 * (low + high)
             x = at(middle)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray
+from app.planning.checkpoint import checkpoint
 from app.planning.path import Path, joint_derivatives, point_derivatives
 from app.planning.scaling import CUBIC, Bounds, Scaling, rest_to_rest
 
@@ -121,6 +122,7 @@ class _Sampled:
         c = start * self.excess(start, a, j).max()
         best, least = c, np.inf
         for _ in range(rounds):
+            checkpoint()
             excess = self.excess(c, a, j)
             most = float(excess.max())
             # tau at the end, were all made slower until nothing is too fast.

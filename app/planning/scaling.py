@@ -97,6 +97,10 @@ class Scaling:
         """[s] from rest to rest at full speed."""
         return rest_to_rest(self.span, self.acceleration, self.jerk)
 
+    def tau_after(self, t: float) -> float:
+        """tau [s] ``t`` [s] after the start at full speed, from 0 to `duration`."""
+        return gone_after(t, self.span, self.acceleration, self.jerk)
+
     @cached_property
     def _pieces(self) -> list[list[float]]:
         """Of each piece the slowness as a polynomial of its own share."""
@@ -156,6 +160,25 @@ def rest_to_rest(way: float, a: float, j: float) -> float:
     if way >= 2.0 * a**3 / j**2:
         return a / j + math.sqrt((a / j) ** 2 + 4.0 * way / a)
     return float(4.0 * (way / (2.0 * j)) ** (1.0 / 3.0))
+
+
+def gone_after(t: float, way: float, a: float, j: float) -> float:
+    """How much of ``way`` is behind ``t`` [s] after the start of the motion of `rest_to_rest`."""
+    total = rest_to_rest(way, a, j)
+    t = min(max(t, 0.0), total)
+    if t > 0.5 * total:
+        return way - gone_after(total - t, way, a, j)
+    # The jerk lasts for `ramp`, and the speed grows until `up`.
+    ramp = min(a / j, 1.0 / math.sqrt(j), math.cbrt(way / (2.0 * j)))
+    up = min(1.0 / (j * ramp) + ramp, 0.5 * total)
+    speed = j * ramp * (up - ramp)
+    if t <= ramp:
+        return j * t**3 / 6.0
+    if t <= up - ramp:
+        since = t - ramp
+        return j * ramp * (ramp**2 / 6.0 + 0.5 * ramp * since + 0.5 * since**2)
+    left = max(up - t, 0.0)
+    return speed * (t - 0.5 * up) + j * left**3 / 6.0
 
 
 def _inverted(w: float, w1: float, w2: float) -> tuple[float, float, float]:

@@ -24,6 +24,7 @@ from app.kinematics.reading import Reading
 from app.kinematics.tool import ToolTarget
 from app.kinematics.tracker import leap
 from app.motion.limiter import Motion
+from app.planning.checkpoint import checkpoint
 from app.planning.curve import Curve
 from app.planning.path import Path, joint_derivatives
 from app.planning.plan import JOINED, check_clear
@@ -210,6 +211,7 @@ class Bench:
         refused = InputError("no way is left.")
         state, orders = self.state, tuple(self.orders)
         for number, way in enumerate(ways):
+            checkpoint()
             try:
                 return lay(way)
             except InputError as error:
@@ -223,6 +225,7 @@ class Bench:
         session, state = self.rig.session, self.state
         given: tuple[Command, ...] = (command,)
         for _ in range(ticks):
+            checkpoint()
             state = session.step(state, given, state.t + TICK)
             state = session.observe(state, state.setpoint, state.gripper_setpoint)
             given = ()

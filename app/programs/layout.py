@@ -13,10 +13,39 @@ from app.errors import InputError
 from app.programs.bench import Bench, Draft, Taken
 from app.programs.order import Go, Order
 from app.programs.script import Placed, Script
+from app.programs.situation import Situation
 from app.programs.source import Problem, ScriptError
 
 Orders = list[tuple[str, Order]]
 """Of a step, each with its name."""
+
+FINDING, TIMING = "finding paths", "timing paths"
+"""The two phases of planning."""
+
+TIMING_TAKES = 0.8
+"""[1] The part of the whole time that timing takes, roughly."""
+
+
+class PlanningStage(NamedTuple):
+    """How far planning is. phase: FINDING or TIMING. step: under work, from 1, of ``steps``."""
+
+    phase: str
+    step: int
+    steps: int
+
+    @property
+    def share(self) -> float:
+        """The fraction of the whole work that is done, from 0 to 1, as an estimate."""
+        done = (self.step - 1) / self.steps
+        return (
+            (1.0 - TIMING_TAKES) * done
+            if self.phase == FINDING
+            else 1.0 + TIMING_TAKES * (done - 1.0)
+        )
+
+
+Report = Callable[[PlanningStage], None]
+"""Is given each stage as it begins."""
 
 
 class Laid(NamedTuple):
@@ -34,13 +63,11 @@ class Layout:
     the next of them is tried then, each once, before the script is refused.
     """
 
-    def __init__(
-        self, script: Script, bench: Bench, check: Callable[[], None] | None = None
-    ) -> None:
-        """``check``: asked before each step; what it raises ends the planning."""
+    def __init__(self, script: Script, bench: Bench, report: Report = lambda _: None) -> None:
+        """``report``: given every stage; what it raises ends the planning."""
         self._script = script
         self._bench = bench
-        self._check = check
+        self._report = report
         self._laid: list[Laid] = []
         # A repetition from where it began is planned already.
         self._known: dict[tuple[object, ...], Laid] = {}
@@ -56,7 +83,7 @@ class Layout:
             number = len(self._laid)
             before, taken = self._bench.state, self._bench.taken
             self._bench.ahead = [placed.step for placed in steps[number + 1 :]]
-            self._ask(steps[number])
+            self._report(PlanningStage(FINDING, number + 1, len(steps)))
             try:
                 laid = self._step(steps[number])
             except ScriptError as error:
@@ -68,14 +95,11 @@ class Layout:
             _, self._bench.state, self._bench.taken = laid
             self._note_grasp(taken, (number, before))
         # What can be done is known now, so that the time it takes is sought for nothing else.
-        return [self._timed(*each) for each in zip(steps, self._laid, strict=True)]
-
-    def _ask(self, placed: Placed) -> None:
-        try:
-            if self._check is not None:
-                self._check()
-        except InputError as error:
-            raise _at(placed, error) from error
+        found: list[Orders] = []
+        for number, laid in enumerate(self._laid, 1):
+            self._report(PlanningStage(TIMING, number, len(steps)))
+            found.append(self._timed(laid))
+        return found
 
     def _step(self, placed: Placed) -> Laid:
         bench = self._bench
@@ -92,12 +116,11 @@ class Layout:
             self._known[key] = laid
         return laid
 
-    def _timed(self, placed: Placed, laid: Laid) -> Orders:
+    def _timed(self, laid: Laid) -> Orders:
         found: Orders = []
         for name, order in laid.orders:
             if isinstance(order, Draft):
                 if id(order) not in self._plans:
-                    self._ask(placed)
                     self._plans[id(order)] = order.timed()
                 found.append((name, self._plans[id(order)]))
             else:
@@ -139,9 +162,5 @@ def _at(placed: Placed, error: InputError) -> ScriptError:
 
 def _situation(bench: Bench) -> tuple[object, ...]:
     """What a step's plans depend on."""
-    state = bench.state
-    things = tuple((each.name, each.T.tobytes(), each.held) for each in state.things)
-    water = None if state.poured is None else state.poured.water.cup
     taken = None if bench.taken is None else bench.taken.at.position.tobytes()
-    fingers = state.gripper_setpoint
-    return state.setpoint.tobytes(), fingers, state.tool, things, water, taken, bench.given_up
+    return Situation.of(bench.state).key, taken, bench.given_up

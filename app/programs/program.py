@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.control.state import State
 from app.errors import InputError
 from app.geometry.arrays import FloatArray
 from app.programs.bench import Bench, Rig
-from app.programs.layout import Layout
+from app.programs.layout import Layout, Report
 from app.programs.order import Go, Pace, Task
 from app.programs.script import Script
 
@@ -38,12 +37,12 @@ def compiled(
     rig: Rig,
     state: State,
     speed: float = 1.0,
-    check: Callable[[], None] | None = None,
+    report: Report = lambda _: None,
 ) -> Program:
     """``script`` for ``rig`` from where ``state`` has it, at ``speed`` of its own.
 
-    ``check``: asked before each step; what it raises ends the planning, as a step's own reason.
-    Raises ScriptError with the line of the step that cannot be, and why.
+    ``report``: given every stage of the planning as it begins. Raises ScriptError with the line of
+    the step that cannot be, and why; CancelledError where a checkpoint does.
     """
     if script.bare and rig.arm.gripper.moves:
         raise InputError(
@@ -52,7 +51,7 @@ def compiled(
         )
     bench = Bench(rig, state)
     bench.state = bench.standing(state.setpoint)
-    laid = Layout(script, bench, check).all()
+    laid = Layout(script, bench, report).all()
     tasks = [Task(0, 1, "speed", Pace(1.0))]
     for number, (placed, orders) in enumerate(zip(script.steps, laid, strict=True)):
         tasks += [Task(number, placed.line, name, order) for name, order in orders]

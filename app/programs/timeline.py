@@ -9,26 +9,30 @@ from itertools import accumulate
 import numpy as np
 
 from app.geometry.arrays import FloatArray
-from app.planning.plan import Plan
+from app.planning.plan import Segment
 from app.programs.order import Go
 from app.programs.program import Program
 
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """The motions of a program, at full speed but for the ramps; what they wait for is left out.
+    """The motions of a program at full speed, on the clock of `Program.duration`; pauses between
+    them, for the gripper for example, are left out.
 
-    plans: in their order. begins: [s] when each does, and the last ends.
+    pieces: in their order, each with the finger joint meanwhile [rad]. begins: [s] when each does,
+    and the last ends.
     """
 
-    plans: tuple[Plan, ...]
+    pieces: tuple[tuple[Segment, float], ...]
     begins: tuple[float, ...]
 
     @staticmethod
     def of(program: Program) -> Timeline:
-        """Of ``program``."""
-        plans = tuple(task.order.plan for task in program.tasks if isinstance(task.order, Go))
-        return Timeline(plans, tuple(accumulate((plan.span for plan in plans), initial=0.0)))
+        """The timeline of ``program``."""
+        plans = [task.order.plan for task in program.tasks if isinstance(task.order, Go)]
+        pieces = tuple((segment, plan.fingers) for plan in plans for segment in plan.segments)
+        durations = (segment.scaling.duration for segment, _ in pieces)
+        return Timeline(pieces, tuple(accumulate(durations, initial=0.0)))
 
     @property
     def span(self) -> float:
@@ -38,12 +42,12 @@ class Timeline:
     def at(self, t: float) -> tuple[FloatArray, float]:
         """The joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
 
-        There has to be a plan.
+        There has to be a motion.
         """
-        number = min(max(bisect_right(self.begins, t) - 1, 0), len(self.plans) - 1)
-        plan = self.plans[number]
-        return plan.q(min(max(t - self.begins[number], 0.0), plan.span)), plan.fingers
+        number = min(max(bisect_right(self.begins, t) - 1, 0), len(self.pieces) - 1)
+        segment, fingers = self.pieces[number]
+        return segment.at(segment.scaling.tau_after(t - self.begins[number])).q, fingers
 
     def postures(self, count: int) -> list[tuple[FloatArray, float]]:
-        """``count`` of them evenly, from start to end."""
+        """``count`` of them evenly in time, from start to end."""
         return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]

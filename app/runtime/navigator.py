@@ -23,6 +23,9 @@ REST_SECONDS = 5.0
 PASSIVE = (cmd.SpeedScale, cmd.SetGripper, *cmd.THINGS)
 """Commands that leave a way under work as it is."""
 
+WAITING = (cmd.Pause, cmd.Resume)
+"""Commands that decide when the arm moves, not where."""
+
 
 class Navigator:
     """Between whoever commands and the arm: a branch is taken on a planned way, clear from end to
@@ -36,6 +39,8 @@ class Navigator:
         self._work: threading.Event | None = None
         self.tell: Callable[[str], None] = log.warning
         """Is told why no way was found."""
+        self.redirected: Callable[[], None] = lambda: None
+        """Is called, in any thread, when the arm is told to go elsewhere, to hold or to stop."""
 
     @property
     def last_ticket(self) -> int:
@@ -52,6 +57,8 @@ class Navigator:
         said = command.commands if isinstance(command, cmd.Together) else (command,)
         if not all(isinstance(each, PASSIVE) for each in said):
             self.cancel()
+        if not all(isinstance(each, PASSIVE + WAITING) for each in said):
+            self.redirected()
         if isinstance(command, cmd.TakeBranch):
             self._set_out(command)
             return self.last_ticket

@@ -33,6 +33,9 @@ Clickable = (
 Listen = Callable[[Clickable, Callable[[], cmd.Command]], None]
 """Sends what the function makes when a person, not this program, changes the handle."""
 
+PACING = ("Motion", "Speed")
+"""Labels of the controls that pause, resume and slow down whatever moves."""
+
 ORDERS: dict[str, cmd.Command] = {
     "Pause": cmd.Pause(),
     "Resume": cmd.Resume(),
@@ -72,13 +75,13 @@ def refuse(
 def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSliderHandle[float]:
     """Pause, Resume, and how fast; the slider of that."""
     orders = gui.add_button_group(
-        "Motion",
+        PACING[0],
         tuple(ORDERS),
         hint="Pause: rest on the way, until Resume. STOP is above, and on Space and Esc",
     )
     listen(orders, lambda: ORDERS[orders.value])
     speed = gui.add_slider(
-        "Speed",
+        PACING[1],
         min=1.0,
         max=100.0,
         step=1.0,

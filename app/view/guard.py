@@ -14,6 +14,7 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
+from app.view.controls import PACING
 from app.view.looks import PERSONAL
 from app.view.programs import STEERING
 
@@ -64,9 +65,16 @@ class Guard:
 
     def steers(self, message: Any) -> bool:
         """Whether ``message`` is for a program, which may be another's than who drives by hand."""
+        return self._is_of(message, STEERING)
+
+    def paces(self, message: Any) -> bool:
+        """Whether ``message`` only pauses, resumes or slows down what moves, by hand or program."""
+        return self._is_of(message, PACING)
+
+    def _is_of(self, message: Any, labels: tuple[str, ...]) -> bool:
         if not isinstance(message, wire.GuiUpdateMessage):
             return False
-        return getattr(self._control(message), "label", None) in STEERING
+        return getattr(self._control(message), "label", None) in labels
 
     def correction(self, message: Any) -> list[Any]:
         """What the sender must be told so that its window shows the truth again.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from html import escape
 from typing import Any, Protocol
@@ -13,7 +14,7 @@ from app.api.answers import Progress as Told
 from app.api.fields import Order
 from app.control.state import State
 from app.errors import InputError, KatanaError
-from app.exchange.scripts import Scripts
+from app.exchange.scripts import Scripts, file_name
 from app.geometry.arrays import FloatArray
 from app.programs.program import Program
 from app.programs.script import parse
@@ -80,6 +81,10 @@ class ProgramsPanel:
         self._state = state
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
+        # The script that was last asked for.
+        self._text = ""
+        # Held while a person asks for one, which viser hears in a thread of its own.
+        self._asking = threading.Lock()
         # Whether a person asked to see it before it runs.
         self._wanted = False
         self._preview = Preview(server, model)
@@ -99,7 +104,7 @@ class ProgramsPanel:
                 "Program",
                 ("Preview", *ORDERS),
                 hint="Preview: plan it and show the tool's way. Step: to the end of a step. "
-                "Wait: rest on the way, until Run or Step",
+                "Wait: rest on the way, until Run or Step. End: end the run, or the planning",
             )
             self._orders.on_click(self._guarded(self._order))
             self._look = gui.add_slider(
@@ -116,7 +121,8 @@ class ProgramsPanel:
             self._teach = gui.add_button_group(
                 "Teach",
                 ("Add pose", "Forget", "Save"),
-                hint="Add pose: where the arm is now. Save: a script through all of them",
+                hint="Add pose: where the arm is now. Save: a script through all of them, in the "
+                "folder of --programs, or else as a download",
             )
             self._teach.on_click(self._guarded(self._on_teach))
             self._name = gui.add_text("Name", "My script", hint="Of the script that Save writes")
@@ -127,14 +133,21 @@ class ProgramsPanel:
         page = _page(told, len(self._taught))
         if page != self._status.content:
             self._status.content = page
+        if self._asking.acquire(blocking=False):
+            try:
+                self._follow_program()
+            finally:
+                self._asking.release()
+        if not self._look.disabled and told is not None and told.status in RUNS:
+            self._preview.begin()
+            self._look.disabled = True
+
+    def _follow_program(self) -> None:
         program = self._steering.program
         if program is not self._drawn:
             self._drawn = program
             self._draw(program)
             self._wanted = self._wanted and program is None
-        if not self._look.disabled and told is not None and told.status in RUNS:
-            self._preview.begin()
-            self._look.disabled = True
 
     def _draw(self, program: Program | None) -> None:
         """Show what ``program`` would do."""
@@ -142,20 +155,29 @@ class ProgramsPanel:
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
         if span > 0.0:
-            self._look.max = math.ceil(span / STEP) * STEP
+            self._look.max = shown_seconds(span)
 
-    def _order(self) -> None:
+    def _order(self, _client: viser.ClientHandle | None = None) -> None:
         said = self._orders.value
         told = self._steering.told
-        running = told is not None and told.status in RUNS
-        if said == "Preview" or (said in ("Run", "Step") and not running):
-            text = self._scripts.text(self._choice.value)
+        status = "" if told is None else told.status
+        if said in ("Wait", "End") or (said != "Preview" and status in RUNS):
+            self._steering.steer(ORDERS[said])
+            return
+        text = self._scripts.text(self._choice.value)
+        if said != "Preview" and status == "planning" and text == self._text:
+            # A preview is on its way already: it is run once it is planned.
+            self._steering.steer(ORDERS[said])
+            return
+        with self._asking:
             self._wanted = said == "Preview"
             self._steering.plan(text, ORDERS.get(said))
-        else:
-            self._steering.steer(ORDERS[said])
+            self._text = text
+            # A plan that is kept is drawn anew.
+            self._drawn = None
+            self._draw(None)
 
-    def _on_teach(self) -> None:
+    def _on_teach(self, client: viser.ClientHandle | None = None) -> None:
         match self._teach.value:
             case "Add pose":
                 if len(self._taught) >= MOST_TAUGHT:
@@ -166,24 +188,40 @@ class ProgramsPanel:
             case "Save":
                 if not self._taught:
                     raise InputError("There is no pose yet: bring the arm somewhere and add it.")
-                name = self._name.value.strip()
-                self._scripts.save(name, taught(name, self._taught))
-                self._taught.clear()
-                self._choice.options = tuple(self._scripts.paths)
-                self._choice.value = name  # type: ignore[misc]  # viser declares it read-only
+                self._save(client)
 
-    def _guarded(self, act: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], None]:
+    def _save(self, client: viser.ClientHandle | None) -> None:
+        """Save the poses in the folder; where there is none, as a download of ``client``."""
+        name = self._name.value.strip()
+        text = taught(name, self._taught)
+        if client is not None and not self._scripts.keeps:
+            # The poses stay: a browser may refuse the file.
+            client.send_file_download(file_name(name), text.encode(), save_immediately=True)
+            return
+        self._scripts.save(name, text)
+        self._taught.clear()
+        self._choice.options = tuple(self._scripts.paths)
+        self._choice.value = name  # type: ignore[misc]  # viser declares it read-only
+
+    def _guarded(
+        self, act: Callable[[viser.ClientHandle | None], None]
+    ) -> Callable[[viser.GuiEvent[Any]], None]:
         """``act``, and what is wrong told in the window of whoever asked."""
 
         def acted(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:
-                act()
+                act(event.client)
             except KatanaError as error:
                 refuse(event, error)
 
         return acted
+
+
+def shown_seconds(duration: float) -> float:
+    """``duration`` [s] as the panel shows it, in words and as the end of its slider."""
+    return math.ceil(round(duration / STEP, 6)) * STEP
 
 
 def _suits(scripts: Scripts, name: str, model: RobotModel) -> bool:
@@ -206,8 +244,14 @@ def _page(told: Told | None, poses: int) -> str:
             )
         elif told.status == "planning":
             lines.append("All of it is planned before anything moves, which may take a while.")
+            if told.steps:
+                at = f"Step {told.step} of {told.steps}: {escape(told.task)}"
+                lines.append(
+                    f"{at}, {told.share:.0%}<progress value='{told.share:.2f}'></progress>"
+                )
         elif told.status == "ready":
-            lines.append(f"{told.steps} steps, {told.seconds:.1f} s of motion at full speed")
+            seconds = shown_seconds(told.seconds)
+            lines.append(f"{told.steps} steps, {seconds:.1f} s of motion at full speed")
         lines += [escape(line) for line in told.why.splitlines()]
     if poses:
         lines.append(f"Taught: {poses} pose{'s' if poses > 1 else ''}")

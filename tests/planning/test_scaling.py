@@ -16,7 +16,7 @@ from app.errors import InputError
 from app.planning.curve import ToolLines
 from app.planning.pacing import fastest
 from app.planning.path import Path, joint_derivatives, point_derivatives
-from app.planning.scaling import Bounds, Scaling, rest_to_rest
+from app.planning.scaling import Bounds, Scaling, gone_after, rest_to_rest
 from app.planning.tool_path import ToolPath
 from tests.planning.time_optimal import least_time
 
@@ -138,6 +138,11 @@ def test_the_time_from_rest_to_rest_is_that_of_ruckig(way: float, a: float, j: f
     trajectory = Trajectory(1)
     Ruckig(1).calculate(wanted, trajectory)
     assert rest_to_rest(way, a, j) == pytest.approx(trajectory.duration, rel=1e-6)
+    for t in np.linspace(0.0, trajectory.duration, 21).tolist():
+        (there,), _, _ = trajectory.at_time(t)
+        assert gone_after(t, way, a, j) == pytest.approx(there, rel=1e-5, abs=1e-6 * way)
+    assert gone_after(-1.0, way, a, j) == 0.0
+    assert gone_after(trajectory.duration + 1.0, way, a, j) == way
 
 
 def test_numbers_that_are_none_are_refused(arm: Arm) -> None:

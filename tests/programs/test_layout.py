@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
-from app.errors import InputError
+from app.errors import CancelledError, InputError
+from app.planning.checkpoint import checked_by
 from app.programs.bench import Bench, Draft
-from app.programs.layout import Layout
+from app.programs.layout import FINDING, TIMING, Layout, PlanningStage
 from app.programs.order import Putting
 from app.programs.pour import PourDemo
 from app.programs.program import compiled
@@ -75,6 +78,47 @@ def test_the_same_step_is_planned_anew_when_things_stand_elsewhere(stage: Stage)
     assert compiled(parse(once), stage.rig, stage.begin()).steps == 5
     with pytest.raises(ScriptError, match=r"line 7.* and basin are .* too near"):
         compiled(parse(once.replace("times: 1", "times: 2")), stage.rig, stage.begin())
+
+
+LINES = "tool: tcp\nsteps:\n  - line: {by: {z: 20}}\n  - line: {by: {y: 20}}\n  - home\n"
+
+
+def test_planning_reports_each_step_of_both_phases(stage: Stage) -> None:
+    stages: list[PlanningStage] = []
+    compiled(parse(LINES), stage.rig, stage.begin(), report=stages.append)
+    phases = [(phase, step) for phase in (FINDING, TIMING) for step in range(1, 5)]
+    assert [(each.phase, each.step) for each in stages] == phases
+    shares = [each.share for each in stages]
+    assert shares[0] == pytest.approx(0.0)
+    assert shares == sorted(shares)
+    assert shares[-1] < 1.0
+
+
+def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
+    """Each phase is cancelled in its middle, and the longest gap between checkpoints is short."""
+    for phase in (FINDING, TIMING):
+        reached: list[PlanningStage] = []
+
+        def check() -> None:
+            if any(each == (phase, 3, 4) for each in reached):  # noqa: B023
+                raise CancelledError("enough")
+
+        with pytest.raises(CancelledError, match="enough"), checked_by(check):
+            compiled(parse(LINES), stage.rig, stage.begin(), report=reached.append)
+        assert reached[-1] == (phase, 3, 4)
+    gaps: list[float] = []
+    begun = time.thread_time()
+
+    def measure() -> None:
+        nonlocal begun
+        now = time.thread_time()
+        gaps.append(now - begun)
+        begun = now
+
+    with checked_by(measure):
+        compiled(parse(PourDemo().text), stage.rig, stage.begin())
+    assert len(gaps) > 1000
+    assert max(gaps) < 0.25
 
 
 @pytest.fixture

@@ -1,0 +1,161 @@
+"""Programs while they are planned, as a person at the page sees and steers them."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from app.api import answers
+from app.client import Client, connect
+from app.programs.script import parse
+from tests.browser.conftest import Windows
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+
+pytestmark = pytest.mark.long
+
+PLANNED = 60.0
+"""[s] In which a busy machine has planned anything here."""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    with windows.open(server.url, nodes=("/arm", "/target/move")) as page:
+        page.frame.get_by_text("Programs", exact=True).click()
+        yield page
+        assert page.errors == []
+
+
+@pytest.fixture
+def arm(server: AppServer) -> Iterator[Client]:
+    with connect(server.url, "Test") as arm:
+        yield arm
+
+
+def headline(page: ViserPage) -> str:
+    return page.page.inner_text("#headline")
+
+
+def orders(page: ViserPage) -> list[str]:
+    """Labels of the buttons in the bar that steer the program."""
+    return page.page.locator("#orders button").all_inner_texts()
+
+
+def press(page: ViserPage, label: str) -> None:
+    page.page.locator("#orders").get_by_role("button", name=label, exact=True).click()
+
+
+def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
+    """Until the bar's headline matches ``shown``."""
+    page.wait_until(lambda: re.fullmatch(shown, headline(page)) is not None, shown, seconds=seconds)
+
+
+def wait(arm: Client, condition: Callable[[answers.State], bool]) -> answers.State:
+    due = time.monotonic() + PLANNED
+    while not condition(state := arm.look(answers.State)):
+        assert time.monotonic() < due, state
+        time.sleep(0.02)
+    return state
+
+
+def test_a_cancelled_preview_leaves_the_planner_free(page: ViserPage, artefacts: Path) -> None:
+    page.choose("Script", "Pour")
+    page.click_button("Preview")
+    until(page, r"Planning Pour \d+%")
+    assert orders(page) == ["Cancel"]
+    assert "does not run by itself" in page.page.inner_text("#why")
+    page.keep(artefacts / "planning.png")
+    press(page, "Cancel")
+    until(page, "On target", 2.0)
+    page.wait_until(lambda: "cancelled" in page.text_of(".k450.program"), "the panel to say so")
+    assert orders(page) == []
+
+
+def test_a_previewed_plan_has_one_clock_and_is_run_at_once(
+    page: ViserPage, arm: Client, artefacts: Path
+) -> None:
+    page.choose("Script", "Pour")
+    page.click_button("Preview")
+    state = wait(arm, lambda state: state.program is not None and state.program.status == "ready")
+    assert state.program is not None
+    page.wait_until(lambda: "of motion" in page.text_of(".k450.program"), "its length")
+    said = re.search(r"([\d.]+) s of motion", page.text_of(".k450.program"))
+    assert said is not None
+    thumb = page._labelled("Look at").get_by_role("slider")
+    end = float(thumb.get_attribute("aria-valuemax") or 0)
+    assert float(said[1]) == pytest.approx(end)
+    assert state.program.seconds <= end < state.program.seconds + 0.1
+    page.keep(artefacts / "planning-previewed.png")
+    begun = time.monotonic()
+    page.click_button("Run")
+    wait(arm, lambda state: state.program is not None and state.program.status == "running")
+    assert time.monotonic() - begun < 2.0
+    page.press_in_bar("STOP")
+    wait(arm, lambda state: state.stopped is not None and not state.moving)
+    page.press_in_bar("Reset")
+    until(page, "On target", 5.0)
+
+
+def test_a_pause_while_it_is_planned_lasts_until_resume(
+    page: ViserPage, arm: Client, artefacts: Path
+) -> None:
+    page.choose("Script", "Square")
+    page.click_button("Run")
+    until(page, r"Planning Square \d+%")
+    assert orders(page) == ["Pause", "Cancel"]
+    height = page.page.locator("header").bounding_box()
+    page.click_button("Pause")
+    until(page, "Planning Square, paused")
+    assert orders(page) == ["Resume", "Cancel"]
+    assert page.page.locator("header").bounding_box() == height
+    page.keep(artefacts / "planning-paused.png")
+    until(page, "Square, paused")
+    before = arm.look(answers.State)
+    page.page.wait_for_timeout(1500)
+    after = arm.look(answers.State)
+    assert after.q == before.q
+    assert headline(page) == "Square, paused"
+    press(page, "Resume")
+    until(page, r"Square, step \d+ of \d+", 5.0)
+    wait(arm, lambda state: state.moving)
+    page.keep(artefacts / "planning-running.png")
+    # Its owner paces it by every control there is.
+    page.click_button("Pause")
+    until(page, "Square, paused", 5.0)
+    page.click_button("Resume")
+    until(page, r"Square, step .*", 5.0)
+    page.drag_slider("Speed", 30.0)
+    wait(arm, lambda state: 0.2 < state.speed < 0.4)
+    page.click_button("Wait")
+    until(page, "Square, paused", 5.0)
+    page.click_button("Resume")
+    until(page, r"Square, step .*", 5.0)
+    assert not page.page.locator("#toast.shown").is_visible()
+    page.press_in_bar("STOP")
+    wait(arm, lambda state: state.stopped is not None and not state.moving)
+    page.press_in_bar("Reset")
+    until(page, "On target", 5.0)
+
+
+def test_taught_poses_are_downloaded_where_there_is_no_folder(
+    page: ViserPage, tmp_path: Path
+) -> None:
+    page.click_button("Add pose")
+    page.wait_until(lambda: "1 pose" in page.text_of(".k450.program"), "the pose")
+    with page.page.expect_download() as downloading:
+        page.click_button("Save")
+    assert downloading.value.suggested_filename == "My script.yaml"
+    path = tmp_path / "My script.yaml"
+    downloading.value.save_as(path)
+    script = parse(path.read_text(encoding="utf-8"))
+    assert (script.name, len(script.steps)) == ("My script", 1)

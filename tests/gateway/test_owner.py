@@ -1,0 +1,248 @@
+"""The owner of a program, on a real server: by websocket, by HTTP and on the page's own sockets."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+from itertools import count
+from typing import Any
+
+import pytest
+
+from app.api import answers, requests
+from app.api.fields import Order
+from app.client import Client, RefusedError, connect
+from tests.browser.server import AppServer
+from tests.gateway.client import opened
+from tests.gateway.lines import post, speaking
+
+LINES = "".join(f"  - line: {{by: {{z: {z}}}}}\n" for z in (20, -20))
+SWEEPS = "".join(f"  - joints: [{angle}, -64, 85, 8, 0]\n" for angle in (60, -60, 50, -50, 40, -40))
+LONG = f"name: Long\ntool: tcp\nsteps:\n{SWEEPS}{LINES * 6}  - home\n"
+"""A script that takes a second or more to plan, and begins with a long motion."""
+
+NUMBERS = count()
+
+PROMPT = 0.5
+"""[s]"""
+
+
+@pytest.fixture
+def arm(server: AppServer) -> Iterator[Client]:
+    """A program that may be an owner; afterwards nothing runs and the arm is at home."""
+    with connect(server.url, "Owner") as arm:
+        yield arm
+        arm.ask(requests.Stop())
+        wait(arm, lambda state: not state.moving)
+        with connect(server.url, "Cleaner") as cleaner:
+            cleaner.ask(requests.Take())
+            cleaner.ask(requests.Reset())
+            cleaner.ask(requests.Resume())
+            cleaner.ask(requests.Speed(value=1.0))
+            cleaner.go(requests.Home())
+
+
+def wait(
+    arm: Client, until: Callable[[answers.State], bool], seconds: float = 40.0
+) -> answers.State:
+    due = time.monotonic() + seconds
+    while not until(state := arm.look(answers.State)):
+        assert time.monotonic() < due, (state.program, state.why)
+        time.sleep(0.01)
+    return state
+
+
+def status(state: answers.State) -> str:
+    return "" if state.program is None else state.program.status
+
+
+def send(arm: Client, text: str = LONG) -> None:
+    """Have it planned."""
+    for at in range(0, len(text), 150):
+        arm.ask(requests.Program(text=text[at : at + 150], more=at + 150 < len(text)))
+
+
+def planning(arm: Client) -> None:
+    """Have it planned, and run once it is; never a plan that is kept."""
+    send(arm, f"{LONG}# {next(NUMBERS)}\n")
+    arm.ask(requests.Steer(order=Order.RUN))
+    assert status(arm.look(answers.State)) == "planning"
+
+
+def stays(arm: Client, seconds: float = 1.0) -> None:
+    """The arm stands still for a while."""
+    before = arm.look(answers.State)
+    time.sleep(seconds)
+    after = arm.look(answers.State)
+    assert after.q == before.q
+    assert not after.moving
+
+
+@pytest.mark.parametrize("by", ["pause", "steer"])
+def test_pause_during_planning_lasts_until_resume(arm: Client, by: str) -> None:
+    planning(arm)
+    request = requests.Pause() if by == "pause" else requests.Steer(order=Order.PAUSE)
+    arm.ask(request)
+    start = wait(arm, lambda state: status(state) != "planning")
+    stays(arm)
+    state = arm.look(answers.State)
+    assert (status(state), state.status, state.q) == ("paused", "paused", start.q)
+    arm.ask(requests.Resume())
+    wait(arm, lambda state: status(state) == "running" and state.moving, 5.0)
+
+
+def test_pause_during_planning_over_http(server: AppServer, arm: Client) -> None:
+    for at in range(0, len(LONG), 300):
+        code, _ = post(server, do="program", text=LONG[at : at + 300], more=at + 300 < len(LONG))
+        assert code == 200
+    assert post(server, do="pause")[0] == 200
+    due = time.monotonic() + 40.0
+    while (state := post(server, do="look", at="state")[1])["program"]["status"] == "planning":
+        assert time.monotonic() < due
+        time.sleep(0.05)
+    assert post(server, do="steer", order="run")[0] == 200
+    stays(arm)
+    state = post(server, do="look", at="state")[1]
+    assert (state["program"]["status"], state["status"]) == ("paused", "paused")
+    assert post(server, do="speed", value=0.5)[0] == 200
+    code, refused = post(server, "another-that-posts", do="resume")
+    assert (code, refused["is"]) == (409, "refused")
+    assert post(server, do="resume")[0] == 200
+    wait(arm, lambda state: state.moving and state.speed == 0.5, 5.0)
+    assert post(server, do="pause")[0] == 200
+    wait(arm, lambda state: status(state) == "paused" and not state.moving, 5.0)
+    code, _ = post(server, "another-that-posts", do="stop")
+    assert code == 200
+    wait(arm, lambda state: state.stopped is not None and status(state) == "stopped", 5.0)
+
+
+@pytest.mark.parametrize("request_", [requests.Hold(), requests.Stop(), requests.Home()])
+def test_hold_stop_and_motions_during_planning_keep_it_from_running(
+    arm: Client, request_: requests.AnyRequest
+) -> None:
+    planning(arm)
+    arm.ask(request_)
+    if isinstance(request_, requests.Stop):
+        arm.ask(requests.Reset())
+    wait(arm, lambda state: status(state) != "planning")
+    stays(arm)
+    state = arm.look(answers.State)
+    assert state.program is not None
+    assert status(state) == "ready"
+    assert state.program.why.startswith("Not run")
+
+
+def test_planning_is_cancelled_at_once_and_the_planner_is_free(
+    server: AppServer, arm: Client
+) -> None:
+    planning(arm)
+    state = wait(arm, lambda state: state.program is not None and state.program.steps > 0)
+    assert state.program is not None
+    assert (state.program.name, state.program.steps) == ("Long", 20)
+    with connect(server.url, "Other") as other:
+        with pytest.raises(RefusedError, match="being planned"):
+            send(other, "steps: [home]\n")
+        begun = time.monotonic()
+        arm.ask(requests.Steer(order=Order.HALT))
+        assert status(arm.look(answers.State)) == "cancelled"
+        send(other, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
+        assert time.monotonic() - begun < PROMPT
+        state = wait(other, lambda state: status(state) == "ready")
+        assert state.program is not None
+        assert state.program.name == "Short"
+    stays(arm)
+
+
+def test_a_kept_plan_begins_at_once(arm: Client) -> None:
+    text = LONG + "# kept\n"
+    begun = time.monotonic()
+    send(arm, text)
+    wait(arm, lambda state: status(state) == "ready")
+    took = time.monotonic() - begun
+    begun = time.monotonic()
+    send(arm, text)
+    arm.ask(requests.Steer(order=Order.RUN))
+    wait(arm, lambda state: state.moving)
+    assert time.monotonic() - begun < 0.5 * took
+
+
+def test_a_moved_arm_is_planned_for_anew(arm: Client) -> None:
+    send(arm, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
+    wait(arm, lambda state: status(state) == "ready")
+    arm.joints([0.1, -1.1, 1.4, 0.3, 0.0])
+    arm.ask(requests.Steer(order=Order.RUN))
+    program = arm.look(answers.State).program
+    assert program is not None
+    assert (program.status, program.why) == ("planning", "Planned anew: the arm has moved.")
+    wait(arm, lambda state: status(state) == "done")
+
+
+def test_the_owner_paces_it_and_others_only_stop_it(server: AppServer, arm: Client) -> None:
+    planning(arm)
+    wait(arm, lambda state: state.moving)
+    arm.ask(requests.Pause())
+    wait(arm, lambda state: status(state) == "paused" and not state.moving, 5.0)
+    arm.ask(requests.Speed(value=0.2))
+    with connect(server.url, "Other") as other:
+        for request in (requests.Pause(), requests.Resume(), requests.Speed(value=1.0)):
+            with pytest.raises(RefusedError, match="Long holds the arm"):
+                other.ask(request)
+        assert status(other.look(answers.State)) == "paused"
+        arm.ask(requests.Resume())
+        state = wait(arm, lambda state: status(state) == "running" and state.moving, 5.0)
+        assert state.speed == 0.2
+        other.ask(requests.Stop())
+    wait(arm, lambda state: status(state) == "stopped" and not state.moving, 5.0)
+
+
+def test_a_program_on_the_tcp_port_paces_its_own(server: AppServer, arm: Client) -> None:
+    with speaking(server) as lines:
+        text = "name: Line\nsteps:\n  - joints: [60, -64, 85, 8, 0]\n  - home\n"
+        assert lines.answer(do="program", text=text)["is"] == "done"
+        wait(arm, lambda state: status(state) == "ready")
+        assert lines.answer(do="steer", order="run")["is"] == "done"
+        assert lines.answer(do="pause")["is"] == "done"
+        wait(arm, lambda state: status(state) == "paused")
+        assert lines.answer(do="resume")["is"] == "done"
+
+
+@pytest.mark.long
+def test_the_page_paces_its_own_program_by_both_its_sockets(server: AppServer, arm: Client) -> None:
+    async def driven() -> None:
+        async with opened(server.url) as (peer, control):
+
+            async def until(**wanted: Any) -> None:
+                async with asyncio.timeout(40.0):
+                    while True:
+                        state = await asyncio.to_thread(arm.look, answers.State)
+                        known = {"program": status(state), "speed": state.speed}
+                        if all(known[key] == wanted[key] for key in wanted):
+                            return
+                        await asyncio.sleep(0.02)
+
+            await peer.set("Script", value="Square")
+            await peer.set("Program", value="Run")
+            await control.wait(40.0, mood="planning")
+            assert control.status["headline"].startswith("Planning")
+            await peer.set("Motion", value="Pause")
+            await until(program="paused")
+            await control.wait(headline="Square, paused", orders=["resume"])
+            await peer.set("Motion", value="Resume")
+            await until(program="running")
+            await peer.set("Speed", value=20.0)
+            await until(speed=0.2)
+            await peer.set("Program", value="Wait")
+            await until(program="paused")
+            await control.say("resume")
+            await until(program="running")
+            await control.say("speed", value=0.3)
+            await until(speed=0.3)
+            assert not [each for each in control.heard if each["is"] == "refused"]
+            async with opened(server.url) as (stranger, watching):
+                await stranger.set("Motion", value="Pause")
+                refused = await watching.notice("refused")
+                assert "Square holds the arm" in refused["why"]
+                await until(program="running")
+
+    asyncio.run(driven())

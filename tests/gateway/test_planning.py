@@ -1,0 +1,290 @@
+"""Pause, hold, stop and cancel while a program is planned, and the plan that is kept."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.api.fields import Order
+from app.control import commands as cmd
+from app.control.lease import Role
+from app.control.session import Session
+from app.control.things import Form, Thing
+from app.errors import LeaseError
+from app.gateway import planning, status
+from app.gateway.hub import Window
+from app.geometry import se3
+from app.planning.checkpoint import checkpoint
+from app.programs.layout import TIMING, PlanningStage
+from app.programs.program import compiled
+from tests.gateway.test_hub import PAGES
+from tests.gateway.test_performer import SCRIPT, Staged
+
+PROMPT = 0.5
+"""[s] Within which a cancelled planning has ended."""
+
+
+class Slow:
+    """Planning that lasts until it is released."""
+
+    def __init__(self) -> None:
+        self.released = threading.Event()
+        self.begun = 0
+        self._compiled = compiled
+
+    def compiled(self, *args: Any) -> Any:
+        self.begun += 1
+        args[-1](PlanningStage(TIMING, 1, 2))
+        while not self.released.wait(0.002):
+            checkpoint()
+        return self._compiled(*args)
+
+
+@pytest.fixture
+def table(session: Session) -> Staged:
+    return Staged(session)
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
+    slow = Slow()
+    monkeypatch.setattr(planning, "compiled", slow.compiled)
+    yield slow
+    slow.released.set()
+
+
+def ask(table: Staged, window: Window, then: Order | None = Order.RUN) -> None:
+    """Run ``SCRIPT`` as the panel of the page asks for it."""
+    table.hub.performer.touch(window)
+    table.hub.performer.plan(SCRIPT, then)
+    table.wait(0.1, window)
+
+
+def finish(table: Staged, window: Window, slow: Slow) -> None:
+    slow.released.set()
+    due = time.monotonic() + 20.0
+    while table.status == "planning" and time.monotonic() < due:
+        time.sleep(0.005)
+    table.wait(0.2, window)
+
+
+def followed(table: Staged) -> bool:
+    return any(isinstance(command, cmd.Follow) for command in table.arm.commands)
+
+
+def bar(table: Staged, window: Window) -> dict[str, Any]:
+    return status.common(table.hub) | status.of(table.hub, window)
+
+
+def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
+    window = table.join(PAGES[0])
+    ask(table, window)
+    table.hub.performer.steer(window, Order.PAUSE)
+    assert isinstance(table.arm.commands[-1], cmd.Pause)
+    table.arm.rest = replace(table.arm.rest, paused=True)
+    shown = bar(table, window)
+    assert shown["headline"] == "Planning Wave, paused"
+    assert shown["orders"] == ["resume", "halt"]
+    finish(table, window, slow)
+    assert table.status == "paused"
+    assert bar(table, window)["headline"] == "Wave, paused"
+    assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
+    table.wait(60.0, window)
+    assert not followed(table)
+    table.hub.performer.steer(window, Order.RESUME)
+    assert isinstance(table.arm.commands[-1], cmd.Resume)
+    table.arm.rest = replace(table.arm.rest, paused=False)
+    table.wait(0.1, window)
+    assert table.status == "running"
+
+
+def test_run_of_a_finished_plan_does_not_end_a_pause(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window)
+    table.arm.rest = replace(table.arm.rest, paused=True)
+    table.hub.performer.steer(window, Order.RUN)
+    table.wait(60.0, window)
+    assert table.status == "paused"
+    assert not followed(table)
+
+
+def test_other_commands_during_planning_keep_the_program_from_running(
+    table: Staged, slow: Slow
+) -> None:
+    window = table.join(PAGES[0])
+    ask(table, window)
+    table.hub.performer.redirected()
+    assert "does not run by itself" in bar(table, window)["why"]
+    finish(table, window, slow)
+    told = table.hub.performer.told()
+    assert told is not None
+    assert told.status == "ready"
+    assert told.why.startswith("Not run: the arm was told something else")
+    assert not table.hub.performer.running
+
+
+def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
+    window = table.join(PAGES[0])
+    ask(table, window, None)
+    table.hub.stop("Anybody")
+    performer = table.hub.performer
+    with pytest.raises(LeaseError, match="reset it first"):
+        performer.steer(window, Order.RUN)
+    with pytest.raises(LeaseError, match="reset it first"):
+        performer.plan(SCRIPT, Order.RUN)
+    finish(table, window, slow)
+    q = table.arm.rest.setpoint + 0.01
+    motion = replace(table.arm.rest.motion, q=q)
+    table.arm.rest = replace(table.arm.rest, q=q, goal=q, motion=motion)
+    with pytest.raises(LeaseError, match="reset it first"):
+        performer.steer(window, Order.RUN)
+    table.hub.reset(window)
+    table.wait(1.0, window)
+    assert table.status == "ready"
+    assert not performer.running
+
+
+def test_a_run_asked_for_while_planning_is_done_after_it(table: Staged, slow: Slow) -> None:
+    window, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    ask(table, window, None)
+    assert bar(table, window)["orders"] == ["halt"]
+    assert bar(table, other)["orders"] == []
+    for order in Order:
+        with pytest.raises(LeaseError, match="is Window 1's"):
+            table.hub.performer.steer(other, order)
+    table.hub.performer.steer(window, Order.RUN)
+    finish(table, window, slow)
+    assert table.status == "running"
+
+
+def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, slow: Slow) -> None:
+    window, other = (table.join(page) for page in PAGES)
+    ask(table, window)
+    job = table.hub.performer._planning
+    assert job is not None
+    with pytest.raises(LeaseError, match="being planned"):
+        table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
+    table.hub.performer.steer(window, Order.HALT)
+    assert table.status == "cancelled"
+    table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
+    assert table.status == "planning"
+    job.thread.join(PROMPT)
+    assert not job.thread.is_alive()
+    finish(table, other, slow)
+    assert table.status == "ready"
+    assert not table.hub.performer.running
+
+
+def test_planning_of_an_owner_who_is_gone_makes_way(table: Staged, slow: Slow) -> None:
+    window, other = (table.join(page) for page in PAGES)
+    ask(table, window)
+    table.hub.leave(window)
+    table.wait(2.0, other)
+    assert not table.hub.performer.waits
+    table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
+    finish(table, other, slow)
+    told = table.hub.performer.told()
+    assert told is not None
+    assert (told.status, told.by) == ("ready", other.person.name)
+
+
+def test_a_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) -> None:
+    slow.released.set()
+    window = table.join(PAGES[0])
+    ask(table, window, None)
+    finish(table, window, slow)
+    before = table.hub.performer.program
+    ask(table, window)
+    assert table.status == "running"
+    assert table.hub.performer.program is before
+    assert slow.begun == 1
+    table.hub.performer.steer(window, Order.HALT)
+    table.hub.performer.script(window, SCRIPT, more=False, speed=0.5)
+    finish(table, window, slow)
+    assert slow.begun == 2
+
+
+@pytest.mark.parametrize("moved", ["arm", "scene", "gripper"])
+def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) -> None:
+    slow.released.set()
+    window = table.join(PAGES[0])
+    ask(table, window, None)
+    finish(table, window, slow)
+    rest = table.arm.rest
+    match moved:
+        case "arm":
+            q = rest.setpoint + np.array((0.01, 0.0, 0.0, 0.0, 0.0))
+            table.arm.rest = replace(rest, q=q, goal=q, motion=replace(rest.motion, q=q))
+        case "gripper":
+            table.arm.rest = replace(rest, gripper=0.1, gripper_setpoint=0.1, gripper_goal=0.1)
+        case "scene":
+            T = se3.from_rotation_translation(np.eye(3), np.array((0.0, -0.8, 0.0)))
+            box = Thing("box", Form.BOX, (0.05, 0.05, 0.05), T)
+            table.arm.rest = replace(rest, things=(box,))
+    slow.released.clear()
+    table.hub.performer.steer(window, Order.RUN)
+    told = table.hub.performer.told()
+    assert told is not None
+    assert told.status == "planning"
+    assert moved in told.why
+    assert moved in bar(table, window)["why"]
+    finish(table, window, slow)
+    assert (table.status, slow.begun) == ("running", 2)
+
+
+def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> None:
+    window = table.join(PAGES[0])
+    ask(table, window, None)
+    shown = bar(table, window)
+    assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20%")
+    assert shown["why"] == "Step 1 of 2: timing paths, 20%. It does not run by itself."
+    table.arm.moves = True
+    shown = bar(table, window)
+    assert (shown["mood"], shown["headline"]) == ("moving", "Moving")
+    assert shown["why"].startswith("Planning Wave. Step 1 of 2")
+    table.arm.moves = False
+    table.hub.stop("Anybody")
+    assert bar(table, window)["mood"] == "stopping"
+    table.hub.reset(window)
+    finish(table, window, slow)
+    assert bar(table, window)["headline"] == "On target"
+
+
+def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
+    owner, other = (table.join(page) for page in PAGES)
+    table.plan(owner)
+    performer, hub = table.hub.performer, table.hub
+    performer.steer(owner, Order.RUN)
+    hub.move(performer.actor(owner), cmd.Pause())
+    assert isinstance(table.arm.commands[-1], cmd.Pause)
+    hub.set_speed(performer.actor(owner), 0.5)
+    assert table.arm.share == 0.5
+    with pytest.raises(LeaseError, match="Wave holds the arm"):
+        hub.move(performer.actor(other), cmd.Pause())
+    with pytest.raises(LeaseError, match="Wave holds the arm"):
+        hub.set_speed(performer.actor(other), 1.0)
+    assert bar(table, owner)["orders"] == ["pause"]
+    assert bar(table, other)["orders"] == []
+    # The page of the owner is loaded anew.
+    hub.leave(owner)
+    again = table.join(PAGES[0])
+    hub.move(performer.actor(again), cmd.Resume())
+
+
+def test_a_persons_speed_holds_to_the_end_of_the_program(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
+    table.hub.performer.steer(window, Order.RUN)
+    table.wait(0.5, window)
+    table.arm.rest = replace(table.arm.rest, speed=0.3)
+    table.wait(3.0, window)
+    told = [each.value for each in table.arm.commands if isinstance(each, cmd.SpeedScale)]
+    assert told == [1.0, 0.3]
+    assert table.status == "done"
+    assert table.arm.share == 0.3
