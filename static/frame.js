@@ -15,7 +15,8 @@
   // viser draws faintly until the light of the room is loaded. Where drawing takes as long as that it
   // loses count and leaves the picture faint for good.
   const clear = new CSSStyleSheet();
-  clear.replaceSync("canvas { opacity: 1 !important }");
+  clear.replaceSync(`canvas { opacity: 1 !important }
+    input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
   document.adoptedStyleSheets.push(clear);
 
   // The policy of this page lets no text become code. viser tries that once, for clouds of splats,
@@ -125,6 +126,7 @@
         tries = 0;
       }
       if (data?.type !== "message_batch" || data.ours) return;
+      Fields.hear(data.messages);
       seen += 1;
       tell((message) => super.postMessage(message));
       const ready = data.messages.some(({ type }) => type === "ReplayDoneMessage");
@@ -139,6 +141,7 @@
     }
   };
 
+  Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });
   window.addEventListener("blur", () => outer?.katana?.blur());

@@ -96,7 +96,7 @@
   window.addEventListener("blur", blur);
   // viser's page has a switch for this; until it is there the system's choice counts.
   const theme = (name) => (document.documentElement.dataset.theme = name);
-  window.katana = { key, blur, theme };
+  window.katana = { key, blur, theme, toast };
 
   // What is shown
 

@@ -1,4 +1,4 @@
-"""viser's own page, with our script in front of its own, and the hashes that let both run."""
+"""viser's own page, with our scripts in front of its own, and the hashes that let both run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ LOADER = re.compile(
 
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
 
-OUR_SCRIPT = '<script src="../static/frame.js"></script>'
+OUR_SCRIPTS = "".join(
+    f'<script src="../static/{name}.js"></script>' for name in ("fields", "frame")
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def load() -> ViserPage:
     unpacked = zstandard.ZstdDecompressor().decompress(
         _bytes(packed), max_output_size=int(style) + int(program)
     )
-    ours = html[: found.start()] + OUR_SCRIPT + html[found.start() :]
+    ours = html[: found.start()] + OUR_SCRIPTS + html[found.start() :]
     hashes = (_hash(loader.encode()), _hash(unpacked[int(style) :]))
     return ViserPage(ours.encode(), hashes)
 

@@ -327,10 +327,16 @@ class ViserPage:
         self.page.mouse.up()
         return self.slider_value(label)
 
+    def number_box(self, label: str, *, index: int = 0) -> Locator:
+        """The box for a number beside a label, or one of several boxes there."""
+        row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
+        return row.locator("input:not([type=hidden])").nth(index)
+
     def type_number(self, label: str, value: float, *, index: int = 0) -> None:
         """Type a number into the box beside a label, or into one of several boxes there."""
-        row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
-        row.locator("input:not([type=hidden])").nth(index).fill(str(value))
+        box = self.number_box(label, index=index)
+        box.fill(str(value))
+        box.press("Enter")
         # viser holds changes back and forgets all but the newest of any control.
         self.page.wait_for_timeout(2 * THROTTLE_MILLISECONDS)
 
