@@ -1,4 +1,4 @@
-"""Number boxes of the panel: a typed value is sent on Enter or when the box is left, never before."""
+"""Number boxes of the panel: a value is sent on Enter or when the box is left, never before."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth
     page.wait_until(lambda: "5-0 is not a number" in toast(page), "the reason")
 
 
-def test_leaving_the_box_sends_the_value(page: ViserPage, truth: Truth) -> None:
+def test_leaving_the_box_sends_the_value(page: ViserPage) -> None:
     watch = Watch(page)
     type_slowly(page, page.number_box("Axis 1"), "12.5")
     page.page.keyboard.press("Tab")
@@ -156,7 +156,7 @@ def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Tru
     assert np.allclose(truth.status()["q"], READY, atol=1e-9)
 
 
-def test_arrow_keys_step_the_typed_value(page: ViserPage, truth: Truth) -> None:
+def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
     box = page.number_box("Axis 1")
     watch = Watch(page)
     type_slowly(page, box, "20")
@@ -195,7 +195,8 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
     page.frame.evaluate("() => document.activeElement.blur()")
     page.number_box("Speed").evaluate(
         """(box) => {
-            Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(box, "80");
+            const { prototype } = HTMLInputElement;
+            Object.getOwnPropertyDescriptor(prototype, "value").set.call(box, "80");
             for (const kind of ["input", "change"])
                 box.dispatchEvent(new Event(kind, { bubbles: true }));
         }"""
