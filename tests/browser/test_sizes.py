@@ -1,4 +1,4 @@
-"""The page at every size and in both themes: arm and gizmo in the picture, and nothing over them."""
+"""The page at every size and in both themes: arm and gizmo are in the picture, under nothing."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_arm_and_gizmo_are_in_the_picture_at_every_size(desk: ViserPage, artefac
     wait_whole(desk, "at first")
     first = eye(desk)
     for scheme in ("light", "dark"):
-        desk.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        desk.page.emulate_media(color_scheme=scheme)
         for size in SIZES:
             resize(desk, size)
             wait_whole(desk, f"at {size}")
@@ -195,7 +195,7 @@ def test_every_mood_has_a_lamp_that_is_seen(desk: ViserPage) -> None:
         return colours[0], colours[1]
 
     for scheme in ("light", "dark"):
-        desk.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        desk.page.emulate_media(color_scheme=scheme)
         neutral, _ = lamp("nothing that is known")
         for mood in MOODS:
             colour, ground = lamp(mood)
@@ -252,8 +252,10 @@ def test_on_a_phone_by_night_and_a_slow_line_all_is_dark_and_seen_from_the_first
         # The system changes, and so do both documents and the room.
         page.page.emulate_media(color_scheme="light")
         page.wait_until(
-            lambda: page.frame.evaluate("document.documentElement.dataset.mantineColorScheme")
-            == "light",
+            lambda: (
+                page.frame.evaluate("document.documentElement.dataset.mantineColorScheme")
+                == "light"
+            ),
             "the day",
         )
         sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
