@@ -109,7 +109,7 @@ UNHURRIED = 0.5
 
 def pouring(page: ViserPage) -> None:
     """Initial, grasping, approaching, emptying."""
-    # Room for a banner of ours, which there is while the picture is old.
+    # The taller the scene, the closer its middle is seen.
     page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1] + 200})
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []

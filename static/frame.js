@@ -1,11 +1,13 @@
 // In viser's page, before its own script. It says which page around it this is, tells the gateway
-// what is on the screen, keeps camera and theme over a lost connection, and hands keys to the page.
+// what is on the screen, keeps the camera over a lost connection, gives the scene its theme, and hands
+// keys to the page.
 "use strict";
 (() => {
   const TELL_EVERY = 50; // ms
   const AGAIN = 100; // ms
   const TRIES = 30;
-  const THEME = "katana450.theme";
+  // Of each theme: what the floor's message holds, and the file of the sky.
+  const ROOMS = JSON.parse(document.currentScript.dataset.rooms);
   const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
 
@@ -13,9 +15,12 @@
   document.hasFocus = () => true;
 
   // viser draws faintly until the light of the room is loaded. Where drawing takes as long as that it
-  // loses count and leaves the picture faint for good.
+  // loses count and leaves the picture faint for good. It also starts light, whatever the theme.
   const clear = new CSSStyleSheet();
-  clear.replaceSync("canvas { opacity: 1 !important }");
+  clear.replaceSync(`canvas { opacity: 1 !important }
+    html[data-theme=dark] { color-scheme: dark; background: #14181d }
+    html[data-theme=dark]:not([data-mantine-color-scheme=dark]) #root { opacity: 0 }
+    input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
   document.adoptedStyleSheets.push(clear);
 
   // The policy of this page lets no text become code. viser tries that once, for clouds of splats,
@@ -34,8 +39,8 @@
   let camera = null; // where this person last looked from
   let kept = null; //   the same, from when the line is back until viser looks from there again
   let tries = 0;
-  let replayed = false;
-  let themes = null; // the id of the buttons for it
+  const groups = new Map(); // the labels of the rows of buttons, by their ids
+  const room = new Map(); //   the last message of each kind that the theme decides on
   let seen = 0;
   let told = 0;
   let telling = false;
@@ -66,16 +71,25 @@
       { type: "SetCameraLookAtMessage", look_at, initial: false },
       { type: "SetCameraPositionMessage", position, initial: false },
     ];
-    const data = { type: "message_batch", messages, ours: true };
-    worker.dispatchEvent(new MessageEvent("message", { data }));
+    say(worker, messages);
   }
 
-  // viser starts light likewise. What was chosen in this tab counts, else the system's choice; the
-  // page around goes along.
-  const system = matchMedia("(prefers-color-scheme: dark)");
-  const theme = () => sessionStorage.getItem(THEME) ?? (system.matches ? "Dark" : "Light");
-  const around = () => outer?.katana?.theme(theme().toLowerCase());
-  around();
+  // The server gives every window the light theme. Each is changed to its own here, before viser sees
+  // it: no answer of the server has to be waited for, which a slow page would miss.
+  function dress(messages) {
+    const { sky, dark, ...floor } = ROOMS[Theme.name()];
+    for (const message of messages) {
+      if (message.type === "ThemeConfigurationMessage") message.dark_mode = dark;
+      else if (message.name === "/floor" && message.type === "GridMessage") Object.assign(message.props, floor);
+      else if (message.type === "BackgroundImageMessage")
+        message.rgb_data = Uint8Array.from(atob(sky), (byte) => byte.charCodeAt(0));
+      else continue;
+      room.set(message.type, message);
+    }
+  }
+
+  const say = (worker, messages) =>
+    worker.dispatchEvent(new MessageEvent("message", { data: { type: "message_batch", messages, ours: true } }));
 
   const same = (a, b) =>
     ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-3));
@@ -89,15 +103,21 @@
     }
 
     postMessage(data, ...rest) {
-      if (data?.type === "set_server" && page)
-        data = { ...data, server: `${data.server}?page=${page}` };
-      if (data?.type === "send" && data.message.type === "ViewerCameraMessage") this.#looks(data.message);
-      if (data?.type === "set_server") system.onchange = () => this.#dress();
-      if (data?.type === "send" && themes && data.message.uuid === themes) {
-        sessionStorage.setItem(THEME, data.message.updates.value);
-        around();
+      if (data?.type === "set_server") {
+        if (page) data = { ...data, server: `${data.server}?page=${page}` };
+        Theme.follow(() => this.#redress());
       }
+      if (data?.type === "send" && data.message.type === "ViewerCameraMessage") this.#looks(data.message);
+      const group = data?.type === "send" && groups.get(data.message.uuid);
+      if (group === "Theme") return Theme.choose(data.message.updates.value);
+      if (group === "View") Fit.choose(data.message.updates.value);
       super.postMessage(data, ...rest);
+    }
+
+    #redress() {
+      const messages = [...room.values()].map((message) => structuredClone(message));
+      dress(messages);
+      say(this, messages);
     }
 
     #looks(message) {
@@ -109,36 +129,30 @@
       }
     }
 
-    #dress() {
-      around();
-      if (!replayed || !themes) return;
-      const message = { type: "GuiUpdateMessage", uuid: themes, updates: { value: theme() } };
-      super.postMessage({ type: "send", message });
-    }
-
     #hear(data) {
       if (data?.type === "connected") {
         seen = 0;
-        replayed = false;
-        themes = null;
+        groups.clear();
         kept = camera;
         tries = 0;
       }
       if (data?.type !== "message_batch" || data.ours) return;
+      Fields.hear(data.messages);
       seen += 1;
       tell((message) => super.postMessage(message));
       const ready = data.messages.some(({ type }) => type === "ReplayDoneMessage");
-      replayed ||= ready;
-      // While the arm is still being started, the panel comes later.
-      const buttons = data.messages.find(({ type, props }) => type === "GuiButtonGroupMessage" && props.label === "Theme");
-      themes = buttons?.uuid ?? themes;
-      if ((ready || buttons) && theme() === "Dark") this.#dress();
+      dress(data.messages);
+      for (const { type, uuid, props } of data.messages)
+        if (type === "GuiButtonGroupMessage") groups.set(uuid, props.label);
+      Fit.hear(data.messages);
+      if (ready) Fit.begin();
       if (!kept || tries > 0 || !ready) return;
       tries = 1;
       setTimeout(() => kept && look(this), AGAIN);
     }
   };
 
+  Fields.begin((words) => outer?.katana?.toast(words));
   for (const kind of ["keydown", "keyup"])
     window.addEventListener(kind, (event) => outer?.katana?.key(event), { capture: true });
   window.addEventListener("blur", () => outer?.katana?.blur());

@@ -2,6 +2,7 @@
 "use strict";
 (() => {
   const STALE = 1.0; // s after which a picture must not pass for the present
+  const SLOW = 150; // ms of a round trip
   const QUIET = 1000; // ms without a word after which the line counts as bad
   const ANSWER = 250; // ms that a STOP may take before it is sent another way too
   const TOAST = 4000; // ms
@@ -10,7 +11,7 @@
   const OPEN = "katana450.instruments.open";
   // What of the address is for viser; anything else would be a stranger's wish.
   const ORDERS = { pause: "Pause", resume: "Resume", halt: "Cancel" };
-  const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr|darkMode)$/;
+  const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
 
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
@@ -95,9 +96,7 @@
 
   for (const kind of ["keydown", "keyup"]) window.addEventListener(kind, key, { capture: true });
   window.addEventListener("blur", blur);
-  // viser's page has a switch for this; until it is there the system's choice counts.
-  const theme = (name) => (document.documentElement.dataset.theme = name);
-  window.katana = { key, blur, theme };
+  window.katana = { key, blur, toast };
 
   // What is shown
 
@@ -183,7 +182,7 @@
     const lost = !up;
     const bad = !lost && (silent > QUIET || age >= STALE);
     const line = byId("link");
-    line.className = lost ? "lost" : bad || age >= 0.4 || trip > 150 ? "slow" : "";
+    line.className = lost ? "lost" : bad || age >= 0.4 || trip > SLOW ? "slow" : "";
     const old = age >= 0.3 ? `, ${age.toFixed(1)} s old` : "";
     line.lastElementChild.textContent = lost ? "No line" : trip === null ? "" : `${Math.round(trip)} ms${old}`;
     body.classList.toggle("stale", lost || bad);
@@ -194,7 +193,11 @@
       ? asking !== null
         ? "No line to the arm: your STOP goes out as soon as it is back."
         : "No line to the arm: what you see is old. Trying to get it back."
-      : "A slow line: what you see is old.";
+      : silent > QUIET
+        ? "Nothing heard from the arm: what you see is old."
+        : trip > SLOW
+          ? "The line is slow: what you see is old."
+          : "The line is quick, but what you see is old: this device may draw too slowly.";
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
   }
 

@@ -1,11 +1,13 @@
-"""viser's own page, with our script in front of its own, and the hashes that let both run."""
+"""viser's own page, with our scripts in front of its own, and the hashes that let both run."""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,8 @@ import viser
 import zstandard
 
 from app.errors import ConfigurationError
+from app.render.png import png
+from app.view.room import THEMES, gradient
 
 INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"
 
@@ -24,7 +28,8 @@ LOADER = re.compile(
 
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
 
-OUR_SCRIPT = '<script src="../static/frame.js"></script>'
+OUR_SCRIPTS = ("theme", "fields", "fit", "sheet", "frame")
+"""Names of our files in the order in which they run; the last one is given the themes."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +54,27 @@ def load() -> ViserPage:
     unpacked = zstandard.ZstdDecompressor().decompress(
         _bytes(packed), max_output_size=int(style) + int(program)
     )
-    ours = html[: found.start()] + OUR_SCRIPT + html[found.start() :]
+    ours = html[: found.start()] + _our_scripts() + html[found.start() :]
     hashes = (_hash(loader.encode()), _hash(unpacked[int(style) :]))
     return ViserPage(ours.encode(), hashes)
+
+
+def _our_scripts() -> str:
+    """The script elements, with each theme's colours as viser's messages hold them."""
+    rooms = {
+        name: {
+            "cell_color": theme.cell,
+            "section_color": theme.section,
+            "plane_color": theme.floor,
+            "shadow_opacity": theme.shadow,
+            "dark": theme.dark,
+            "sky": base64.b64encode(png(gradient(theme.sky, theme.floor))).decode(),
+        }
+        for name, theme in THEMES.items()
+    }
+    *first, last = (f'src="../static/{name}.js"' for name in OUR_SCRIPTS)
+    last += f' data-rooms="{escape(json.dumps(rooms))}"'
+    return "".join(f"<script {each}></script>" for each in (*first, last))
 
 
 def _hash(script: bytes) -> str:

@@ -7,12 +7,11 @@ import viser
 BRAND = (36, 119, 212)
 
 
-def dress(gui: viser.GuiApi, *, dark: bool) -> None:
-    """Give the panel our colours; for the whole server or for one browser, whose ``gui`` it is."""
+def dress(gui: viser.GuiApi) -> None:
+    """Give the panel of every window our colours."""
     gui.configure_theme(
         control_width="medium",
         show_logo=False,
         show_share_button=False,
         brand_color=BRAND,
-        dark_mode=dark,
     )

@@ -10,7 +10,7 @@ import viser
 
 from app.view.cameras import Preset
 from app.view.reachability import Cut, ReachabilityCloud
-from app.view.room import THEMES, give
+from app.view.room import THEMES
 
 PERSONAL = ("View", "Theme")
 """Labels of the controls that concern no window but the one they are clicked in."""
@@ -79,10 +79,5 @@ def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
 
 
 def add_themes(gui: viser.GuiApi) -> None:
-    """Light or dark, each for the browser it is clicked in."""
-    themes = gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")
-
-    @themes.on_click
-    def _(event: viser.GuiEvent[Any]) -> None:
-        if event.client is not None:
-            give(event.client, THEMES[themes.value])
+    """Light or dark. The page changes its own theme; the server does not see the click."""
+    gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")

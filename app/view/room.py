@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import viser
 
-from app.view.brand import dress
 from app.view.scene import Colour
 
 
@@ -35,7 +33,7 @@ THEMES = {"Light": LIGHT, "Dark": DARK}
 
 
 def furnish(server: viser.ViserServer) -> None:
-    """Light the scene and give it the light theme."""
+    """Light the scene and give it the light theme; a dark window's page changes it to its own."""
     scene = server.scene
     scene.configure_default_lights(enabled=False)
     # Key from the left and above, in front: it models the cheeks; the rim parts arm from sky.
@@ -50,13 +48,6 @@ def furnish(server: viser.ViserServer) -> None:
 
 KEY, RIM, FILL = (0.7, -0.9, 1.9), (-1.0, 1.4, 0.9), (1.2, 1.0, 0.6)
 """[m] Where each light shines from, towards the base."""
-
-
-def give(client: viser.ClientHandle, theme: Theme) -> None:
-    """Show the room and the panel of one browser in ``theme``; the others keep theirs."""
-    with client.atomic():
-        _paint(client.scene, theme)
-        dress(client.gui, dark=theme.dark)
 
 
 def _paint(scene: viser.SceneApi, theme: Theme) -> None:
@@ -75,9 +66,10 @@ def _paint(scene: viser.SceneApi, theme: Theme) -> None:
         shadow_opacity=theme.shadow,
         position=(0.0, 0.0, FLOOR_AT),
     )
-    scene.set_background_image(_gradient(theme.sky, theme.floor), format="png")
+    scene.set_background_image(gradient(theme.sky, theme.floor), format="png")
 
 
-def _gradient(top: Colour, bottom: Colour) -> npt.NDArray[Any]:
-    rows = np.linspace(top, bottom, 128).round().astype(np.uint8)
+def gradient(top: Colour, bottom: Colour) -> npt.NDArray[np.uint8]:
+    """The sky as a picture (128, 2, 3): from ``top`` down to ``bottom``."""
+    rows: npt.NDArray[np.uint8] = np.linspace(top, bottom, 128).round().astype(np.uint8)
     return np.repeat(rows[:, None, :], 2, axis=1)

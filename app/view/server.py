@@ -78,7 +78,7 @@ async def _ignore(_client_id: Any, _message: Any) -> None:
 
 def _dress(server: viser.ViserServer) -> None:
     """What a page takes over when it connects, and so must stand before the first one does."""
-    dress(server.gui, dark=False)
+    dress(server.gui)
     server.gui.set_panel_label("Katana450")
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")

@@ -103,24 +103,33 @@ class ViserPage:
         nodes: Sequence[str] = (),
         drawing: Drawing = Drawing.PICTURES,
         window: tuple[int, int] = WINDOW,
+        own_camera: bool = False,
+        script: str = "",
+        **context_options: Any,
     ) -> Self:
         """Open `url` in a window of its own and wait until the scene can be used.
 
-        `nodes` must be there besides whatever the server has sent by then.
+        `nodes` must be there besides whatever the server has sent by then. With `own_camera` the
+        page looks from where it would for a person. `script` runs first in both documents;
+        `context_options` are Playwright's.
         """
         camera = camera or Camera()
         width, height = window
-        context = browser.new_context(viewport={"width": width, "height": height})
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, **context_options
+        )
         best = drawing is Drawing.BEST
         options = json.dumps({"draws": drawing is Drawing.ALWAYS, "fullQuality": best})
         scripts = "\n".join(path.read_text(encoding="utf-8") for path in SCRIPTS)
-        context.add_init_script(f"window.harness = {options};\n{scripts}")
+        context.add_init_script(f"window.harness = {options};\n{scripts}\n{script}")
         page = context.new_page()
         errors: list[str] = []
         page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
         try:
-            page.goto(f"{url}/?{camera.query(1.0 if best else COARSE)}")
+            pixels = 1.0 if best else COARSE
+            query = f"fixedDpr={pixels}" if own_camera else camera.query(pixels)
+            page.goto(f"{url}/?{query}")
             viser_page = cls(page, _viser_frame(page), errors)
             viser_page.wait_ready(nodes)
         except BaseException:
@@ -327,10 +336,16 @@ class ViserPage:
         self.page.mouse.up()
         return self.slider_value(label)
 
+    def number_box(self, label: str, *, index: int = 0) -> Locator:
+        """The box for a number beside a label, or one of several boxes there."""
+        row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
+        return row.locator("input:not([type=hidden])").nth(index)
+
     def type_number(self, label: str, value: float, *, index: int = 0) -> None:
         """Type a number into the box beside a label, or into one of several boxes there."""
-        row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
-        row.locator("input:not([type=hidden])").nth(index).fill(str(value))
+        box = self.number_box(label, index=index)
+        box.fill(str(value))
+        box.press("Enter")
         # viser holds changes back and forgets all but the newest of any control.
         self.page.wait_for_timeout(2 * THROTTLE_MILLISECONDS)
 

@@ -1,0 +1,120 @@
+// Number boxes of viser's panel. viser sends each keystroke, and the arm would go to 5, 50 and 500.
+// Here what is typed is a draft that viser does not see before Enter or before the box is left.
+"use strict";
+const Fields = (() => {
+  const BOX = "input.mantine-NumberInput-input";
+  const UNFINISHED = /^-?\.?$/;
+  const STEPS = { ArrowUp: 1, ArrowDown: -1 };
+
+  const controls = new Map(); // the range and step of each control, by its id
+  const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  let box = null; // the box that has the focus
+  let sending = false;
+  let tell = () => {};
+
+  const isBox = (target) => target instanceof Element && target.matches(BOX);
+  const halted = () => window.parent.document.body.dataset.mood === "stopped";
+
+  // The value that viser shows is the element's default value.
+  const changed = (field) => field.value !== field.defaultValue;
+
+  function range(field) {
+    const row = field.closest(":has(label[for])");
+    const label = row?.querySelector("label[for]");
+    const { min = null, max = null, step = 1 } = controls.get(label?.htmlFor) ?? {};
+    const index = row ? [...row.querySelectorAll(BOX)].indexOf(field) : 0;
+    const [low, high] = [min, max].map((end) => (Array.isArray(end) ? end[index] : end));
+    return { label: label?.textContent ?? "", low: low ?? -Infinity, high: high ?? Infinity, step };
+  }
+
+  // Why the draft cannot be sent; empty when it can.
+  function objection(field) {
+    const { low, high } = range(field);
+    const value = field.value.trim() === "" ? NaN : Number(field.value);
+    if (!Number.isFinite(value)) return "is not a number";
+    return value < low || value > high ? `is not between ${low} and ${high}` : "";
+  }
+
+  function mark(field, invalid) {
+    if (invalid) field.setAttribute("aria-invalid", "true");
+    else field.removeAttribute("aria-invalid");
+  }
+
+  function restore(field) {
+    field.value = field.defaultValue;
+    mark(field, false);
+  }
+
+  function commit(field) {
+    if (!changed(field)) return mark(field, false);
+    const why = objection(field);
+    mark(field, why);
+    if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}, and was not sent.`);
+    sending = true;
+    // Emptied first: viser's box takes what differs from before for a single edit at the caret.
+    for (const text of ["", field.value]) {
+      write.call(field, text);
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+    }
+    sending = false;
+  }
+
+  function leave(field) {
+    box = null;
+    // A value typed before a stop must not be newer than the reset that was clicked to leave the box.
+    if (!halted()) commit(field);
+    if (halted() || field.getAttribute("aria-invalid")) restore(field);
+  }
+
+  function step(field, sign) {
+    const { low, high, step } = range(field);
+    const from = Number(field.value.trim() === "" || objection(field) ? field.defaultValue : field.value);
+    const decimals = Math.max(...[from, step].map((x) => String(x).split(".")[1]?.length ?? 0));
+    const next = Math.min(high, Math.max(low, from + sign * step));
+    // Unseen by viser, which compares with what it wrote last by the element's own property.
+    write.call(field, String(Number(next.toFixed(decimals))));
+    mark(field, false);
+  }
+
+  const on = (kind, listen) => window.addEventListener(kind, listen, { capture: true });
+
+  on("input", (event) => {
+    if (sending || !isBox(event.target)) return;
+    event.stopImmediatePropagation();
+    mark(event.target, !UNFINISHED.test(event.target.value) && objection(event.target));
+  });
+  on("change", (event) => {
+    if (!isBox(event.target)) return;
+    event.stopImmediatePropagation();
+    // A tool for the blind can set a value without the focus.
+    if (event.target !== box) commit(event.target);
+  });
+  on("focusin", ({ target }) => isBox(target) && (box = target));
+  // When the window loses the focus, the box keeps it, and the draft stays one.
+  on("focusout", ({ target }) => isBox(target) && document.activeElement !== target && leave(target));
+  // The buttons beside the box go on from what is typed, and the scene does not take the focus.
+  on("pointerdown", ({ target }) => box && target !== box && !halted() && commit(box));
+  on("keydown", (event) => {
+    if (!isBox(event.target)) return;
+    if (event.key === "Enter") commit(event.target);
+    // Both stop the arm as well, as everywhere.
+    else if (event.key === "Escape" || event.key === " ") restore(event.target);
+    else if (event.key in STEPS) {
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      step(event.target, STEPS[event.key]);
+    }
+  });
+
+  return {
+    // Keep what the server says of the controls.
+    hear(messages) {
+      for (const { uuid, props, updates } of messages) {
+        if (props && "step" in props) controls.set(uuid, { ...props });
+        else if (updates && controls.has(uuid)) Object.assign(controls.get(uuid), updates);
+      }
+    },
+    // `say` shows a sentence to the person.
+    begin: (say) => (tell = say),
+  };
+})();

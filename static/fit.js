@@ -1,0 +1,124 @@
+// Keep arm and gizmo in the picture. Where the view that was asked for would cut them off, look the
+// same way from farther off; again whenever the picture changes its size, unless the person has turned
+// the camera since.
+"use strict";
+const Fit = (() => {
+  const FILLED = 0.9; // of the picture's width and height that arm and gizmo may take
+  const SAME = 1e-3; // m between two views that are one
+  const AGAIN = 200; // ms
+  const STEADY = 3; // times in a row that as many shapes are there: all are loaded
+  const TRIES = 100;
+  const NODES = ["/arm", "/target/move"];
+
+  const given = new URLSearchParams(location.search).has("initialCameraPosition");
+  let base = null; // {position, look_at} as asked for; m, in viser's world
+  let put = null; //  the same, as it was fitted
+  let chosen = false;
+  let riding = false; // on the tool, with a new view at every step
+  let begun = false;
+
+  const viewer = () => window.__viserMutable;
+  const root = () => viewer().nodeRefFromName[""].matrixWorld;
+  const vector = (xyz) => viewer().camera.position.clone().set(...xyz);
+  const same = (a, b) =>
+    ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < SAME));
+
+  // The corners of the boxes round all shapes of arm and gizmo, in viser's world.
+  function corners() {
+    const found = [];
+    const inverse = root().clone().invert();
+    for (const name of NODES)
+      viewer().nodeRefFromName[name]?.traverseVisible((object) => {
+        const { geometry } = object;
+        if (!geometry?.attributes?.position) return;
+        if (!geometry.boundingBox) geometry.computeBoundingBox();
+        const { min, max } = geometry.boundingBox;
+        object.updateWorldMatrix(true, false);
+        for (let corner = 0; corner < 8; corner++)
+          found.push(
+            vector(["x", "y", "z"].map((axis, i) => ((corner >> i) & 1 ? max : min)[axis]))
+              .applyMatrix4(object.matrixWorld)
+              .applyMatrix4(inverse),
+          );
+      });
+    return found;
+  }
+
+  // The view along the same direction, no nearer than `view`, that has all `points` in the picture.
+  function fitted(view, points) {
+    const { camera, canvas } = viewer();
+    const [eye, target] = [vector(view.position), vector(view.look_at)];
+    const forward = target.clone().sub(eye).normalize();
+    const right = forward.clone().cross(vector([0, 0, 1])).normalize();
+    const up = right.clone().cross(forward);
+    const high = FILLED * Math.tan((camera.fov * Math.PI) / 360);
+    const wide = (high * canvas.clientWidth) / canvas.clientHeight;
+    // A point is in the picture when |its way right or up| <= slope * its depth, both from the eye.
+    // Of each side of the picture the outermost point counts.
+    const outermost = (axis, slope) =>
+      [1, -1].map((sign) => Math.max(...points.map((p) => sign * axis.dot(p) - slope * forward.dot(p))));
+    const sides = [[right, wide], [up, high]].map(([axis, slope]) => [axis, slope, ...outermost(axis, slope)]);
+    const inside = sides.every(([axis, slope, most, least]) => {
+      const [across, depth] = [axis.dot(eye), forward.dot(eye)];
+      return most <= across - slope * depth && least <= -across - slope * depth;
+    });
+    if (inside || !points.length) return view;
+    const depths = sides.map(([, slope, most, least]) => -(most + least) / (2 * slope));
+    const depth = Math.min(forward.dot(eye), ...depths);
+    const placed = forward.clone().multiplyScalar(depth);
+    for (const [axis, , most, least] of sides) placed.addScaledVector(axis, (most - least) / 2);
+    const away = points.reduce((sum, p) => sum + forward.dot(p), 0) / points.length - depth;
+    return { position: placed.toArray(), look_at: placed.clone().addScaledVector(forward, away).toArray() };
+  }
+
+  function refit() {
+    if (!base?.position || !base.look_at || riding) return;
+    const { cameraControl, canvas } = viewer();
+    if (!canvas.clientHeight) return;
+    const inverse = root().clone().invert();
+    const inWorld = (three) => three.applyMatrix4(inverse).toArray();
+    const now = {
+      position: inWorld(cameraControl.getPosition(vector([0, 0, 0]))),
+      look_at: inWorld(cameraControl.getTarget(vector([0, 0, 0]))),
+    };
+    if (!same(now, put ?? base)) return;
+    put = fitted(base, corners());
+    cameraControl.setPosition(...vector(put.position).applyMatrix4(root()).toArray(), false);
+    cameraControl.setTarget(...vector(put.look_at).applyMatrix4(root()).toArray(), false);
+  }
+
+  return {
+    // Note the views that the server asks for, and fit those that a person chose before viser sees them.
+    hear(messages) {
+      const of = (type) => messages.findLast((each) => each.type === type);
+      const [position, target] = [of("SetCameraPositionMessage"), of("SetCameraLookAtMessage")];
+      if (position?.initial ?? target?.initial) {
+        if (chosen || given) return;
+        if (position) base = { ...base, position: position.position };
+        if (target) base = { ...base, look_at: target.look_at };
+      } else if (position && target && !riding) {
+        chosen = true;
+        base = { position: position.position, look_at: target.look_at };
+        put = fitted(base, corners());
+        position.position = put.position;
+        target.look_at = put.look_at;
+      }
+    },
+    // The person has chosen the view of this name.
+    choose: (view) => (riding = view === "Tool"),
+    // The scene is there, but for shapes that are still being unpacked.
+    begin() {
+      if (begun) return;
+      begun = true;
+      let [count, steady, tries] = [0, 0, 0];
+      const timer = setInterval(() => {
+        const before = count;
+        count = viewer()?.cameraControl && viewer().nodeRefFromName[""] ? corners().length : 0;
+        steady = count && count === before ? steady + 1 : 0;
+        if (steady < STEADY && ++tries < TRIES) return;
+        clearInterval(timer);
+        if (count) new ResizeObserver(refit).observe(viewer().canvas);
+      }, AGAIN);
+    },
+  };
+})();

@@ -1,0 +1,205 @@
+"""Number boxes of the panel: a value is sent on Enter or when the box is left, never before."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from playwright.sync_api import Locator
+
+from app.settings import Settings
+from tests.browser.conftest import Windows
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.browser.test_gateway import Truth, prepare, reset
+
+MOVE = "/target/move"
+READY = Settings().ready
+BETWEEN_KEYS = 300.0  # ms; viser alone sends a keystroke after at most 50
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def truth(server: AppServer) -> Truth:
+    return Truth(server)
+
+
+@pytest.fixture(scope="module")
+def window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        yield page
+
+
+@pytest.fixture
+def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
+    """A window whose person drives, the arm at home and no box in focus."""
+    window.frame.evaluate("() => document.activeElement.blur()")
+    prepare(window, truth)
+    yield window
+    assert window.errors == []
+
+
+class Watch:
+    """Counts what the page sends to the panel's controls."""
+
+    def __init__(self, page: ViserPage) -> None:
+        self._page = page
+        self._before = self._count()
+
+    def _count(self) -> int:
+        return len(self._page.sent("GuiUpdateMessage"))
+
+    @property
+    def sent(self) -> list[object]:
+        """The values sent since the watch began."""
+        self._page.page.wait_for_timeout(BETWEEN_KEYS)
+        newer = self._page.sent("GuiUpdateMessage")[self._before :]
+        return [each.body["updates"]["value"] for each in newer]
+
+
+def type_slowly(page: ViserPage, box: Locator, text: str) -> None:
+    """Replace what the box holds, key by key, as a person does."""
+    box.click()
+    box.press("Control+a")
+    for key in text:
+        page.page.keyboard.type(key)
+        page.page.wait_for_timeout(BETWEEN_KEYS)
+
+
+def first_joint(truth: Truth) -> float:
+    """The first joint of the arm [deg], as the server says."""
+    return math.degrees(truth.status()["q"][0])
+
+
+def wait_for_joint(page: ViserPage, truth: Truth, degrees: float) -> None:
+    page.wait_until(
+        lambda: abs(first_joint(truth) - degrees) < 1e-3, f"axis 1 at {degrees}", seconds=20.0
+    )
+
+
+def marked(box: Locator) -> bool:
+    return box.get_attribute("aria-invalid") == "true"
+
+
+def toast(page: ViserPage) -> str:
+    return page.page.inner_text("#toast")
+
+
+def test_typed_digits_are_sent_on_enter_only(page: ViserPage, truth: Truth) -> None:
+    box = page.number_box("Axis 1")
+    home, watch = first_joint(truth), Watch(page)
+    type_slowly(page, box, "50")
+    assert box.input_value() == "50"
+    assert not marked(box)
+    assert watch.sent == []
+    assert first_joint(truth) == home
+    assert page.slider_value("Axis 1") == home
+    box.press("Enter")
+    assert watch.sent == [50]
+    wait_for_joint(page, truth, 50.0)
+    box.press("Enter")
+    assert watch.sent == [50]
+
+
+def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth) -> None:
+    box = page.number_box("Axis 1")
+    home, watch = first_joint(truth), Watch(page)
+    type_slowly(page, box, "500")
+    assert marked(box)
+    box.press("Enter")
+    page.wait_until(lambda: "500 is not between -173.35 and 165.65" in toast(page), "the reason")
+    assert watch.sent == []
+    # One key less is a value that the axis can have.
+    box.press("Backspace")
+    assert not marked(box)
+    type_slowly(page, box, "5-0")
+    assert marked(box)
+    box.press("Tab")
+    assert watch.sent == []
+    assert first_joint(truth) == home
+    assert float(box.input_value()) == home
+    assert not marked(box)
+    page.wait_until(lambda: "5-0 is not a number" in toast(page), "the reason")
+
+
+def test_leaving_the_box_sends_the_value(page: ViserPage) -> None:
+    watch = Watch(page)
+    type_slowly(page, page.number_box("Axis 1"), "12.5")
+    page.page.keyboard.press("Tab")
+    assert watch.sent == [12.5]
+    # What is typed counts before the button pressed next.
+    type_slowly(page, page.number_box("Speed"), "60")
+    page.click_button("Home")
+    assert watch.sent == [12.5, 60, "Home"]
+    page.type_number("Speed", 100)
+
+
+def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Truth) -> None:
+    box = page.number_box("Axis 1")
+    home, watch = box.input_value(), Watch(page)
+    type_slowly(page, box, "50")
+    box.press("Escape")
+    assert box.input_value() == home
+    truth.wait(mood="stopped")
+    # A value typed and not sent must not follow the reset.
+    type_slowly(page, box, "40")
+    reset(page, truth)
+    page.wait_until(lambda: box.input_value() == home, "the value of before")
+    assert watch.sent == []
+    assert np.allclose(truth.status()["q"], READY, atol=1e-9)
+
+
+def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
+    box = page.number_box("Axis 1")
+    watch = Watch(page)
+    type_slowly(page, box, "20")
+    for key in ("ArrowUp", "ArrowUp", "ArrowDown"):
+        box.press(key)
+    assert box.input_value() == "20.05"
+    assert watch.sent == []
+    box.press("Enter")
+    assert watch.sent == [20.05]
+    type_slowly(page, box, "165.65")
+    box.press("ArrowUp")
+    assert box.input_value() == "165.65"
+    type_slowly(page, box, "20.05")
+    box.press("Enter")
+    # The buttons beside a box go on from what is typed.
+    box = page.number_box("x, y, z")
+    type_slowly(page, box, "400")
+    page.frame.locator("[data-direction=up]").first.click()
+    page.page.wait_for_timeout(BETWEEN_KEYS)
+    assert box.input_value() == "401"
+
+
+def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
+    """A screen reader types as a person does, or sets the value without the focus."""
+    for label, index, text in (("Gripper", 0, "35"), ("Speed", 0, "70"), ("r, p, y", 2, "-12")):
+        box = page.number_box(label, index=index)
+        before = float(box.input_value())
+        watch = Watch(page)
+        type_slowly(page, box, text)
+        assert watch.sent == []
+        box.press("Enter")
+        (value,) = watch.sent
+        assert (value[index] if isinstance(value, list) else value) == float(text)
+        page.type_number(label, before, index=index)
+    watch = Watch(page)
+    page.frame.evaluate("() => document.activeElement.blur()")
+    page.number_box("Speed").evaluate(
+        """(box) => {
+            const { prototype } = HTMLInputElement;
+            Object.getOwnPropertyDescriptor(prototype, "value").set.call(box, "80");
+            for (const kind of ["input", "change"])
+                box.dispatchEvent(new Event(kind, { bubbles: true }));
+        }"""
+    )
+    assert watch.sent == [80]
+    page.type_number("Speed", 100)

@@ -1,0 +1,278 @@
+"""The page at every size and in both themes: arm and gizmo are in the picture, under nothing."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.control.state import Status
+from app.geometry.arrays import FloatArray
+from app.view.room import DARK
+from tests.browser.conftest import OpenPage, Windows
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.gateway.slow_link import SlowLink
+
+MOVE = "/target/move"
+WIDE, WIDER, PORTRAIT, LANDSCAPE = (1440, 900), (1920, 1080), (390, 844), (844, 390)
+SIZES = (WIDE, WIDER, PORTRAIT, LANDSCAPE)
+PHONE = {"has_touch": True, "is_mobile": True}
+
+MOODS = {*(status.value for status in Status), "moving", "stopped"}
+"""All that the server sends of an arm whose state is known."""
+
+LEAST_CONTRAST = 3.0
+"""Of a lamp to what it lies on, as WCAG 2.2 (1.4.11) asks for."""
+
+SHOWN = """() => {
+    // Each vertex of the arm and of the gizmo, as the camera sees it: pixels of viser's document.
+    const { camera, canvas, nodeRefFromName } = __viserMutable;
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    camera.updateMatrixWorld();
+    const found = [];
+    for (const name of ["/arm", "/target/move"])
+        nodeRefFromName[name].traverseVisible((object) => {
+            const attributes = object.geometry?.attributes;
+            const vertices = attributes?.instanceStart ?? attributes?.position;
+            if (!vertices) return;
+            object.updateWorldMatrix(true, false);
+            const step = Math.ceil(vertices.count / 200);
+            for (let i = 0; i < vertices.count; i += step) {
+                const point = camera.position.clone()
+                    .set(vertices.getX(i), vertices.getY(i), vertices.getZ(i))
+                    .applyMatrix4(object.matrixWorld).project(camera);
+                found.push([left + (1 + point.x) / 2 * width, top + (1 - point.y) / 2 * height]);
+            }
+        });
+    const outermost = [0, 1].flatMap((axis) => [Math.min, Math.max].map((pick) =>
+        found.reduce((a, b) => pick(a[axis], b[axis]) === a[axis] ? a : b)));
+    const uncovered = outermost.every(([x, y]) => document.elementFromPoint(x, y) === canvas);
+    return { outermost, uncovered, canvas: [left, top, width, height], count: found.length };
+}"""
+
+NOTED = """
+    window.shades = new Set();
+    (function note() {
+        const { documentElement: html, body } = document;
+        const root = document.getElementById("root");
+        const seen = root?.childElementCount && getComputedStyle(root).opacity > 0;
+        if (seen) shades.add(`viser ${html.dataset.mantineColorScheme}`);
+        requestAnimationFrame(note);
+        if (!body) return;
+        const { backgroundColor, colorScheme } = getComputedStyle(window === top ? body : html);
+        // Where nothing is painted the browser's own ground shows, which the scheme colours.
+        const bare = backgroundColor === "rgba(0, 0, 0, 0)";
+        shades.add(bare ? `bare ${colorScheme}` : backgroundColor);
+    })();
+"""
+"""Keeps what each frame of a document was drawn in."""
+
+NIGHT = "rgb(20, 24, 29)"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def desk(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    """A window with a mouse, light at first."""
+    with windows.open(server.url, nodes=("/arm", MOVE), window=WIDE, own_camera=True) as page:
+        yield page
+        assert page.errors == []
+
+
+def shown(page: ViserPage) -> dict[str, Any]:
+    page.wait_drawn()
+    found: dict[str, Any] = page.frame.evaluate(SHOWN)
+    return found
+
+
+def whole(page: ViserPage) -> bool:
+    """Whether arm and gizmo are in the picture and nothing of either document lies over them."""
+    found = shown(page)
+    assert found["count"] > 1000
+    left, top, width, height = found["canvas"]
+    frame = page.frame.frame_element().bounding_box()
+    assert frame is not None
+    window = page.page.viewport_size
+    assert window is not None
+    for x, y in found["outermost"]:
+        if not (left < x < left + width and top < y < top + height):
+            return False
+        place = [frame["x"] + x, frame["y"] + y]
+        if not (0 < place[0] < window["width"] and 0 < place[1] < window["height"]):
+            return False
+        if page.page.evaluate("(at) => document.elementFromPoint(...at)?.id", place) != "scene":
+            return False
+    return bool(found["uncovered"])
+
+
+def wait_whole(page: ViserPage, what: str) -> None:
+    page.wait_until(lambda: whole(page), f"arm and gizmo in the picture {what}", seconds=15.0)
+    # It stays so.
+    page.page.wait_for_timeout(300)
+    assert whole(page), what
+
+
+def resize(page: ViserPage, size: tuple[int, int]) -> None:
+    page.page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.page.wait_for_timeout(300)
+
+
+def eye(page: ViserPage) -> FloatArray:
+    """Where the camera stands, in three.js's world."""
+    page.wait_drawn()
+    return np.array(page.frame.evaluate("() => __viserMutable.camera.position.toArray()"))
+
+
+def test_arm_and_gizmo_are_in_the_picture_at_every_size(desk: ViserPage, artefacts: Path) -> None:
+    wait_whole(desk, "at first")
+    first = eye(desk)
+    for scheme in ("light", "dark"):
+        desk.page.emulate_media(color_scheme=scheme)
+        for size in SIZES:
+            resize(desk, size)
+            wait_whole(desk, f"at {size}")
+            desk.keep(artefacts / f"size-{size[0]}x{size[1]}-{scheme}.png")
+            if size is WIDER:
+                continue
+            for button in ("instruments-button", "jog-button"):
+                if button == "jog-button" and size is WIDE:
+                    continue
+                desk.page.click(f"#{button}")
+                desk.page.wait_for_timeout(500)
+                wait_whole(desk, f"at {size} with {button}")
+                desk.keep(artefacts / f"size-{size[0]}x{size[1]}-{scheme}-{button[:-7]}.png")
+                desk.page.click(f"#{button}")
+    resize(desk, WIDE)
+    desk.wait_until(lambda: np.allclose(eye(desk), first, atol=1e-3), "the first view again")
+
+
+def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
+    resize(desk, WIDE)
+    wait_whole(desk, "before")
+    desk.page.mouse.move(300, 500)
+    desk.page.mouse.down()
+    desk.page.mouse.move(420, 530, steps=5)
+    desk.page.mouse.up()
+    desk.page.wait_for_timeout(500)
+    turned = eye(desk)
+    resize(desk, PORTRAIT)
+    desk.page.wait_for_timeout(500)
+    assert np.allclose(eye(desk), turned, atol=1e-3)
+    assert not whole(desk)
+    # A view button fits again, now and at every size that follows.
+    desk.frame.get_by_text("Katana450", exact=True).first.click()
+    desk.page.wait_for_timeout(500)
+    desk.click_button("Front")
+    wait_whole(desk, "from the front")
+    resize(desk, WIDE)
+    wait_whole(desk, "from the front and wide")
+    desk.click_button("3D")
+    wait_whole(desk, "again")
+
+
+def test_every_mood_has_a_lamp_that_is_seen(desk: ViserPage) -> None:
+    def lamp(mood: str) -> tuple[str, str]:
+        """Colours of the lamp and of what it lies on."""
+        colours: list[str] = desk.page.evaluate(
+            """(mood) => {
+                const kept = document.body.dataset.mood;
+                document.body.dataset.mood = mood;
+                const lamp = getComputedStyle(document.getElementById("headline"), "::before");
+                const { backgroundColor } = getComputedStyle(document.querySelector("header"));
+                const found = [lamp.backgroundColor, backgroundColor];
+                document.body.dataset.mood = kept;
+                return found;
+            }""",
+            mood,
+        )
+        return colours[0], colours[1]
+
+    for scheme in ("light", "dark"):
+        desk.page.emulate_media(color_scheme=scheme)
+        neutral, _ = lamp("nothing that is known")
+        for mood in MOODS:
+            colour, ground = lamp(mood)
+            assert colour != neutral, mood
+            assert contrast(colour, ground) >= LEAST_CONTRAST, (mood, scheme)
+        assert lamp("blocked") == lamp("limited") == ("rgb(196, 117, 0)", ground)
+
+
+def contrast(one: str, other: str) -> float:
+    """Of two colours as CSS writes them, by WCAG 2.2."""
+
+    def luminance(colour: str) -> float:
+        parts = [int(part) / 255 for part in colour[4:-1].split(",")]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return math.fsum(k * c for k, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+    low, high = sorted(map(luminance, (one, other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_on_a_phone_by_night_and_a_slow_line_all_is_dark_and_seen_from_the_first_frame(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    with SlowLink(server.port, 1e6, delay=0.15) as line:
+        started = time.monotonic()
+        page = open_page(
+            f"http://127.0.0.1:{line.port}",
+            nodes=("/arm", MOVE),
+            window=PORTRAIT,
+            own_camera=True,
+            script=NOTED,
+            color_scheme="dark",
+            **PHONE,
+        )
+        wait_whole(page, "on a phone")
+        print(f"there after {time.monotonic() - started:.1f} s")
+        shades = [each.evaluate("() => [...shades]") for each in (page.page.main_frame, page.frame)]
+        assert set(shades[0]) == {NIGHT}
+        assert {NIGHT, "viser dark"} <= set(shades[1]) <= {NIGHT, "viser dark", "bare dark"}
+        page.keep(artefacts / "phone.png")
+        sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
+        assert sky.max() < max(DARK.floor) + 30
+        # Folded until a person opens it; then the scene has what is left of the height.
+        assert not in_view(page, "3D")
+        page.frame.get_by_text("Katana450", exact=True).first.tap()
+        page.wait_until(lambda: in_view(page, "3D"), "the panel")
+        wait_whole(page, "above the panel")
+        page.keep(artefacts / "phone-panel.png")
+        page.frame.get_by_text("Katana450", exact=True).first.tap()
+        page.page.tap("#jog-button")
+        wait_whole(page, "above the pads")
+        for key in page.page.locator("#jog kbd").all():
+            assert not key.is_visible()
+        page.keep(artefacts / "phone-jog.png")
+        # The system changes, and so do both documents and the room.
+        page.page.emulate_media(color_scheme="light")
+        page.wait_until(
+            lambda: (
+                page.frame.evaluate("document.documentElement.dataset.mantineColorScheme")
+                == "light"
+            ),
+            "the day",
+        )
+        sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
+        assert sky.min() > 200
+        page.page.emulate_media(color_scheme="dark")
+        assert page.errors == []
+
+
+def in_view(page: ViserPage, text: str) -> bool:
+    """Whether the text in viser's document lies in the window."""
+    found = page.frame.get_by_text(text, exact=True).first
+    box = found.bounding_box() if found.is_visible() else None
+    size = page.page.viewport_size
+    assert size is not None
+    return box is not None and box["y"] + box["height"] < size["height"]
