@@ -24,14 +24,17 @@ FIVE = 5
 DEEP = 3
 """Joints in a row from which a branch of the tree is an arm, and not a finger or a wheel."""
 
-FINGER = re.compile("finger|gripper|jaw|claw|knuckle|grasp|clamp|pincer", re.IGNORECASE)
+FINGER = re.compile(r"finger|gripper|jaw|claw|knuckle|grasp|clamp|pincer|rh_[lr]\d", re.IGNORECASE)
 """In the name of a joint or of its link: it may be that of a finger."""
 
 WRIST = re.compile("wrist|roll|rot|yaw|pitch|twist|tilt|flex", re.IGNORECASE)
 """In the name of a joint: it turns the gripper and is none of its fingers."""
 
 JAW_RANGE = 3.0
-"""[rad] A finger does not turn farther than this; a wrist does."""
+"""[rad] A joint that turns farther is that of a wrist, if an arm has none without it."""
+
+TIP = re.compile(r"tcp|tool|tip|grasp|end_?effector|(^|[_/])ee([_/]|$)", re.IGNORECASE)
+"""In the name of a frame: it is the tool, and what moves beside it is a finger."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ def _main_axes(tree: _Tree, path: Path) -> list[Any]:
         axes.append(deepest)
         link = deepest.child
     last = axes[-1] if axes and not branches else None
-    if last is not None and _is_finger(last):
+    if last is not None and _is_finger(tree, last, len(axes)):
         axes.pop()
         last = None
     _refuse_followers(axes, "the tool")
@@ -223,16 +226,19 @@ def _branches(tree: _Tree, link: str, axes: Sequence[Any]) -> list[Any]:
     return own or found[:1]
 
 
-def _is_finger(joint: Any) -> bool:
-    """Whether the last joint of a row opens a gripper instead of turning one."""
+def _is_finger(tree: _Tree, joint: Any, number: int) -> bool:
+    """Whether the last joint of a row of ``number`` opens a gripper instead of turning one."""
     if joint.mimic is not None or joint.type == "prismatic":
+        return True
+    fixed = [j.child for j in tree.below[joint.parent] if not _moves(j)]
+    if any(TIP.search(link) and link not in tree.below for link in fixed):
         return True
     if not FINGER.search(f"{joint.name} {joint.child}") or WRIST.search(joint.name):
         return False
     limit = joint.limit
     if joint.type == "continuous" or limit is None or None in (limit.lower, limit.upper):
         return True
-    return bool(limit.upper - limit.lower <= JAW_RANGE)
+    return bool(number > FIVE or limit.upper - limit.lower <= JAW_RANGE)
 
 
 def _axes_to(tree: _Tree, tool: str) -> list[Any]:

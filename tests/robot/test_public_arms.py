@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from app.api import answers, requests
 from app.cli.assembly import Jointed, recognised
+from app.client.client import connect
 from app.control import commands as cmd
 from app.control.session import Session
 from app.control.state import Reason
@@ -147,11 +149,15 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
              for side in ("left", "right") for j in PX150[:5]],
             r"has 2 arms of 5 joints each, which begin at left_waist, right_waist.* --tool",
         ),
+        (
+            [*Z1, J("rh_r1", "revolute", "link06", "trigger", limits=(-3.14, 3.14))],
+            r"has 6 axes \(joint1, .*, joint6\)",
+        ),
         ([J("rail", "prismatic", "floor", "base"), *PX150[:5]], r"has 6 axes \(rail \(prismatic\)"),
         ([J("rail", "prismatic", "floor", "base"), *PX100], r"axes of .* are rail \(prismatic\)"),
     ],
     ids=["PincherX-100", "UR5", "Z1", "Z1 with a jaw", "ViperX-300 6DOF", "a sixth axis",
-         "a flange on six", "two arms", "six with a rail", "five with a rail"],
+         "a flange on six", "two arms", "a trigger", "six with a rail", "five with a rail"],
 )  # fmt: skip
 def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J], said: str) -> None:
     path = written(tmp_path, "arm", joints)
@@ -160,6 +166,29 @@ def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J],
     robot = recognised(Settings(), path, None)
     assert isinstance(robot, Jointed)
     assert [note for note in robot.notes if note.startswith("Joints only. ") and "arm.urdf" in note]
+
+
+@pytest.mark.parametrize(
+    "jaw",
+    [
+        J("gripper_joint_1", "revolute", "hand", "f", limits=(-6.28, 6.28)),
+        J("gripper", "continuous", "hand", "f", limits=None),
+        J("motor_6", "revolute", "hand", "moving_jaw", limits=(-0.2, 2.0)),
+        J("joint_6", "prismatic", "hand", "link_6", limits=(0.0, 0.02)),
+    ],
+    ids=["a wide range", "an endless one", "the link's name", "it slides"],
+)
+def test_a_last_joint_in_a_row_can_be_a_finger(tmp_path: Path, jaw: J) -> None:
+    model = load(written(tmp_path, "arm", [*PX150[:5], jaw]))
+    assert model.arm.chain.names == tuple(joint.name for joint in PX150[:5])
+
+
+def test_a_joint_beside_a_tool_frame_is_a_finger(tmp_path: Path) -> None:
+    frame = J("end", "fixed", "hand", "end_effector_link", (0.1, 0.0, 0.0))
+    sixth = J("joint_6", "revolute", "hand", "link_6")
+    model = load(written(tmp_path, "arm", [*PX150[:5], frame, sixth]))
+    assert model.arm.default_tool == "end_effector_link"
+    assert model.arm.gripper.moves
 
 
 def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
@@ -242,3 +271,13 @@ def test_they_are_served_with_their_grippers(tmp_path: Path, joints: list[J]) ->
         assert server.running
         assert "Traceback" not in server.output
         assert "Joints only" not in server.output
+        with connect(server.url) as client:
+            arm = client.look(answers.Arm)
+            assert arm.gripper is not None
+            closed, opened, _ = arm.gripper
+            assert arm.gripper_slides == (opened < 0.1)
+            state = next(iter(client.states()))
+            assert closed <= state.gripper <= opened
+            assert client.go(requests.Gripper(angle=opened)).gripper == opened
+            q = [angle + 0.05 for angle in state.q]
+            np.testing.assert_allclose(client.joints(q).q, q, atol=1e-9)
