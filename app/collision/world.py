@@ -251,7 +251,9 @@ class Placed:
         square = np.einsum("ij,ij->i", c, c)[:, None] - 2.0 * (c @ origins.T)
         square += np.einsum("ij,ij->i", origins, origins) - along * along
         reach = np.asarray(np.sqrt(np.maximum(square, 0.0)) + self._world.radius[:, None])
-        reach[:, self._world.linkage.sliding] = 1.0
+        sliding = self._world.linkage.sliding
+        if sliding.size:
+            reach[:, sliding] = 1.0
         return reach
 
     def likely_nearest(self) -> int:
