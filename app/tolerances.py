@@ -25,15 +25,16 @@ SCREW: Final = 1e-9
 # Cosine of the pitch below which roll and yaw turn about one axis and only their sum is known.
 GIMBAL_LOCK: Final = 1e-9
 
-# [rad], [m] How far the axes of a described arm may be off parallel, square or crossing and still
-# be meant so: a file with five decimals passes, a real offset does not.
+# [rad], [m] How far the axes of a described arm may be off parallel, square, upright or crossing
+# and still be meant so: a file with five decimals passes, a real offset does not. Such an arm is
+# replaced, once, when it is read, by the exact one next to it.
 FAMILY_ANGLE: Final = 1e-4
 FAMILY_LENGTH: Final = 1e-5
 
 # [rad] What a right angle written as 1.57 is off by, twice over: no offset of a real arm.
 COARSE_ANGLE: Final = 2e-3
 
-# [rad, m] Up to here nothing of the above is worth a word.
+# [rad, m] An arm that is off by no more is used as it is, without a word.
 FAMILY_EXACT: Final = 1e-9
 
 # [1, m] What is left of a 0 or a 1 after a few products of matrices in double precision.

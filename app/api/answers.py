@@ -205,6 +205,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one of
             them.
         gripper: closed and open [rad], and its speed [rad/s]; null without fingers.
+        gripper_slides: whether its fingers slide; its numbers are in m and m/s then.
         T_base_shoulder: (4, 4) the frame {S} in the base frame; null where there are only joints.
         slides: (n,) whether each joint slides; its numbers are in m then.
         joints_only: why no tool can be brought to a pose; empty where one can.
@@ -221,6 +222,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     tools: dict[str, list[Numbers]]
     default_tool: str | None
     gripper: tuple[float, float, float] | None
+    gripper_slides: bool
     T_base_shoulder: list[Numbers] | None
     slides: list[bool]
     joints_only: str

@@ -65,7 +65,8 @@ class Kinematics:
         The residuals say how far that pose is from ``T``, limits of the joints left aside:
         ``within_limits`` tells of each solution whether the arm can go there. With badges there are
         also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
-        value, and the two parts in contact there with the finger joint at 0, if any are.
+        value, and the two parts in contact there, if any are, with the finger joint at 0 or the
+        limit next to it.
         """
         chain = self._chain(request, {"T", "tool", "q"} if self._badges else {"T", "tool"})
         start = chain.check_q(_numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
@@ -92,7 +93,7 @@ class Kinematics:
         }
 
     def _badge(self, badge: Badge) -> dict[str, Any]:
-        contact = met(self._world, badge.q, 0.0)
+        contact = met(self._world, badge.q, self._arm.gripper.clamp(0.0))
         return {
             "distance_rad": badge.distance,
             "time_s": badge.time,

@@ -68,7 +68,7 @@ def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Pl
     settings = replace(Settings(), bare=script.bare)
     model, session, _ = described(settings, urdf, None)
     rig = Rig(session, model.T_base_shoulder, seed)
-    program = compiled(script, rig, session.begin(session.ready, 0.0, 0.0), speed)
+    program = compiled(script, rig, _at_rest(session), speed)
     return Planned(script, program, model, session)
 
 
@@ -117,7 +117,7 @@ def of_pose(pose: Sequence[float], urdf: Path) -> Performance:
     """Standing at ``pose``: values of the driven joints [rad]; at home where there are none."""
     model, session, _ = _described(urdf)
     if not pose:
-        return Performance(model, session, [session.begin(session.ready, 0.0, 0.0)], 1.0)
+        return Performance(model, session, [_at_rest(session)], 1.0)
     mechanism = load_mechanism(urdf)[0]
     return Performance(model, session, [_standing(model, session, mechanism.values(pose))], 1.0)
 
@@ -141,6 +141,11 @@ def _described(urdf: Path) -> tuple[RobotModel, Session, tuple[str, ...]]:
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)
     return model, session, notes
+
+
+def _at_rest(session: Session) -> State:
+    """Where an arm is that nobody has moved."""
+    return session.begin(session.ready, session.arm.gripper.clamp(0.0), 0.0)
 
 
 def _standing(

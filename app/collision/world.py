@@ -143,8 +143,8 @@ class World:
     def travel(self, placed: Placed, x: FloatArray, towards: FloatArray) -> FloatArray:
         """At most how far the bodies of each pair move against each other, (p,) [m].
 
-        ``placed`` is at ``x`` (k,) [rad]; on the way to ``towards`` (k,) the joints turn by no more
-        than LONGEST_WAY together.
+        ``placed`` is at ``x`` (k,) [rad or m]; on the way to ``towards`` (k,) the joints turn by no
+        more than LONGEST_WAY together.
         """
         joints = self.linkage
         turns = np.abs(joints.factor * (towards - x)[joints.variable])
@@ -240,14 +240,21 @@ class Placed:
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)) - self._world.radii)
 
     def reach(self) -> FloatArray:
-        """The farthest that each body is from each joint's axis, (b, m) [m]."""
+        """The farthest that each body is from each joint's axis, (b, m) [m].
+
+        Of joints that slide it is 1: how far they move a body for each metre of their own.
+        """
         axes = self._world.axes @ self._columns
         origins = self._columns[3::4]
         c = self._centre
         along = c @ axes.T - np.einsum("ij,ij->i", origins, axes)
         square = np.einsum("ij,ij->i", c, c)[:, None] - 2.0 * (c @ origins.T)
         square += np.einsum("ij,ij->i", origins, origins) - along * along
-        return np.asarray(np.sqrt(np.maximum(square, 0.0)) + self._world.radius[:, None])
+        reach = np.asarray(np.sqrt(np.maximum(square, 0.0)) + self._world.radius[:, None])
+        sliding = self._world.linkage.sliding
+        if sliding.size:
+            reach[:, sliding] = 1.0
+        return reach
 
     def likely_nearest(self) -> int:
         """The pair whose balls are nearest to each other, or farthest in each other."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.control.commands import SetAxes, SetJoint
 from app.control.following import Following
-from app.control.state import Finding, JointTarget, Reason, Servoing, State, Target
+from app.control.state import GRIPPER_LIMITS, Finding, JointTarget, Reason, Servoing, State, Target
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import branch_of
 from app.kinematics.chain import Chain
@@ -23,7 +23,7 @@ SEEN = 0.06
 
 def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]) -> State:
     """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
-    kept = tuple(f for f in state.findings if f.reason is Reason.GRIPPER_LIMIT)
+    kept = tuple(f for f in state.findings if f.reason in GRIPPER_LIMITS)
     pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
     # What the arm brakes for stays the reason, however often it is told anew meanwhile.
     met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)

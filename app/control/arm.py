@@ -16,17 +16,22 @@ from app.motion.limiter import Limits
 class Gripper:
     """The driven finger joint: limits [rad], greatest speed [rad/s]; ``lower`` is closed.
 
-    That of an arm without fingers has nowhere to go.
+    Where it slides, its numbers are in m and m/s. That of an arm without fingers has nowhere to go.
     """
 
     lower: float
     upper: float
     speed: float
+    slides: bool = False
 
     @property
     def moves(self) -> bool:
         """Whether there is anything to open."""
         return self.lower < self.upper
+
+    def clamp(self, value: float) -> float:
+        """The nearest to ``value`` [rad or m] inside the limits."""
+        return min(max(value, self.lower), self.upper)
 
 
 GENTLE = 0.9

@@ -22,8 +22,8 @@ SAME_PLACE = 1e-4
 """[m or 1] A body that is no farther from where a plan has it may be taken to be there: plans keep
 MARGIN, 1 mm more than has to be."""
 
-SAME_FINGERS = 5e-3
-"""[rad] Likewise: half a millimetre at the pads."""
+SAME_FINGERS_TURN, SAME_FINGERS_SLIDE = 5e-3, 5e-4
+"""[rad, m] Likewise: half a millimetre at the pads."""
 
 PROBE = 0.02
 """[1] Of a segment: an arm that waits goes on once the way is clear so far."""
@@ -32,9 +32,10 @@ PROBE = 0.02
 class Follower:
     """Moves one arm along plans. Its methods are pure; it is for one thread."""
 
-    def __init__(self, world: World | None) -> None:
-        """``world``: what must not be touched."""
+    def __init__(self, world: World | None, *, slides: bool = False) -> None:
+        """``world``: what must not be touched. ``slides``: whether the fingers slide, not turn."""
         self._world = world
+        self._same_fingers = SAME_FINGERS_SLIDE if slides else SAME_FINGERS_TURN
         self._limiters: dict[Scaling, Limiter] = {}
         # What of a segment is known to be clear with the fingers as they are: no state, but facts.
         self._known: tuple[Segment, float, float, float] | None = None
@@ -76,7 +77,7 @@ class Follower:
         world = self._world
         if world is None or (
             plan.clear_of is not None
-            and abs(plan.fingers - fingers) <= SAME_FINGERS
+            and abs(plan.fingers - fingers) <= self._same_fingers
             and plan.clear_of.differs_by(world.likeness) <= SAME_PLACE
         ):
             return None

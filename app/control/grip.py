@@ -16,8 +16,8 @@ TOUCHING = 3e-4
 CENTRED = 3e-3
 """[m] When one finger touches and the other is no farther, the thing slides between them."""
 
-OPENED = 0.02
-"""[rad] By as much the fingers open before what they held is free: 1 mm at the pads."""
+OPENED_TURN, OPENED_SLIDE = 0.02, 1e-3
+"""[rad, m] By as much the fingers open before what they held is free: 1 mm at the pads."""
 
 
 def gripped(surroundings: Surroundings, world: World | None, state: State) -> State:
@@ -27,7 +27,8 @@ def gripped(surroundings: Surroundings, world: World | None, state: State) -> St
         return state
     x = state.x_setpoint
     if state.grip is not None:
-        if state.gripper_setpoint <= state.grip + OPENED:
+        opened = OPENED_SLIDE if hand.slides else OPENED_TURN
+        if state.gripper_setpoint <= state.grip + opened:
             return state
         things = tuple(surroundings.left(t, x) if t.held else t for t in state.things)
         return replace(state, things=things, grip=None)

@@ -64,7 +64,7 @@ class Mover:
                 frozenset((names[world.first[pair]], names[world.second[pair]])) for pair in soft
             )
         self._tool_speed = PLANNED * tool_speed
-        self._follower = Follower(world)
+        self._follower = Follower(world, slides=arm.gripper.slides)
         self._any = Limiter(arm.limits)
         self._elbow = {elbow: Limiter(_bent(arm, elbow)) for elbow in ("up", "down")}
 

@@ -363,7 +363,8 @@ class Session:
         limits = self.arm.gripper
         lower = limits.lower if state.grip is None else state.grip
         goal = min(max(angle, lower), limits.upper)
-        others = tuple(f for f in state.findings if f.reason is not Reason.GRIPPER_LIMIT)
+        reason = Reason.GRIPPER_SLIDE_LIMIT if limits.slides else Reason.GRIPPER_LIMIT
+        others = tuple(f for f in state.findings if f.reason is not reason)
         beyond = abs(goal - angle) > tolerances.LIMIT_SLACK
-        held = (Finding(Reason.GRIPPER_LIMIT, goal),) if beyond else ()
+        held = (Finding(reason, goal),) if beyond else ()
         return replace(state, gripper_goal=goal, findings=others + held)

@@ -76,12 +76,17 @@ class Reason(Enum):
     AXIS_LIMIT = "axis limit"
     SLIDE_LIMIT = "slide limit"
     GRIPPER_LIMIT = "gripper limit"
+    GRIPPER_SLIDE_LIMIT = "gripper slide limit"
     YAW_FIXED = "yaw fixed"
     PITCH_CHANGED = "pitch changed"
     ROLL_CHANGED = "roll changed"
     NOT_AT_START = "not at the start"
     LOPSIDED = "one finger only"
     INTERNAL = "internal error"
+
+
+GRIPPER_LIMITS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT)
+"""The reasons that are about the fingers alone."""
 
 
 @dataclass(frozen=True)

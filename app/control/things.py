@@ -200,12 +200,13 @@ class Hand:
 
     palm: the piece of the linkage that fingers hang on, the last of the arm where it has none.
     fingers: their names among the parts. T_palm_tool: (4, 4) the frame of the default tool in that
-    of the palm.
+    of the palm. slides: whether the fingers slide instead of turning.
     """
 
     palm: int
     fingers: tuple[str, ...]
     T_palm_tool: FloatArray
+    slides: bool = False
 
 
 class Surroundings:

@@ -27,10 +27,13 @@ class SimulatedDriver:
     """Keeps to limits and speeds by itself, so that a fault upstream shows instead of hiding."""
 
     def __init__(self, arm: Jointed, q: FloatArray, gripper: float) -> None:
-        """The arm stands at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad]."""
+        """The arm stands at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad or m].
+
+        What is beyond its limits is set to the limit.
+        """
         self._limits = arm.limits
         self._fingers = arm.gripper
-        self._sent = Sent(self._clamped(q), gripper)
+        self._sent = Sent(self._clamped(q), self._fingers.clamp(gripper))
         self._t: float | None = None
 
     def start(self, t: float) -> Sent:
@@ -60,5 +63,5 @@ class SimulatedDriver:
     def _gripper(self, angle: float, dt: float) -> float:
         fingers = self._fingers
         step = fingers.speed * dt
-        wanted = min(max(angle, fingers.lower), fingers.upper)
+        wanted = fingers.clamp(angle)
         return self._sent.gripper + min(max(wanted - self._sent.gripper, -step), step)

@@ -13,7 +13,7 @@ import numpy as np
 from app.errors import RobotDescriptionError
 from app.exchange.mechanism import Joint, Link, Material, Mechanism, Shape
 from app.geometry.arrays import FloatArray, frozen
-from app.robot.description import check_description
+from app.robot.description import reading
 from app.robot.visual import Visual, rods, unreadable_mesh, visuals_of
 
 MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
@@ -32,16 +32,15 @@ def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
     Raises RobotDescriptionError when the file cannot be read or has a joint that no exported
     format has a word for.
     """
-    check_description(path)
     import yourdfpy
 
-    try:
+    with reading(path):
         urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False)
         joints = {joint.child: joint for joint in urdf.robot.joints}
         links = {link.name: link for link in urdf.robot.links}
         missing: list[Path] = []
         found: dict[str, Link] = {}
-        for name in _parents_first(path, links, joints):
+        for name in _parents_first(links, joints):
             visuals, absent = visuals_of(links[name].visuals, urdf.robot.materials, path.parent)
             missing.extend(absent)
             if not visuals:
@@ -54,30 +53,19 @@ def load_mechanism(path: Path) -> tuple[Mechanism, tuple[str, ...]]:
             else:
                 T = np.eye(4) if above.origin is None else above.origin
                 found[name] = Link(name, above.parent, frozen(T), _joint(path, above), shapes)
-    except RobotDescriptionError:
-        raise
-    except Exception as error:
-        raise RobotDescriptionError(f"{path} is not a robot description: {error}") from error
     notes = tuple(f"There is no mesh at {mesh}." for mesh in missing)
     return _with_leaders(path, Mechanism(urdf.robot.name, tuple(found.values()))), notes
 
 
-def _parents_first(path: Path, links: dict[str, Any], joints: dict[str, Any]) -> list[str]:
-    order: list[str] = []
-    waiting = list(links)
-    roots = [name for name in links if name not in joints]
-    if len(roots) != 1:
-        raise RobotDescriptionError(
-            f"{path.name} must have one link that hangs on no other, not {len(roots)}."
-        )
-    while waiting:
-        ready = [n for n in waiting if n not in joints or joints[n].parent in order]
-        if not ready:
-            raise RobotDescriptionError(
-                f"{path.name}: {', '.join(waiting)} do not hang on the link {roots[0]}."
-            )
-        order += ready
-        waiting = [name for name in waiting if name not in ready]
+def _parents_first(links: dict[str, Any], joints: dict[str, Any]) -> list[str]:
+    """The names of the links of a tree, each behind the one it hangs on."""
+    children: dict[str, list[str]] = {}
+    for name in links:
+        if name in joints:
+            children.setdefault(joints[name].parent, []).append(name)
+    order = [name for name in links if name not in joints]
+    for name in order:
+        order.extend(children.get(name, ()))
     return order
 
 

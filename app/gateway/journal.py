@@ -25,6 +25,7 @@ UNITS = {
     Reason.AXIS_LIMIT: "rad",
     Reason.SLIDE_LIMIT: "m",
     Reason.GRIPPER_LIMIT: "rad",
+    Reason.GRIPPER_SLIDE_LIMIT: "m",
     Reason.YAW_FIXED: "rad",
     Reason.PITCH_CHANGED: "rad",
     Reason.ROLL_CHANGED: "rad",

@@ -42,12 +42,14 @@ class Body:
         gripper: the driven finger joint, if there is one.
         values: of every movable joint [rad, m].
         links: those there are.
+        fingers: the finger joints, which move together.
     """
 
     axes: Mapping[str, int]
     gripper: str | None
     values: Callable[[State], Mapping[str, float]]
     links: frozenset[str]
+    fingers: frozenset[str] = frozenset()
 
 
 def body_of(model: RobotModel, mechanism: Mechanism) -> Body:
@@ -58,6 +60,7 @@ def body_of(model: RobotModel, mechanism: Mechanism) -> Body:
         gripper=fingers[0] if fingers else None,
         values=lambda state: model.joint_angles(state.q, state.gripper),
         links=frozenset(body.name for body in model.bodies),
+        fingers=frozenset(model.fingers),
     )
 
 
@@ -213,6 +216,8 @@ class Nodes:
                 orders.axes[body.axes[name]] = amount
             elif name == body.gripper:
                 orders.others.append(cmd.SetGripper(amount))
+            elif name in body.fingers:
+                raise InputError(f"{name} is driven together with {body.gripper}: set that.")
             else:
                 raise InputError(f"{name} stays at zero: it is no joint of the arm.")
 

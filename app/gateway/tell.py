@@ -137,6 +137,7 @@ def arm(model: RobotModel | Machine, ready: list[float]) -> answers.Arm:
         tools={name: M.tolist() for name, M in model.arm.tools.items()},
         default_tool=model.arm.default_tool,
         gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
+        gripper_slides=gripper.slides,
         T_base_shoulder=model.T_base_shoulder.tolist(),
     )
 
@@ -163,6 +164,7 @@ class _Jointed(NamedTuple):
             tools={},
             default_tool=None,
             gripper=None,
+            gripper_slides=False,
             T_base_shoulder=None,
             slides=list(self.slides),
             joints_only=self.why,

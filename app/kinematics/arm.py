@@ -63,22 +63,6 @@ class FiveAxisArm:
     skew: float
     gap: float
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Sentences for a person on what was taken as rounding; none for an exact member."""
-        result = []
-        if self.skew > tolerances.FAMILY_EXACT:
-            result.append(
-                f"Axes are off square or parallel by up to {math.degrees(self.skew):.2g} deg, "
-                "which is taken for rounding."
-            )
-        if self.gap > tolerances.FAMILY_EXACT:
-            result.append(
-                f"The tool point is {1e3 * self.gap:.2g} mm beside the roll axis, which is taken "
-                "for rounding."
-            )
-        return tuple(result)
-
     @cached_property
     def reach(self) -> float:
         """No part of the arm is farther than this from the origin of {C} or of {S} [m]."""
@@ -173,6 +157,9 @@ def arm_of(chain: Chain) -> FiveAxisArm:
     )
     home = T_C_S @ chain.M
     tool = home[:3, 3]
+    # An axis that is off square by rounding is where it should be beside the tool.
+    turned = T_C_S[:3, :3] @ omega[4]
+    roll = roll + float((tool - roll) @ turned) * turned
 
     along = T_C_S[:3, :3] @ omega[4]
     along = np.array([along[0], 0.0, along[2]]) / math.hypot(along[0], along[2])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Self
-
-import numpy as np
 
 from app.control.commands import LEAST_SPEED
 from app.errors import InputError
@@ -21,14 +20,14 @@ LONGEST_WAIT = 3600.0
 
 @dataclass(frozen=True)
 class Gripper:
-    """Open or close the fingers, or bring them to an angle [rad]."""
+    """Open or close the fingers, or bring them to a place: [deg], or [mm] where they slide."""
 
     where: float | str
 
     @classmethod
     def read(cls, value: Value, setting: Setting) -> Self:  # noqa: ARG003
         if value.number is not None:
-            return cls(read.degrees(-180.0, 180.0)(value))
+            return cls(read.number(-180.0, 180.0, "deg or mm")(value))
         return cls(read.choice("open", "closed")(value))
 
     def lay(self, bench: Bench) -> None:
@@ -36,10 +35,11 @@ class Gripper:
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
         ends = {"open": fingers.upper, "closed": fingers.lower}
-        angle = ends[self.where] if isinstance(self.where, str) else self.where
+        unit, scale = ("mm", 1e-3) if fingers.slides else ("deg", math.radians(1.0))
+        angle = ends[self.where] if isinstance(self.where, str) else scale * self.where
         if not fingers.lower <= angle <= fingers.upper:
-            low, high = np.degrees((fingers.lower, fingers.upper))
-            raise InputError(f"The fingers go from {low:.1f} to {high:.1f} deg.")
+            low, high = fingers.lower / scale, fingers.upper / scale
+            raise InputError(f"The fingers go from {low:.1f} to {high:.1f} {unit}.")
         held = replace(bench.state, gripper=angle, gripper_setpoint=angle, gripper_goal=angle)
         bench.note("gripper", Grip(angle), held)
 

@@ -13,7 +13,7 @@ from app.control.state import State
 from app.control.things import Thing
 from app.exchange.mechanism import Material, Shape
 from app.exchange.urdf_mechanism import shapes_of
-from app.geometry import se3, so3
+from app.geometry import so3
 from app.geometry.arrays import FloatArray, frozen
 from app.render.picture import Veil
 from app.render.scene import Item, smooth
@@ -98,8 +98,7 @@ class Stage:
         for body in self._model.bodies:
             T = body.T_parent_body
             if body.joint is not None:
-                turned = so3.exp(body.axis * angles.get(body.joint, 0.0))
-                T = T @ se3.from_rotation_translation(turned, np.zeros(3))
+                T = T @ body.motion(angles[body.joint])
             found[body.name] = T if body.parent is None else found[body.parent] @ T
         return found
 

@@ -112,12 +112,15 @@ class Report:
         heads = ["t_s", "step", "line", "task"]
         heads += [f"theta{axis}_deg" for axis in range(1, n + 1)]
         heads += [f"theta{axis}_deg_s" for axis in range(1, n + 1)]
-        rows.writerow([*heads, "fingers_deg", "tool", "x_mm", "y_mm", "z_mm", "path_share"])
+        slides = self.arm.gripper.slides
+        heads.append("fingers_mm" if slides else "fingers_deg")
+        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_share"])
         trace = self.trace
         for tick in range(len(trace.t)):
             task = self.program.tasks[int(trace.task[tick])]
             numbers = [*np.degrees(trace.q[tick]), *np.degrees(trace.qd[tick])]
-            numbers.append(float(np.degrees(trace.fingers[tick])))
+            fingers = trace.fingers[tick]
+            numbers.append(float(1e3 * fingers if slides else np.degrees(fingers)))
             chain = self.arm.chain_to(trace.tools[tick])
             point = 1e3 * forward(chain, trace.q[tick])[:3, 3]
             rows.writerow(

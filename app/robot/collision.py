@@ -20,7 +20,7 @@ def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
     """The arm's own collision bodies, and sentences for a person on what is left out of them.
 
     Every shape counts as its convex hull. x is the arm's joint angles (n,) and the driven finger
-    joint [rad]. The world is None when no link has a shape.
+    joint [rad, or m where it slides]. The world is None when no link has a shape.
     """
     movers: list[Mover] = []
     # Of each body the piece it moves with, and where it is in the frame of that.
@@ -32,7 +32,7 @@ def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
         T = T @ body.T_parent_body
         drive = _drive(model, body)
         if drive is not None:
-            movers.append(Mover(piece, T, body.axis, *drive))
+            movers.append(Mover(piece, T, body.axis, *drive, slides=body.slides))
             piece, T = len(movers), np.eye(4)
         places[body.name] = piece, T
         shapes, refused = _shapes(body)
@@ -86,7 +86,8 @@ def hand_of(model: RobotModel, world: World) -> Hand:
     chain = model.arm.chain
     T_base_palm = world.linkage.poses(np.zeros(chain.n + 1))[palm]
     T_palm_tool = se3.inverse(T_base_palm) @ model.T_base_shoulder @ chain.M
-    return Hand(palm, tuple(part.name for part in fingers), frozen(T_palm_tool))
+    names = tuple(part.name for part in fingers)
+    return Hand(palm, names, frozen(T_palm_tool), slides=model.arm.gripper.slides)
 
 
 def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:

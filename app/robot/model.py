@@ -11,15 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from app.control.arm import NO_GRIPPER, Arm, Gripper
+from app.control.arm import Arm
 from app.errors import InputError, RobotDescriptionError
-from app.geometry import screws, se3
+from app.geometry import screws, se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
+from app.kinematics.ideal import idealised
 from app.kinematics.turns import in_limits_turn
 from app.robot.conduit import Hinge, Stretch, read_stretches
-from app.robot.description import check_description
+from app.robot.description import reading
+from app.robot.gripper import SLIDING, Fingers, fingers_of
+from app.robot.structure import structure_of
 from app.robot.visual import Visual, rods, visuals_of
 from robot_description import URDF_PATH
 
@@ -29,16 +32,8 @@ if TYPE_CHECKING:
 SHOULDER_FRAME = "shoulder_frame"
 """The link that is the paper's frame {S}."""
 
-TOOL_FRAMES = ("tcp", "grasp", "flange")
-"""Links that targets can be set for where the file has them; the first is the default."""
-
 CONDUITS = "conduits.json"
 """File beside the URDF that says where its conduit is held."""
-
-TURNING = ("revolute", "continuous")
-"""Types of joint an arm is made of; a continuous one is given half a turn either way."""
-
-FIVE = 5
 
 READY_ROOM = 0.05
 """Share of a joint's range that the ready posture keeps from its limits."""
@@ -51,12 +46,13 @@ class Body:
     Attributes:
         name, parent: of the link and the link it hangs on; the root has none.
         T_parent_body: (4, 4) where it sits at zero [m].
-        joint: the movable joint it hangs on, or None when it is fixed.
+        joint: the driven joint it hangs on, or None when it is fixed or at rest.
         axis: (3,) unit direction of that joint in the body's own frame.
         visuals: its shapes.
         collisions: the shapes that stand for it where contacts are looked for.
         moves: whether it hangs, directly or not, on a movable joint.
         mass: [kg], 0 where the file tells none. centre: (3,) of it, in the body's own frame [m].
+        slides: whether its joint slides along the axis instead of turning about it.
     """
 
     name: str
@@ -69,6 +65,11 @@ class Body:
     moves: bool
     mass: float
     centre: FloatArray
+    slides: bool = False
+
+    def motion(self, value: float) -> FloatArray:
+        """The pose (4, 4) that its joint adds at ``value`` [rad, or m where it slides]."""
+        return _motion(self.axis, value, slides=self.slides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ class RobotModel:
         T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table.
         bodies: every link, parents first.
         stretches: the free runs of the conduit, if it has one.
-        fingers: driven and following finger joints: angle = factor * driven + offset.
+        fingers: finger joints, the driven one first: value = factor * driven + offset [rad or m].
         notes: sentences for a person on what was taken for granted in the file.
     """
 
@@ -108,7 +109,7 @@ class RobotModel:
         return np.clip(q, chain.lower + room, chain.upper - room)
 
     def joint_angles(self, q: FloatArray, gripper: float) -> dict[str, float]:
-        """Every movable joint's angle [rad] for arm joints (n,) and the driven finger joint."""
+        """Every driven joint's value [rad or m] for arm joints (n,) and the driven finger joint."""
         angles = dict(zip(self.arm.chain.names, (float(angle) for angle in q), strict=True))
         for joint, (factor, offset) in self.fingers.items():
             angles[joint] = factor * gripper + offset
@@ -126,53 +127,44 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     Raises:
         RobotDescriptionError: the file cannot be read, or lacks what an arm needs; says what.
     """
-    check_description(path)
+    with reading(path):
+        return _read(path, tool)
+
+
+def _read(path: Path, tool: str | None) -> RobotModel:
     import yourdfpy
 
-    try:
-        # What is not finite is told below.
-        with np.errstate(invalid="ignore"):
-            urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
-            frames = {link: np.asarray(urdf.get_transform(link)) for link in urdf.link_map}
-    except Exception as error:
-        raise RobotDescriptionError(f"{path} is not a robot description: {error}") from error
-    for joint in urdf.joint_map.values():
-        if joint.origin is not None and not np.isfinite(joint.origin).all():
-            raise RobotDescriptionError(f"Joint {joint.name!r} has an origin that is not finite.")
-
-    links = _tools(urdf, path, tool)
-    driven = _driven_joints(urdf, links[0])
-    joints = [urdf.joint_map[name] for name in driven]
+    urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    frames = {link: np.asarray(urdf.get_transform(link)) for link in urdf.link_map}
+    structure = structure_of(urdf, path, tool)
+    joints = structure.axes
     T_base_shoulder = _shoulder_frame(frames, joints)
     T_shoulder_base = se3.inverse(T_base_shoulder)
-    tools = {link: frozen(T_shoulder_base @ frames[link]) for link in links}
-    chain = Chain(
-        M=tools[links[0]],
+    described = Chain(
+        M=T_shoulder_base @ frames[structure.tools[0]],
         S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
         lower=np.array([_limit(joint, "lower") for joint in joints]),
         upper=np.array([_limit(joint, "upper") for joint in joints]),
         speed=np.array([_limit(joint, "velocity") for joint in joints]),
-        names=tuple(driven),
+        names=tuple(joint.name for joint in joints),
     )
-    others = [j for j in urdf.joint_map.values() if j.name not in driven and j.type != "fixed"]
-    fingers = [joint for joint in others if joint.type == "revolute"]
-    notes = [*arm_of(chain).notes]
-    notes += [
-        f"Joint {j.name!r} is {j.type} and stays at zero." for j in others if j not in fingers
-    ]
-    if tool is None and links[0] not in TOOL_FRAMES:
-        notes += [
-            f"Joint {j.name!r} is taken for that of a gripper; {links[0]!r} is the tool."
-            for j in fingers
-            if j.mimic is None
-        ]
-    bodies, missing = _bodies(urdf, path, frames)
+    up = T_shoulder_base[:3, 2]
+    chain, notes = idealised(described, up)
+    tools = {
+        link: idealised(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
+        for link in structure.tools
+    }
+    fingers = fingers_of(structure.hand, structure.others, frames)
+    notes = [*notes, *fingers.notes]
+    if structure.chosen and fingers.driven:
+        notes.append(_taken_for_gripper(fingers, structure.tools[0]))
+    bodies, missing = _bodies(urdf, path, frames, chain, fingers)
     return RobotModel(
         name=urdf.robot.name,
-        arm=Arm(chain, tools, links[0], _gripper(path, fingers)),
+        arm=Arm(chain, tools, structure.tools[0], fingers.gripper),
         T_base_shoulder=frozen(T_base_shoulder),
         bodies=bodies,
-        fingers=_follow(fingers),
+        fingers=fingers.follow,
         stretches=read_stretches(
             path.parent / CONDUITS, lambda start, end: _hinge(bodies, chain, start, end)
         ),
@@ -180,66 +172,17 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> RobotModel:
     )
 
 
-def _tools(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> list[str]:
-    """The tool links, the default one first."""
-    if tool is not None and tool not in urdf.link_map:
-        raise RobotDescriptionError(
-            f"{path.name} has no link {tool!r}; its links are {', '.join(urdf.link_map)}."
-        )
-    known = [link for link in TOOL_FRAMES if link in urdf.link_map]
-    if tool is not None:
-        return [tool, *(link for link in known if link != tool)]
-    if known:
-        return known
-    turning = {link: _joints_to(urdf, link) for link in urdf.link_map}
-    five = [
-        link
-        for link, joints in turning.items()
-        if sum(joint.type in TURNING for joint in joints) == FIVE
-        and all(joint.type in (*TURNING, "fixed") for joint in joints)
-    ]
-    if not five:
-        raise RobotDescriptionError(
-            f"{path.name} has no link that hangs on five turning joints; "
-            f"its joints are {', '.join(f'{j.name} ({j.type})' for j in urdf.joint_map.values())}."
-        )
-    return [max(five, key=lambda link: len(turning[link]))]
+def _taken_for_gripper(fingers: Fingers, tool: str) -> str:
+    names = ", ".join(map(repr, fingers.driven))
+    if len(fingers.driven) == 1:
+        return f"Joint {names} is taken for that of a gripper; {tool!r} is the tool."
+    return (
+        f"Joints {names} are taken for those of a gripper and driven together; "
+        f"{tool!r} is the tool."
+    )
 
 
-def _joints_to(urdf: yourdfpy.URDF, link: str) -> list[Any]:
-    """The joints from the root to ``link``, in that order."""
-    by_child = {joint.child: joint for joint in urdf.joint_map.values()}
-    joints: list[Any] = []
-    while link in by_child:
-        joints.append(by_child[link])
-        link = by_child[link].parent
-    return joints[::-1]
-
-
-def _driven_joints(urdf: yourdfpy.URDF, tool: str) -> list[str]:
-    """The movable joints from the root to ``tool``, in that order."""
-    names: list[str] = []
-    for joint in _joints_to(urdf, tool):
-        if joint.mimic is not None:
-            raise RobotDescriptionError(
-                f"Joint {joint.name!r} follows joint {joint.mimic.joint!r}; "
-                f"the five axes that carry {tool!r} must each turn by themselves."
-            )
-        if joint.type in TURNING:
-            names.append(joint.name)
-        elif joint.type != "fixed":
-            raise RobotDescriptionError(
-                f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}."
-            )
-    if len(names) != FIVE:
-        raise RobotDescriptionError(
-            f"Link {tool!r} hangs on {len(names)} turning joints ({', '.join(names)}); "
-            "the tool of a five-axis arm hangs on five. Name another link with --tool."
-        )
-    return names
-
-
-def _shoulder_frame(frames: Mapping[str, FloatArray], joints: list[Any]) -> FloatArray:
+def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[Any]) -> FloatArray:
     """{S}: the link of that name, else parallel to the root where axis 1 passes axis 2."""
     if SHOULDER_FRAME in frames:
         return frames[SHOULDER_FRAME]
@@ -272,25 +215,10 @@ def _limit(joint: Any, which: str) -> float:
     return float(value)
 
 
-def _gripper(path: Path, fingers: list[Any]) -> Gripper:
-    leaders = [joint for joint in fingers if joint.mimic is None]
-    if not leaders:
-        return NO_GRIPPER
-    if len(leaders) > 1:
-        raise RobotDescriptionError(
-            f"{path.name} has {len(leaders)} driven finger joints "
-            f"({', '.join(joint.name for joint in leaders)}); let all but one mimic that one."
-        )
-    return Gripper(*(_limit(leaders[0], which) for which in ("lower", "upper", "velocity")))
-
-
-def _follow(fingers: list[Any]) -> dict[str, tuple[float, float]]:
-    return {
-        joint.name: (1.0, 0.0)
-        if joint.mimic is None
-        else (float(joint.mimic.multiplier), float(joint.mimic.offset))
-        for joint in fingers
-    }
+def _motion(axis: FloatArray, value: float, *, slides: bool) -> FloatArray:
+    if slides:
+        return se3.from_rotation_translation(np.eye(3), value * axis)
+    return se3.from_rotation_translation(so3.exp(value * axis), np.zeros(3))
 
 
 def _hinge(bodies: Sequence[Body], chain: Chain, start: str, end: str) -> Hinge:
@@ -326,7 +254,11 @@ def _weight(inertial: Any) -> tuple[float, FloatArray]:
 
 
 def _bodies(
-    urdf: yourdfpy.URDF, path: Path, frames: Mapping[str, FloatArray]
+    urdf: yourdfpy.URDF,
+    path: Path,
+    frames: Mapping[str, FloatArray],
+    chain: Chain,
+    fingers: Fingers,
 ) -> tuple[tuple[Body, ...], list[Path]]:
     """Every link, parents first, and the meshes that were not found."""
     by_child = {joint.child: joint for joint in urdf.joint_map.values()}
@@ -339,12 +271,18 @@ def _bodies(
         joint = by_child.get(link)
         if joint is None:
             parent, T, name, axis = None, np.eye(4), None, np.array([0.0, 0.0, 1.0])
+            slides = False
         else:
             parent = joint.parent
             add(parent)
             T = se3.inverse(frames[parent]) @ frames[link]
-            name = joint.name if joint.type in TURNING else None
+            driven = joint.name in chain.names or joint.name in fingers.follow
+            name = joint.name if driven else None
+            slides = joint.type == SLIDING
             axis = np.asarray(joint.axis, dtype=float)
+            axis = axis / (float(np.linalg.norm(axis)) or 1.0)
+            if rest := fingers.resting.get(joint.name, 0.0):
+                T = T @ _motion(axis, rest, slides=slides)
         shapes = urdf.link_map[link]
         visuals, absent = visuals_of(shapes.visuals, urdf.robot.materials, path.parent)
         missing.extend(absent)
@@ -356,7 +294,17 @@ def _bodies(
         moves = name is not None or (parent is not None and bodies[parent].moves)
         mass, centre = _weight(shapes.inertial)
         bodies[link] = Body(
-            link, parent, frozen(T), name, frozen(axis), visuals, collisions, moves, mass, centre
+            link,
+            parent,
+            frozen(T),
+            name,
+            frozen(axis),
+            visuals,
+            collisions,
+            moves,
+            mass,
+            centre,
+            slides,
         )
 
     for link in urdf.link_map:

@@ -23,7 +23,7 @@ from app.view.controls import add_motion, ends, listener, set_slider, set_value
 from app.view.follower import READOUT_INTERVAL
 from app.view.ledger import LedgerList
 from app.view.looks import Shows, add_shows, add_views
-from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees
+from app.view.texts import AXIS_NAMES, READING_HINTS, READINGS, UNCHECKED, degrees, millimetres
 
 FARTHEST = 1000.0
 """[mm] Beyond any tool point of the arm: what a typed position may hold."""
@@ -129,14 +129,15 @@ class Panel:
 
     def _finger(self, state: State) -> viser.GuiSliderHandle[float]:
         fingers = self._model.arm.gripper
+        named = millimetres if fingers.slides else degrees
         slider = self._gui.add_slider(
             "Gripper",
             min=0.0,
             max=100.0,
             step=0.5,
             initial_value=self._opening(state.gripper_goal),
-            hint=f"Percent open: 0 is closed ({degrees(fingers.lower)} at each finger), "
-            f"100 is open ({degrees(fingers.upper)})",
+            hint=f"Percent open: 0 is closed ({named(fingers.lower)} at each finger), "
+            f"100 is open ({named(fingers.upper)})",
         )
         slider.precision = 1
         self._on_person(slider, lambda: cmd.SetGripper(self._finger_angle(slider.value)))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.geometry import se3, so3
+from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
 from app.programs.order import Go, Use
@@ -152,8 +152,7 @@ def _poses(model: RobotModel, q: FloatArray, fingers: float) -> dict[str, FloatA
             body.T_parent_body if body.parent is None else found[body.parent] @ body.T_parent_body
         )
         if body.joint is not None:
-            turn = so3.exp(angles[body.joint] * body.axis)
-            T = T @ se3.from_rotation_translation(turn, np.zeros(3))
+            T = T @ body.motion(angles[body.joint])
         found[body.name] = T
     return found
 

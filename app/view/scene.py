@@ -1,4 +1,4 @@
-"""The arm in the browser: a tree of frames that move by rotation only, and its ghost."""
+"""The arm in the browser: a tree of frames that each turn or slide, and its ghost."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from app.geometry import so3
 from app.geometry.arrays import FloatArray
 from app.robot.model import RobotModel
 from app.robot.visual import Visual
-from app.view.posing import Quaternion, turn
+from app.view.posing import Quaternion, place, turn
 
 Colour = tuple[int, int, int]
 """Red, green, blue of 255."""
 
 ANGLE_WORTH_SENDING = 1e-7
-"""[rad] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
+"""[rad or m] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
 
 GAP_WORTH_SEEING = 1e-3
 """[m]"""
@@ -43,11 +43,35 @@ class _Jointed:
     across: list[float]
     angle: float = math.inf
 
+    def move(self, angle: float) -> None:
+        """Send its turn for the joint at ``angle`` [rad]."""
+        turn(self.frame, self.at(angle))
+
     def at(self, angle: float) -> Quaternion:
         """Its turn in its parent with the joint at ``angle`` [rad]."""
         c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
         w, x, y, z = (c * a + s * b for a, b in zip(self.straight, self.across, strict=True))
         return w, x, y, z
+
+
+@dataclass
+class _Sliding:
+    """A link that slides, as it was last sent.
+
+    start, way: (3,) its place at the joint's zero and what a metre of the joint adds to it [m].
+    angle: the value of the joint that was sent [m].
+    """
+
+    joint: str
+    frame: viser.FrameHandle
+    start: FloatArray
+    way: FloatArray
+    angle: float = math.inf
+
+    def move(self, value: float) -> None:
+        """Send its place for the joint at ``value`` [m]."""
+        x, y, z = (self.start + value * self.way).tolist()
+        place(self.frame, (x, y, z))
 
 
 class FrameTree:
@@ -58,7 +82,7 @@ class FrameTree:
         self._server = server
         self.root = server.scene.add_frame(root, show_axes=False)
         self.path: dict[str, str] = {}
-        self._joints: list[_Jointed] = []
+        self._joints: list[_Jointed | _Sliding] = []
         for body in model.bodies:
             parent = root if body.parent is None else self.path[body.parent]
             self.path[body.name] = f"{parent}/{body.name}"
@@ -69,17 +93,20 @@ class FrameTree:
                 wxyz=straight,
                 position=body.T_parent_body[:3, 3],
             )
-            if body.joint is not None:
+            if body.joint is not None and body.slides:
+                way = body.T_parent_body[:3, :3] @ body.axis
+                self._joints.append(_Sliding(body.joint, frame, body.T_parent_body[:3, 3], way))
+            elif body.joint is not None:
                 across = so3.quaternion_product(straight, (0.0, *body.axis))
                 self._joints.append(_Jointed(body.joint, frame, straight.tolist(), across.tolist()))
 
     def move(self, angles: Mapping[str, float]) -> None:
-        """Turn the links to the joint ``angles`` [rad]; sends only what changed."""
+        """Bring the links to the joint ``angles`` [rad or m]; sends only what changed."""
         for jointed in self._joints:
             angle = angles[jointed.joint]
             if abs(angle - jointed.angle) > ANGLE_WORTH_SENDING:
                 jointed.angle = angle
-                turn(jointed.frame, jointed.at(angle))
+                jointed.move(angle)
 
 
 class ArmNodes(FrameTree):

@@ -90,6 +90,7 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
+    Reason.GRIPPER_SLIDE_LIMIT: lambda f: f"the gripper at its limit of {millimetres(f.amount)}",
     Reason.YAW_FIXED: lambda f: (
         f"wrist yaw is fixed by position: {_short(math.degrees(f.amount))}° off"
     ),

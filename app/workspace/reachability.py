@@ -6,9 +6,9 @@ that of pitch and roll, each taken all round in equal steps, at which some postu
 there with every joint inside its limits and elbow, wrist and tool point not below the table. Bodies
 are not looked at: links may cross each other or the table's edge.
 
-All is worked out on the canonical arm (app/kinematics/arm.py), for every member of the family whose
-tool point lies on the roll axis. Where the arm's plane passes beside axis 1 there are two planes
-through a point, one a shoulder; the same pitch and roll in both counts once.
+All is worked out on the canonical arm (app/kinematics/arm.py). Where its plane passes beside axis 1
+there are two planes through a point, one a shoulder; the same pitch and roll in both counts once. A
+tool point beside the roll axis moves as the tool rolls, so each roll is looked at by itself.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from app import tolerances
 from app.errors import InputError, RobotDescriptionError
-from app.geometry import se3
+from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray
 from app.kinematics.arm import FiveAxisArm, arm_of
 from app.kinematics.chain import Chain
@@ -42,7 +42,7 @@ class Reachability:
     chain: the arm with its tool, in {S}. T_base_shoulder: (4, 4) where {S} stands. table: height z
     of the table in the base frame [m]. pitches, rolls: in how many steps a turn is cut. Raises
     InputError for another number of steps than 1 to MOST_STEPS, RobotDescriptionError for an arm
-    whose axis 1 is not upright or whose tool point is not on the roll axis.
+    whose axis 1 is not upright.
     """
 
     chain: Chain
@@ -55,16 +55,12 @@ class Reachability:
         for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
             if not 1 <= steps <= MOST_STEPS:
                 raise InputError(f"The number of {name} is {steps}; give 1 to {MOST_STEPS}.")
-        for what, off in (
-            ("axis 1 must be upright", self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)),
-            ("the tool point must lie on axis 5", self._arm.off_axis),
-        ):
-            size = float(np.linalg.norm(off))
-            if size > tolerances.MAPPED_ARM:
-                raise RobotDescriptionError(
-                    f"The workspace of this arm cannot be mapped: {what}, which is off by "
-                    f"{size:.3g} (m or rad)."
-                )
+        lean = float(np.linalg.norm(self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)))
+        if lean > tolerances.MAPPED_ARM:
+            raise RobotDescriptionError(
+                "The workspace of this arm cannot be mapped: axis 1 must be upright, and it leans "
+                f"by {math.degrees(lean):.3g} deg."
+            )
 
     @property
     def _arm(self) -> FiveAxisArm:
@@ -84,7 +80,7 @@ class Reachability:
     def reach(self) -> float:
         """No point farther than this from the origin of {C} can be reached [m]."""
         arm = self._arm
-        return math.hypot(abs(arm.a) + arm.l1 + arm.l2 + arm.l3, arm.d)
+        return math.hypot(abs(arm.a) + arm.l1 + arm.l2 + arm.l3, arm.d) + arm.off_axis
 
     def grid(self, voxel: float) -> VoxelGrid:
         """The voxels of edge `voxel` [m] that may hold a reachable point."""
@@ -98,38 +94,51 @@ class Reachability:
         near = np.flatnonzero(within)
         counts = np.zeros(len(points), dtype=np.int64)
         possible = np.zeros((len(near) * self.pitches, self.rolls), dtype=np.bool)
-        for poses in self.tool_poses(p[near]):
-            T = poses.reshape(-1, 4, 4)
-            q = postures.at(self.chain, T)
-            pose, branch = np.nonzero(self._free(q))
-            # The postures for a pose out of reach only come near it.
-            exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
-            pose, branch = pose[exact], branch[exact]
-            rollable = self._rollable(q[pose, branch, 4])
-            for number in range(q.shape[1]):
-                here = branch == number
-                possible[pose[here]] |= rollable[here]
+        beside = self._arm.off_axis > 0.0
+        for roll in range(self.rolls if beside else 1):
+            # What a posture can be rolled to: everything, or nothing but the roll it is for.
+            rolls = slice(roll, roll + 1) if beside else slice(None)
+            for poses in self.tool_poses(p[near], roll):
+                T = poses.reshape(-1, 4, 4)
+                q = postures.at(self.chain, T)
+                pose, branch = np.nonzero(self._free(q))
+                # The postures for a pose out of reach only come near it.
+                exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
+                pose, branch = pose[exact], branch[exact]
+                rollable = self._rollable(q[pose, branch, 4])
+                if beside:
+                    rollable = rollable[:, :1]
+                for number in range(q.shape[1]):
+                    here = branch == number
+                    possible[pose[here], rolls] |= rollable[here]
         counts[near] = possible.reshape(len(near), self.orientations).sum(axis=1)
         return counts
 
-    def tool_poses(self, p: FloatArray) -> Iterator[FloatArray]:
-        """T_S_tool (N, pitches, 4, 4) at the points `p` (N, 3) of {C} [m], unrolled.
+    def tool_poses(self, p: FloatArray, roll: int = 0) -> Iterator[FloatArray]:
+        """T_S_tool (N, pitches, 4, 4) at the points `p` (N, 3) of {C} [m], at a step of the roll.
 
         Pitch 0 is outward and positive pitch downwards. Once for the arm facing the points and,
         where that makes another plane, once for the arm with its back to them.
         """
         arm = self._arm
         phi = np.linspace(0.0, math.tau, self.pitches, endpoint=False)
-        rho = np.hypot(p[:, 0], p[:, 1])
-        outward = np.sqrt(np.maximum(rho**2 - arm.d**2, 0.0))
+        angle = roll * math.tau / self.rolls
+        rho = np.hypot(p[:, 0], p[:, 1])[:, None]
         # On axis 1 every bearing will do.
-        bearing = np.where(rho == 0.0, 0.0, np.arctan2(p[:, 1], p[:, 0]))
-        facing = _tool_frames(p, bearing - np.arctan2(arm.d, outward), phi, behind=False)
-        T_S_C = se3.inverse(arm.T_C_S)
-        yield T_S_C @ facing @ arm.T_K_tool
-        if arm.d:
-            behind = _tool_frames(p, bearing - np.arctan2(arm.d, -outward), phi, behind=True)
-            yield T_S_C @ behind @ arm.T_K_tool
+        bearing = np.where(rho == 0.0, 0.0, np.arctan2(p[:, 1], p[:, 0])[:, None])
+        # From {K} to the tool point: (1 or pitches,) outward, sideways and up.
+        pitches = phi.tolist() if arm.off_axis else [0.0]
+        out, side, up = np.transpose([arm.beside(pitch, angle) for pitch in pitches])
+        T_S_C, roll_K = se3.inverse(arm.T_C_S), np.eye(4)
+        roll_K[:3, :3] = so3.rotation_x(angle)
+        for turn in (1.0, -1.0) if arm.d or arm.off_axis else (1.0,):
+            lateral = arm.d + turn * side
+            outward = turn * np.sqrt(np.maximum(rho**2 - lateral**2, 0.0))
+            alpha1 = bearing - np.arctan2(lateral, outward)
+            c, s = turn * np.cos(alpha1), turn * np.sin(alpha1)
+            beside = np.stack((c * out - s * side, s * out + c * side, up + 0.0 * c), axis=-1)
+            T_C_K = _roll_frames(p[:, None, :] - beside, c, s, phi)
+            yield T_S_C @ T_C_K @ roll_K @ arm.T_K_tool
 
     def _rollable(self, theta5: FloatArray) -> BoolArray:
         """(N, rolls) whether axis 5 can add each roll to its angle `theta5` (N,) [rad]."""
@@ -160,19 +169,18 @@ class Reachability:
         return p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
 
 
-def _tool_frames(p: FloatArray, alpha1: FloatArray, phi: FloatArray, *, behind: bool) -> FloatArray:
-    """T_C_K (N, pitches, 4, 4) at `p` (N, 3), in the planes at `alpha1` (N,), pitched by `phi`.
+def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -> FloatArray:
+    """T_C_K (N, pitches, 4, 4) at `p` (N, 1 or pitches, 3), unrolled and pitched by `phi`.
 
-    behind: the plane is seen from its back, where outward is against its own u.
+    c, s: (N, 1 or pitches) cosine and sine of the bearing that is outward. From the back of the
+    arm's plane that is against its own u.
     """
-    turn = -1.0 if behind else 1.0
-    c, s = turn * np.cos(alpha1)[:, None], turn * np.sin(alpha1)[:, None]
     cp, sp = np.cos(phi), np.sin(phi)
     T = np.zeros((len(p), len(phi), 4, 4))
     T[..., 0, 0], T[..., 0, 1], T[..., 0, 2] = c * cp, -s, c * sp
     T[..., 1, 0], T[..., 1, 1], T[..., 1, 2] = s * cp, c, s * sp
     T[..., 2, 0], T[..., 2, 2] = -sp, cp
-    T[..., :3, 3] = p[:, None, :]
+    T[..., :3, 3] = p
     T[..., 3, 3] = 1.0
     return T
 

@@ -106,8 +106,11 @@ def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('xyz="0.190', 'xyz="wide', "not a robot description"),
-        ('<mimic joint="finger_right_joint"', '<dynamics friction="0"', "driven finger"),
+        (
+            'xyz="0.190',
+            'xyz="wide',
+            r"edited.urdf, line \d+: xyz='wide .* 3 finite numbers",
+        ),
     ],
 )
 def test_a_file_that_will_not_do_is_refused_with_a_reason(
@@ -116,6 +119,12 @@ def test_a_file_that_will_not_do_is_refused_with_a_reason(
     path = edited(tmp_path, old, new)
     with pytest.raises(RobotDescriptionError, match=said):
         load(path)
+
+
+def test_a_finger_that_mimics_nothing_is_driven_with_the_other(tmp_path: Path) -> None:
+    other = load(edited(tmp_path, '<mimic joint="finger_right_joint"', '<dynamics friction="0"'))
+    angles = other.joint_angles(np.zeros(5), 0.2)
+    assert (angles["finger_right_joint"], angles["finger_left_joint"]) == (0.2, 0.2)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:

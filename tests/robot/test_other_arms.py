@@ -67,8 +67,9 @@ def test_the_youbot_is_that_of_its_manual() -> None:
     assert arm.signs[1] == -arm.signs[2] == arm.signs[3]
     np.testing.assert_allclose(model.T_base_shoulder[:3, 3], [0.0, 0.0, 0.147], atol=1e-15)
     assert list(model.arm.tools) == ["tip"]
-    assert [note for note in model.notes if "prismatic" in note] == list(model.notes)
-    assert len(model.notes) == 2
+    assert model.notes == ("Joint 'left' is taken for that of a gripper; 'tip' is the tool.",)
+    assert model.fingers == {"left": (1.0, 0.0), "right": (1.0, 0.0)}
+    assert (model.arm.gripper.lower, model.arm.gripper.upper) == (0.0, 0.0115)
 
 
 def test_the_chain_agrees_with_yourdfpy(path: Path, other: RobotModel) -> None:
@@ -202,9 +203,17 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
             '<mimic joint="shoulder"/><limit lower="-2.0',
             "'elbow' follows joint",
         ),
-        ('<axis xyz="1 0 0"/>', '<axis xyz="nan 0 0"/>', "'wrist_rotate' is not .* axis has nan"),
+        (
+            '<axis xyz="1 0 0"/>',
+            '<axis xyz="nan 0 0"/>',
+            "<axis> of <joint> 'wrist_rotate'",
+        ),
         ('lower="-1.97222205" ', "", "shoulder"),
-        ('<origin xyz="0.05 0 0.15"/>', '<origin xyz="0 inf 0"/>', "'elbow' has an origin"),
+        (
+            '<origin xyz="0.05 0 0.15"/>',
+            '<origin xyz="0 inf 0"/>',
+            "<origin> of <joint> 'elbow'",
+        ),
         ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.0008 0 0"/>', "write 1.570796 for 1.57"),
     ],
 )
@@ -269,10 +278,15 @@ def test_what_is_no_robot_description_is_told_as_it_is(
 
 
 def test_a_joint_behind_a_tool_that_nobody_named_is_told(tmp_path: Path) -> None:
-    more = """<link name="more"/><joint name="sixth" type="revolute"><parent link="fingertips"/>
+    more = """<link name="more"/><joint name="{}" type="revolute"><parent link="fingertips"/>
         <child link="more"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
     path = tmp_path / "six.urdf"
-    path.write_text(PINCHER.read_text().replace("</robot>", more))
+    path.write_text(PINCHER.read_text().replace("</robot>", more.format("jaw")))
     (note,) = load(path).notes
-    assert note == "Joint 'sixth' is taken for that of a gripper; 'fingertips' is the tool."
+    assert note == "Joint 'jaw' is taken for that of a gripper; 'fingertips' is the tool."
     assert load(path, "fingertips").notes == ()
+    # What no name calls a finger is an axis, until a person says where the tool is.
+    path.write_text(PINCHER.read_text().replace("</robot>", more.format("sixth")))
+    with pytest.raises(RobotDescriptionError, match=r"has 6 axes .* add --tool fingertips"):
+        load(path)
+    assert load(path, "fingertips").arm.gripper.moves

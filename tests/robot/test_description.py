@@ -1,0 +1,96 @@
+"""Faults of a URDF file: each is named with its file and line, and none in the words of Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yourdfpy
+
+from app.cli.assembly import recognised
+from app.errors import RobotDescriptionError
+from app.robot.model import load
+from app.settings import Settings
+from tests.robot.public_arms import PX150, urdf, written
+
+
+def edited(tmp_path: Path, old: str, new: str) -> Path:
+    text = urdf("arm", PX150)
+    assert old in text
+    path = tmp_path / "arm.urdf"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: this is xacro, .* xacro arm.urdf >"),
+        ('<link name="base"/>', '<xacro:arm xmlns:xacro="http://ros.org/wiki/xacro"/>', "is xacro"),
+        (
+            'xyz="0.05 0.0 0.15"',
+            'xyz="0.05 0.0"',
+            r"line \d+: xyz='0.05 0.0' .*'elbow' .* 3 finite",
+        ),
+        ('xyz="0.05 0.0 0.15"', 'xyz="5cm 0 0"', "xyz='5cm 0 0' .*must be 3 finite numbers"),
+        ('lower="-2.0"', 'lower="low"', "lower='low' of the <limit> of <joint> .* a finite number"),
+        ('<parent link="upper"/>', '<parent link="uper"/>', r"parent of joint 'elbow' is 'uper'"),
+        ('<child link="fore"/>', '<child link="for"/>', r"child of joint 'elbow' is 'for', and"),
+        ('<parent link="upper"/>', "", r"joint 'elbow' has no <parent>"),
+        ('<parent link="upper"/>', "<parent/>", r"the <parent> of <joint> 'elbow' has no 'link'"),
+        ('name="elbow" type="revolute"', 'name="elbow"', r"the <joint> 'elbow' has no 'type'"),
+        ('name="elbow" type="revolute"', 'name="elbow" type="hinge"', "of the type 'hinge'; known"),
+        ('name="elbow"', 'name="waist"', r"there is a joint 'waist' in line \d+ already"),
+        ('<link name="upper"/>', '<link name="upper"/><link name="upper"/>', "a link 'upper' in"),
+        (
+            '<link name="upper"/>',
+            '<link name="upper"/><link name="alone"/>',
+            r"not 2 \(base, alone",
+        ),
+        (
+            '<link name="upper"/>',
+            '<link name="upper"><visual><geometry><cone r="1"/></geometry></visual></link>',
+            "the shape of the <visual> of <link> 'upper' is <cone>; known are box",
+        ),
+        (
+            '<link name="upper"/>',
+            '<link name="upper"><collision><origin/></collision></link>',
+            "<collision> of <link> 'upper' has no shape",
+        ),
+        (
+            '<link name="upper"/>',
+            '<link name="upper"><visual><geometry><box size="1 1"/></geometry></visual></link>',
+            "size='1 1' of the <box> of <link> 'upper' must be 3 finite numbers",
+        ),
+        (
+            '<link name="upper"/>',
+            '<link name="upper"><inertial><mass value="heavy"/></inertial></link>',
+            "value='heavy' of the <mass> of <link> 'upper' must be a finite number",
+        ),
+    ],
+)
+def test_every_fault_of_a_file_is_named_with_its_line(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = edited(tmp_path, old, new)
+    with pytest.raises(RobotDescriptionError, match=said) as raised:
+        recognised(Settings(), path, None)
+    told = str(raised.value)
+    assert "arm.urdf" in told
+    for words in ("list.remove", "could not convert", "NoneType", "KeyError", "invalid literal"):
+        assert words not in told
+
+
+def test_a_fault_that_only_the_reader_finds_ends_in_a_sentence_of_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ValueError("list.remove(x): x not in list")
+
+    monkeypatch.setattr(yourdfpy.URDF, "load", fail)
+    path = written(tmp_path, "arm", PX150)
+    with pytest.raises(
+        RobotDescriptionError, match=r"arm.urdf cannot be read .*check_urdf"
+    ) as raised:
+        load(path)
+    assert "list.remove" not in str(raised.value)

@@ -1,0 +1,283 @@
+"""Arms as their makers describe them: taken with their grippers, or refused for the true reason."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from app.api import answers, requests
+from app.cli.assembly import Jointed, recognised
+from app.client.client import connect
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.state import Reason
+from app.drivers.simulated import SimulatedDriver
+from app.errors import RobotDescriptionError
+from app.kinematics.forward import forward
+from app.kinematics.inverse import inverse
+from app.kinematics.projection import project
+from app.robot.model import load
+from app.settings import Settings
+from tests.browser.server import APP, AppServer
+from tests.robot.public_arms import (
+    KATANAS,
+    PX100,
+    PX150,
+    ROLLS_TWICE,
+    SO101,
+    UR5,
+    VX300S,
+    YOUBOT_FINGERS,
+    Z1,
+    Z1_WITH_JAW,
+    J,
+    stewart,
+    written,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("name", KATANAS)
+def test_every_public_katana_is_an_arm_with_both_fingers_driven(tmp_path: Path, name: str) -> None:
+    model = load(written(tmp_path, name, KATANAS[name]))
+    assert model.arm.default_tool == "tool_frame"
+    gripper = model.arm.gripper
+    assert (gripper.lower, gripper.upper, gripper.speed) == (-0.44, 0.30, 0.718834)
+    assert not gripper.slides
+    angles = model.joint_angles(np.zeros(5), 0.2)
+    # The left finger's axis points the other way, so equal angles open both.
+    assert (angles["r"], angles["l"]) == (0.2, 0.2)
+    assert [note for note in model.notes if "'r', 'l'" in note and "driven together" in note]
+
+
+def test_sliding_fingers_move_within_their_limits(tmp_path: Path) -> None:
+    path = written(tmp_path, "px150", PX150)
+    model = load(path)
+    gripper = model.arm.gripper
+    assert (gripper.lower, gripper.upper, gripper.slides) == (0.015, 0.037, True)
+    assert model.joint_angles(np.zeros(5), 0.03) | {"waist": 0} == {
+        **dict.fromkeys(model.arm.chain.names, 0.0),
+        "left_finger": 0.03,
+        "right_finger": -0.03,
+    }
+    driver = SimulatedDriver(model.arm, np.zeros(5), 0.0)
+    assert driver.start(0.0).gripper == 0.015
+    robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    robot.update_cfg(dict.fromkeys(model.arm.chain.names, 0.0) | {"left_finger": 0.03})
+    frames: dict[str | None, Any] = {None: np.eye(4)}
+    angles = model.joint_angles(np.zeros(5), 0.03)
+    for body in model.bodies:
+        T = frames[body.parent] @ body.T_parent_body
+        frames[body.name] = T if body.joint is None else T @ body.motion(angles[body.joint])
+        np.testing.assert_allclose(frames[body.name], robot.get_transform(body.name), atol=1e-12)
+
+
+def test_a_session_drives_sliding_fingers_and_names_their_limit(tmp_path: Path) -> None:
+    model = load(written(tmp_path, "px150", PX150))
+    session = Session(model.arm, model.ready(Settings().ready))
+    state = session.begin(session.ready, model.arm.gripper.clamp(0.0), 0.0)
+    state = session.step(state, [cmd.SetGripper(0.05)], 0.01)
+    assert [(f.reason, f.amount) for f in state.findings] == [(Reason.GRIPPER_SLIDE_LIMIT, 0.037)]
+    for tick in range(2, 20):
+        state = session.step(state, [], 0.01 * tick)
+    assert state.gripper_setpoint == pytest.approx(0.037, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("joints", "expected"),
+    [
+        ([J("f", "prismatic", "hand", "a", limits=(0.0, 0.02))], {"f": (1.0, 0.0)}),
+        (YOUBOT_FINGERS, {"finger_l": (1.0, 0.0), "finger_r": (1.0, 0.0)}),
+        ([J("a", "prismatic", "hand", "left", limits=(-0.03, -0.01)),
+          J("b", "prismatic", "hand", "right", limits=(0.01, 0.03))],
+         {"b": (1.0, 0.0), "a": (-1.0, 0.0)}),
+        ([J("a", "revolute", "hand", "left", limits=(-0.5, 0.5)),
+          J("b", "revolute", "hand", "right", limits=(-0.5, 0.5))],
+         {"a": (1.0, 0.0), "b": (-1.0, 0.0)}),
+        ([J("a", "revolute", "hand", "left", limits=(0.0, 0.5)),
+          J("b", "revolute", "left", "tip", limits=(0.0, 1.0), mimic=("a", 2.0)),
+          J("c", "prismatic", "hand", "right", limits=(0.0, 0.02), mimic=("b", 0.01))],
+         {"a": (1.0, 0.0), "b": (2.0, 0.0), "c": (0.02, 0.0)}),
+    ],
+    ids=["one sliding", "youBot", "mirrored ranges", "parallel axes", "a chain of mimics"],
+)  # fmt: skip
+def test_fingers_of_every_kind_are_driven_together(
+    tmp_path: Path, joints: list[J], expected: dict[str, tuple[float, float]]
+) -> None:
+    model = load(written(tmp_path, "arm", [*PX150[:5], *joints]))
+    assert set(model.fingers) == set(expected)
+    assert next(iter(model.fingers)) == next(iter(expected))
+    for name, follow in expected.items():
+        assert model.fingers[name] == pytest.approx(follow)
+
+
+def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> None:
+    pan = J("pan_tilt", "revolute", "base", "camera", axis=(0.0, 1.0, 0.0), limits=(0.3, 0.8))
+    model = load(written(tmp_path, "arm", [*PX150, pan]))
+    camera = next(body for body in model.bodies if body.name == "camera")
+    assert camera.joint is None
+    assert camera.T_parent_body[0, 0] == pytest.approx(math.cos(0.3))
+    assert "Joint 'pan_tilt' is revolute and stays at 0.3 rad." in model.notes
+    assert "Joint 'gripper' is continuous and stays at zero." in model.notes
+
+
+@pytest.mark.parametrize(
+    ("joints", "said"),
+    [
+        (PX100, r"arm.urdf has 4 axes \(waist, shoulder, elbow, wrist_angle\)"),
+        (UR5, r"arm.urdf has 6 axes \(shoulder_pan, .*, wrist_3\); the closed-form"),
+        (Z1, r"has 6 axes \(joint1, .*, joint6\).*If joint6 only opens .*, add --tool link05"),
+        (Z1_WITH_JAW, r"has 6 axes \(joint1, .*, joint6\)"),
+        (VX300S, r"has 6 axes \(waist, shoulder, elbow, forearm_roll, wrist_angle, wrist_rotate\)"),
+        (ROLLS_TWICE, r"has 6 axes \(waist, shoulder, elbow, wrist_angle, wrist_rotate, sixth\)"),
+        (
+            [*UR5[:6], J("f", "fixed", "l6", "flange")],
+            r"has 6 axes \(shoulder_pan, .*, wrist_3\); the closed-form",
+        ),
+        (
+            [j._replace(name=f"{side}_{j.name}", child=f"{side}_{j.child}",
+                        parent=j.parent if j.parent == "base" else f"{side}_{j.parent}")
+             for side in ("left", "right") for j in PX150[:5]],
+            r"has 2 arms of 5 joints each, which begin at left_waist, right_waist.* --tool",
+        ),
+        (
+            [*Z1, J("rh_r1", "revolute", "link06", "trigger", limits=(-3.14, 3.14))],
+            r"has 6 axes \(joint1, .*, joint6\)",
+        ),
+        ([J("rail", "prismatic", "floor", "base"), *PX150[:5]], r"has 6 axes \(rail \(prismatic\)"),
+        ([J("rail", "prismatic", "floor", "base"), *PX100], r"axes of .* are rail \(prismatic\)"),
+    ],
+    ids=["PincherX-100", "UR5", "Z1", "Z1 with a jaw", "ViperX-300 6DOF", "a sixth axis",
+         "a flange on six", "two arms", "a trigger", "six with a rail", "five with a rail"],
+)  # fmt: skip
+def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J], said: str) -> None:
+    path = written(tmp_path, "arm", joints)
+    with pytest.raises(RobotDescriptionError, match=said):
+        load(path)
+    robot = recognised(Settings(), path, None)
+    assert isinstance(robot, Jointed)
+    assert [note for note in robot.notes if note.startswith("Joints only. ") and "arm.urdf" in note]
+
+
+@pytest.mark.parametrize(
+    "jaw",
+    [
+        J("gripper_joint_1", "revolute", "hand", "f", limits=(-6.28, 6.28)),
+        J("gripper", "continuous", "hand", "f", limits=None),
+        J("motor_6", "revolute", "hand", "moving_jaw", limits=(-0.2, 2.0)),
+        J("joint_6", "prismatic", "hand", "link_6", limits=(0.0, 0.02)),
+    ],
+    ids=["a wide range", "an endless one", "the link's name", "it slides"],
+)
+def test_a_last_joint_in_a_row_can_be_a_finger(tmp_path: Path, jaw: J) -> None:
+    model = load(written(tmp_path, "arm", [*PX150[:5], jaw]))
+    assert model.arm.chain.names == tuple(joint.name for joint in PX150[:5])
+
+
+def test_a_joint_beside_a_tool_frame_is_a_finger(tmp_path: Path) -> None:
+    frame = J("end", "fixed", "hand", "end_effector_link", (0.1, 0.0, 0.0))
+    sixth = J("joint_6", "revolute", "hand", "link_6")
+    model = load(written(tmp_path, "arm", [*PX150[:5], frame, sixth]))
+    assert model.arm.default_tool == "end_effector_link"
+    assert model.arm.gripper.moves
+
+
+def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
+    wheels = [
+        J(f"wheel_{n}", "continuous", "base", f"w{n}", axis=(0.0, 1.0, 0.0)) for n in range(4)
+    ]
+    model = load(written(tmp_path, "rover", [*wheels, *PX150]))
+    assert model.arm.chain.names == ("waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate")
+
+
+def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) -> None:
+    path = written(tmp_path, "stewart", stewart())
+    said = r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
+    with pytest.raises(RobotDescriptionError, match=r"(?i)" + said):
+        recognised(Settings(), path, None)
+    four_bar = [
+        J("a", "revolute", "ground", "crank"),
+        J("b", "revolute", "crank", "coupler"),
+        J("c", "revolute", "coupler", "rocker"),
+        J("d", "revolute", "rocker", "ground"),
+    ]
+    path = written(tmp_path, "four_bar", four_bar)
+    with pytest.raises(RobotDescriptionError, match=r"link 'ground' hangs on itself, by joint 'd'"):
+        recognised(Settings(), path, None)
+
+
+def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -> None:
+    path = written(tmp_path, "so101", SO101)
+    model = load(path)
+    chain = model.arm.chain
+    (note,) = [note for note in model.notes if "exact arm" in note]
+    assert "0.00021 deg" in note
+    rng = np.random.default_rng(3)
+    for q in rng.uniform(chain.lower, chain.upper, size=(300, 5)):
+        solutions = inverse(chain, project(chain, forward(chain, q), within_limits=False).T)
+        exact = [s for s in solutions if s.exact]
+        assert max(s.position_error for s in exact) < 1e-14
+        # Its own posture comes back: with the rounding of the file it was off by 35 mrad.
+        assert min(np.abs(np.sin(0.5 * (s.q - q))).max() for s in exact) < 1e-9
+    robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    moved = []
+    for q in rng.uniform(chain.lower, chain.upper, size=(100, 5)):
+        robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)) | {"gripper": 0.0})
+        T = model.T_base_shoulder @ forward(chain, q)
+        moved.append(T[:3, 3] - robot.get_transform("gripper_frame_link")[:3, 3])
+    # Less than the last digit of the file, and as much as the note says.
+    assert np.linalg.norm(moved, axis=1).max() < 1.5e-6
+    assert "about 0.001 mm" in note
+
+
+def ask(command: str, path: Path, *options: str, given: str = "") -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "app", command, "--urdf", str(path), *options],
+        input=given,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=120,
+        check=True,
+    )
+    return done.stdout
+
+
+def test_the_commands_take_an_so101(tmp_path: Path) -> None:
+    path = written(tmp_path, "so101", SO101)
+    q = [0.3, -0.2, 0.5, 0.4, 0.7]
+    T = json.loads(ask("fk", path, given=json.dumps({"q": q})))["T"]
+    answer = json.loads(ask("ik", path, given=json.dumps({"T": T})))
+    assert any(np.allclose(s["q"], q, atol=1e-9) for s in answer["solutions"])
+    coarse = ("--voxel", "80", "--pitches", "6", "--rolls", "4", "--samples", "30")
+    assert "The tool gripper_frame_link reaches" in ask("workspace", path, *coarse)
+
+
+@pytest.mark.parametrize(
+    "joints", [PX150, KATANAS["katana_300"], SO101], ids=["px150", "300", "so101"]
+)
+def test_they_are_served_with_their_grippers(tmp_path: Path, joints: list[J]) -> None:
+    path = written(tmp_path, "arm", joints)
+    with AppServer((*APP, "--urdf", str(path))) as server:
+        assert server.running
+        assert "Traceback" not in server.output
+        assert "Joints only" not in server.output
+        with connect(server.url) as client:
+            arm = client.look(answers.Arm)
+            assert arm.gripper is not None
+            closed, opened, _ = arm.gripper
+            assert arm.gripper_slides == (opened < 0.1)
+            state = next(iter(client.states()))
+            assert closed <= state.gripper <= opened
+            assert client.go(requests.Gripper(angle=opened)).gripper == opened
+            q = [angle + 0.05 for angle in state.q]
+            np.testing.assert_allclose(client.joints(q).q, q, atol=1e-9)

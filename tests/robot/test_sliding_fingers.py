@@ -1,0 +1,113 @@
+"""Fingers that slide, from the file to what they hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from app.collision.world import World
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.state import State
+from app.control.things import Form, Thing
+from app.geometry import se3
+from app.kinematics.forward import forward
+from app.robot.collision import hand_of, world_of
+from app.robot.model import RobotModel, load
+from app.settings import Settings
+from tests.robot.public_arms import PX150, urdf
+
+BOX = '<link name="{0}"><{1}><geometry><box size="{2}"/></geometry></{1}></link>'
+THICK = 0.01
+"""[m] Of a finger, along its way."""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A PincherX-150 with boxes for its fingers and its forearm."""
+    text = urdf("arm", PX150)
+    sizes = {"left": f"0.04 {THICK} 0.02", "right": f"0.04 {THICK} 0.02", "upper": "0.03 0.03 0.03"}
+    for link, size in sizes.items():
+        text = text.replace(f'<link name="{link}"/>', BOX.format(link, "collision", size))
+    path = tmp_path / "arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def model(path: Path) -> RobotModel:
+    return load(path)
+
+
+@pytest.fixture
+def world(model: RobotModel) -> World:
+    world, _ = world_of(model)
+    assert world is not None
+    return world
+
+
+def test_their_bodies_slide(path: Path, model: RobotModel, world: World) -> None:
+    robot = yourdfpy.URDF.load(str(path), load_meshes=False)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        q = rng.uniform(model.arm.chain.lower, model.arm.chain.upper)
+        opened = float(rng.uniform(0.015, 0.037))
+        robot.update_cfg(dict(zip(model.arm.chain.names, q, strict=True)) | {"left_finger": opened})
+        T = world.linkage.poses(np.append(q, opened))
+        for part in world.parts:
+            expected = robot.get_transform(part.name)
+            np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
+
+
+def test_no_distance_changes_more_than_their_bodies_travel(model: RobotModel, world: World) -> None:
+    ball = se3.from_rotation_translation(np.eye(3), np.array([0.3, 0.0, 0.2]))
+    thing = Thing("box", Form.BOX, (0.02, 0.02, 0.02), ball, can_be_held=True)
+    session = Session(model.arm, np.zeros(5), world, hand=hand_of(model, world), things=(thing,))
+    around = session.world_at(session.begin(session.ready, 0.02, 0.0))
+    assert around is not None
+    pairs = np.arange(len(around.first))
+    rng = np.random.default_rng(2)
+    tightest = 0.0
+    for _ in range(40):
+        x = np.append(rng.uniform(-0.5, 0.5, 5), rng.uniform(0.015, 0.037))
+        step = np.append(0.01 * rng.uniform(-1.0, 1.0, 5) * rng.integers(0, 2), 0.0)
+        step[5] = rng.uniform(0.015, 0.037) - x[5]
+        here, there = around.at(x), around.at(x + step)
+        change = np.abs(there.distances(pairs) - here.distances(pairs))
+        apart = here.distances(pairs) > 0.0
+        travel = around.travel(here, x, x + step)
+        assert (change <= travel + 2e-6)[apart].all()
+        tightest = max(tightest, float((change / np.maximum(travel, 1e-6))[apart].max()))
+    assert tightest > 0.5
+
+
+def run(session: Session, state: State, *commands: cmd.Command) -> State:
+    """Tick until the arm rests."""
+    state = session.step(state, commands, state.t + 0.01)
+    for _ in range(300):
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        if not state.moving:
+            return state
+        state = session.step(state, (), state.t + 0.01)
+    raise AssertionError(f"still on its way: {state.findings}")
+
+
+def test_they_hold_a_thing_and_let_go_of_it(model: RobotModel, world: World) -> None:
+    ready = model.ready(Settings().ready)
+    fingers = np.array([-0.027575, 0.0, 0.0])
+    T = model.T_base_shoulder @ forward(model.arm.chain, ready)
+    T[:3, 3] += T[:3, :3] @ fingers
+    width = 0.05
+    thing = Thing("block", Form.BOX, (0.02, width, 0.02), T, can_be_held=True)
+    session = Session(model.arm, ready, world, hand=hand_of(model, world), things=(thing,))
+    state = session.begin(ready, model.arm.gripper.upper, 0.0)
+    state = run(session, state, cmd.SetGripper(model.arm.gripper.lower))
+    (held,) = state.things
+    assert held.held
+    inside = 0.5 * (width + THICK)
+    assert state.gripper_setpoint == pytest.approx(inside, abs=1e-3)
+    left = run(session, state, cmd.SetGripper(state.gripper_setpoint + 2e-3))
+    assert not left.things[0].held
