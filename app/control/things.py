@@ -16,6 +16,7 @@ from app.control.solid import PLAIN, Look, Solid
 from app.errors import InputError
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, finite_array, frozen
+from app.water.around import Table
 
 MOST = 24
 """Things at a time."""
@@ -211,10 +212,14 @@ class Hand:
 class Surroundings:
     """The world for any things that stand around, and where these are."""
 
-    def __init__(self, world: World | None, hand: Hand | None) -> None:
-        """``world``: the arm, and what cannot be moved. ``hand``: None where nothing is held."""
+    def __init__(self, world: World | None, hand: Hand | None, table: Table | None = None) -> None:
+        """``world``: the arm, and what cannot be moved. ``hand``: None where nothing is held.
+
+        ``table``: what things stand on; None where that is not judged.
+        """
         self._world = world
         self.hand = hand
+        self.table = table
 
     def world(self, things: Sequence[Thing]) -> World | None:
         """With ``things``; None where nothing is looked at."""
