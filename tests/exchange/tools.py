@@ -9,6 +9,7 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 import tarfile
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,6 +19,7 @@ import pytest
 
 PACKAGES = {
     "gcc": "gcc",
+    "g++": "g++",
     "make": "make",
     "clang": "clang",
     "cmake": "cmake",
@@ -36,6 +38,11 @@ X_ITE = "x_ite@15.0.1"
 
 X_ITE_FOLDER = Path(__file__).parents[2] / ".cache" / X_ITE
 
+VTK = "vtk==9.7.2"
+"""Reads VRML worlds, from PyPI; kept apart from what the project depends on."""
+
+VTK_FOLDER = Path(__file__).parents[2] / ".cache" / VTK
+
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
@@ -52,6 +59,11 @@ def x_ite() -> Path | None:
     """Its script, if it is there."""
     script = X_ITE_FOLDER / "package" / "dist" / "x_ite.min.js"
     return script if script.is_file() else None
+
+
+def vtk_folder() -> Path | None:
+    """Its folder of modules, if it is there."""
+    return VTK_FOLDER if (VTK_FOLDER / "vtkmodules").is_dir() else None
 
 
 def needs(*names: str) -> pytest.MarkDecorator:
@@ -97,6 +109,15 @@ def fetch_x_ite() -> None:
         archive.unlink()
 
 
+def fetch_vtk() -> None:
+    """Unpack its wheel, which runs nothing."""
+    bring = [sys.executable, "-m", "pip", "install", "--no-deps", "--only-binary=:all:", "--quiet"]
+    command = [*bring, "--target", str(VTK_FOLDER), VTK]
+    print("Running:", *command, flush=True)
+    with suppress(subprocess.TimeoutExpired):
+        subprocess.run(command, check=False, timeout=300.0, capture_output=True)
+
+
 def main() -> None:
     """Say what the tests use; install it first if root can."""
     packages = missing(list(PACKAGES))
@@ -112,6 +133,9 @@ def main() -> None:
     if x_ite() is None and shutil.which("npm"):
         fetch_x_ite()
     print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
+    if vtk_folder() is None:
+        fetch_vtk()
+    print("VTK for the tests:", vtk_folder() or f"not here; pip brings {VTK}")
     packages = missing(list(PACKAGES))
     print(
         f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"
