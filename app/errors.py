@@ -39,3 +39,12 @@ def installing(extra: str) -> str:
         "Install it, in the folder of katana450, with: "
         f"{sys.executable} -m pip install --editable '.[{extra}]'"
     )
+
+
+def digits_beyond(value: float, lower: float, upper: float) -> str:
+    """Return ``value`` with the digits, four or more, that show it is not from lower to upper."""
+    for digits in range(4, 17):
+        text = f"{value:.{digits}g}"
+        if not lower <= float(text) <= upper:
+            return text
+    return repr(value)

@@ -17,8 +17,9 @@ class Place(Request, frozen=True, kw_only=True):
     cylinder (radius, height) or sphere (radius); of a mesh ``mesh`` is its key, as the upload told
     it, and the size is the file's. Its frame is in the middle of its underside. A new thing without
     ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may touch it,
-    and hold it when both do. ``colour``: as "#94a3b8", or "own" for that of the file. ``hidden``:
-    it is not drawn, and counts for contacts even so.
+    and hold it when both do. Such a thing, cup and basin are refused where nothing carries them:
+    they stand on the table or on another thing. ``colour``: as "#94a3b8", or "own" for that of the
+    file. ``hidden``: it is not drawn, and counts for contacts even so.
     """
 
     name: Name

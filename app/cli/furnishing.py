@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from app.cli.assembly import Described
+from app.control import commands as cmd
 from app.control.pouring import CUP
 from app.control.room import free_place
 from app.control.things import Form, Thing
@@ -50,6 +51,7 @@ def furnished(
         things.append(thing)
         meshes.append(mesh)
         said.append(f"{thing.name}: {mesh.said}")
+    session.check(cmd.Furnish(tuple(things), stored.scene.water))
     kept = {mesh.key: mesh for mesh in meshes}
     whole = StoredScene(replace(stored.scene, things=tuple(things)), tuple(kept.values()))
     return whole, tuple(said)

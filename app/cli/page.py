@@ -22,11 +22,19 @@ def write_page(options: argparse.Namespace) -> int:
         raise InputError(f"{path} must end in .html.")
     check_writable(path)
     shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
+    title = f"{shown.model.name}: {_shown(options.run, options.trajectory)}"
     count = int(shown.duration * FPS) + 1
     states = [shown.at(number / FPS) for number in range(count)]
     page = recorded(
-        shown.model, shown.session, progress(states, count, path.name), 1.0 / FPS, path.stem
+        shown.model, shown.session, progress(states, count, path.name), 1.0 / FPS, title
     ).encode()
     write_files({path: writer_of(page)})
     print(f"{path}: {len(page)} bytes")
     return 0
+
+
+def _shown(run: str | None, trajectory: Path | None) -> str:
+    """What the page shows, for its title."""
+    if trajectory is not None:
+        return trajectory.stem
+    return "one pose" if run is None else Path(run).stem

@@ -24,8 +24,8 @@ EXACT = 1e-6
 SEARCHED = 200
 """Corners of the true hull that are looked for; of more of them the planes are, that hold all."""
 
-CHUNK = 4_000_000
-"""Numbers worked on at once."""
+BLOCK = 200_000
+"""Numbers worked on at once: what a processor's cache holds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +63,15 @@ def outer(points: npt.ArrayLike) -> Outer:
     middle = 0.5 * (low + high)
     # About the origin and of length 1, so that one tolerance does for all.
     scaled, thickened = _with_volume((points - middle) / length)
-    corners, planes = _hull(scaled)
+    low, high = scaled.min(axis=0), scaled.max(axis=0)
+    corners, planes, spanning = _hull(scaled)
     volume = _volume(corners)
     off = 0.0
     if len(corners) > MOST:
         inside = corners.mean(axis=0)
-        cut = _cut(planes, scaled.min(axis=0), scaled.max(axis=0), inside)
-        corners, off = min(cut, _grown(scaled, corners, planes, inside), key=lambda found: found[1])
+        cut = _cut(planes, low, high, inside)
+        grown = _grown(spanning, corners, planes, inside)
+        corners, off = min(cut, grown, key=lambda found: found[1])
     return Outer(frozen(corners * length + middle), off * length, thickened, volume * length**3)
 
 
@@ -83,25 +85,53 @@ def _with_volume(points: FloatArray) -> tuple[FloatArray, bool]:
     return points, bool(flat)
 
 
-def _hull(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Its corners (k, 3), and its planes (m, 4): n (3,) and the h of n @ x <= h.
+def _hull(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Corners (k, 3) of the hull, its planes (m, 4), and the points (l, 3) that span what they do.
 
-    Begun with four of them; then what is farthest over each face is added (Barber et al., The
-    Quickhull algorithm for convex hulls, 1996), of all faces at once.
+    A plane is n (3,) and the h of n @ x <= h. The search begins with four corners and adds what is
+    farthest over each face (Barber et al., The Quickhull algorithm for convex hulls, 1996), of all
+    faces at once. Points inside what is found are not looked at again.
     """
-    chosen = np.array(_simplex(points))
+    corners = points[_simplex(points)]
     while True:
-        corners = points[chosen]
         normals, heights, _ = _faces(corners)
-        farthest, over = _farthest(points, normals)
+        farthest, over, outside = _over(points, normals, heights)
+        points = points[outside]
         out = over > heights + EXACT
-        if not out.any() or len(chosen) > SEARCHED:
+        if not out.any() or len(corners) > SEARCHED:
             break
-        chosen = np.unique(np.concatenate((chosen, farthest[out])))
+        corners = np.unique(np.concatenate((corners, farthest[out])), axis=0)
     # What is left out of a very round body is out by a hair; the planes hold it even so.
     planes = np.column_stack((normals, np.maximum(over, heights)))
     used = _used(corners)
-    return corners[used], _distinct(planes)
+    return corners[used], _distinct(planes), np.concatenate((corners, points))
+
+
+def _over(
+    points: FloatArray, normals: FloatArray, heights: FloatArray
+) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    """Of each face (m,) the point (m, 3) farthest over it and how far, and which are not inside.
+
+    Points within EXACT of a face count as inside. One pass over the points, in blocks that stay
+    in the processor's cache.
+    """
+    best = np.full(len(normals), -np.inf)
+    farthest = np.zeros((len(normals), 3))
+    outside = np.zeros(len(points), dtype=bool)
+    limit = (heights + EXACT)[:, None]
+    step = max(1, BLOCK // len(normals))
+    for at in range(0, len(points), step):
+        block = points[at : at + step]
+        along = normals @ block.T
+        number = along.argmax(axis=1)
+        most = along[np.arange(len(normals)), number]
+        better = most > best
+        best[better], farthest[better] = most[better], block[number[better]]
+        # Only where a face has something over it any point of the block can be outside.
+        rows = most > limit[:, 0]
+        if rows.any():
+            outside[at : at + step] = (along[rows] > limit[rows]).any(axis=0)
+    return farthest, best, outside
 
 
 def _simplex(points: FloatArray) -> list[int]:
@@ -120,13 +150,16 @@ def _farthest(
     points: FloatArray, directions: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
     """Of each direction (m, 3) the point that is farthest along it, and how far."""
-    step = max(1, CHUNK // len(points))
-    number = np.empty(len(directions), dtype=np.int64)
-    along = np.empty(len(directions))
-    for at in range(0, len(directions), step):
-        heights = points @ directions[at : at + step].T
-        number[at : at + step] = heights.argmax(axis=0)
-        along[at : at + step] = heights.max(axis=0)
+    number = np.zeros(len(directions), dtype=np.int64)
+    along = np.full(len(directions), -np.inf)
+    rows = np.arange(len(directions))
+    step = max(1, BLOCK // len(directions))
+    for at in range(0, len(points), step):
+        heights = directions @ points[at : at + step].T
+        best = heights.argmax(axis=1)
+        most = heights[rows, best]
+        better = most > along
+        number[better], along[better] = at + best[better], most[better]
     return number, along
 
 

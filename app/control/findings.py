@@ -43,16 +43,18 @@ def of_projection(
     """What the nearest feasible pose ``best`` gives up of the wished one."""
     findings = []
     in_place = best.position_error <= POSITION_WORTH_TELLING
-    pitch_gave_way = best.pitch_error > ANGLE_WORTH_TELLING
+    pitch_gave_way, roll_error = best.pitch_error > ANGLE_WORTH_TELLING, best.roll_error
     if not in_place:
         kept = reading is Reading.PITCH and not pitch_gave_way
         reason = Reason.POSITION_CHANGED if kept else Reason.OUT_OF_REACH
         findings.append(Finding(reason, best.position_error))
     if yaw_was_wished and best.yaw_error > ANGLE_WORTH_TELLING:
         findings.append(Finding(Reason.YAW_FIXED, best.yaw_error))
-    elif in_place and not pitch_gave_way and best.rotation_error > ANGLE_WORTH_TELLING:
-        findings.append(Finding(Reason.ROLL_CHANGED, best.rotation_error))
-    if in_place and pitch_gave_way:
+    elif in_place and not pitch_gave_way:
+        roll_error = max(roll_error, best.rotation_error)
+    if roll_error > ANGLE_WORTH_TELLING:
+        findings.append(Finding(Reason.ROLL_CHANGED, roll_error))
+    if pitch_gave_way and (in_place or reading is Reading.PITCH):
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
     if findings:
         if best.axis1:

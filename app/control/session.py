@@ -86,7 +86,7 @@ class Session:
         """
         self.arm = arm
         self.world = world
-        self.surroundings = Surroundings(world, hand)
+        self.surroundings = Surroundings(world, hand, None if around is None else around.table)
         self._things = things
         self.pouring = None if around is None else Pouring(around, self.surroundings)
         self._tool_speed = tool_speed
@@ -119,7 +119,7 @@ class Session:
 
     def check(self, command: cmd.Command) -> None:
         """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
-        check(self.arm, self.pouring, self.surroundings.hand, command)
+        check(self.arm, self.pouring, self.surroundings, command)
 
     def choices(self, state: State) -> tuple[Choice, ...]:
         """What there is to choose from on each branch."""

@@ -13,9 +13,10 @@ from app.collision.clearance import STOP
 from app.collision.shape import Shape, box, cylinder, hull, sphere
 from app.collision.world import Part, World, obstacle
 from app.control.solid import PLAIN, Look, Solid
-from app.errors import InputError
+from app.errors import InputError, digits_beyond
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, finite_array, frozen
+from app.water.around import Table
 
 MOST = 24
 """Things at a time."""
@@ -25,6 +26,9 @@ FARTHEST = 2.0
 
 LARGEST, SMALLEST = 2.0, 1e-3
 """[m] Of a thing, along any of its sides."""
+
+ROUNDING = 1e-6
+"""[1] Of a bound: what single precision makes of the length of a mesh that is on it."""
 
 LEAST_SCALE, MOST_SCALE = 1e-3, 1e3
 
@@ -103,8 +107,16 @@ class Thing:
             )
         # A mesh may be flat.
         least = size.max() if self.form is Form.MESH else size.min()
-        if not (self.scale * least >= SMALLEST and self.scale * size.max() <= LARGEST):
-            said = " by ".join(f"{self.scale * each:.4g}" for each in size.tolist())
+        slack = ROUNDING if self.form is Form.MESH else 0.0
+        longest = self.scale * float(size.max())
+        smallest = self.scale * float(least)
+        if smallest < SMALLEST * (1.0 - slack) or longest > LARGEST * (1.0 + slack):
+            said = " by ".join(
+                digits_beyond(self.scale * each, SMALLEST, LARGEST)
+                if not SMALLEST <= self.scale * each <= LARGEST
+                else f"{self.scale * each:.4g}"
+                for each in size.tolist()
+            )
             raise InputError(f"{what} has to be from {SMALLEST} to {LARGEST:g} m, not {said}.")
         object.__setattr__(self, "size", tuple(size.tolist()))
         if self.fixed and self.held:
@@ -212,10 +224,14 @@ class Hand:
 class Surroundings:
     """The world for any things that stand around, and where these are."""
 
-    def __init__(self, world: World | None, hand: Hand | None) -> None:
-        """``world``: the arm, and what cannot be moved. ``hand``: None where nothing is held."""
+    def __init__(self, world: World | None, hand: Hand | None, table: Table | None = None) -> None:
+        """``world``: the arm, and what cannot be moved. ``hand``: None where nothing is held.
+
+        ``table``: what things stand on; None where that is not judged.
+        """
         self._world = world
         self.hand = hand
+        self.table = table
 
     def world(self, things: Sequence[Thing]) -> World | None:
         """With ``things``; None where nothing is looked at."""

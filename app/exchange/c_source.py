@@ -76,6 +76,10 @@ def _part(link: Link, name: str) -> dict[str, str]:
             f"#ifndef {guard}",
             f"#define {guard}",
             "",
+            "#ifdef __cplusplus",
+            'extern "C" {',
+            "#endif",
+            "",
             f"#define {name.upper()}_FACES {len(faces)}",
             "",
             f"extern {arrays[0]};",
@@ -86,6 +90,10 @@ def _part(link: Link, name: str) -> dict[str, str]:
             "",
             "/* Draws it with its materials in the frame that is set. */",
             f"void {name}_draw(void);",
+            "",
+            "#ifdef __cplusplus",
+            "}",
+            "#endif",
             "",
             "#endif",
             "",
@@ -176,6 +184,10 @@ def _header(mechanism: Mechanism) -> str:
 #include <GL/gl.h>
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
 #define ROBOT_NAME {_text(mechanism.name)}
 #define ROBOT_JOINTS {len(mechanism.driven)}
 
@@ -197,6 +209,10 @@ extern const double robot_eye[3], robot_target[3], robot_field_of_view;
 
 /* Draws every link where the joint values put it. */
 void robot_draw(const double q[]);
+
+#ifdef __cplusplus
+}}
+#endif
 
 #endif
 """

@@ -28,7 +28,7 @@ Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 def glb_files(
     mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
 ) -> dict[str, bytes]:
-    """Name and content of the one file, at the joint `values` [rad, m]."""
+    """Name and content of the one file, at the joint `values` [rad, m] or where a motion begins."""
     (name,) = distinct([mechanism.name])
     return {f"{name}.glb": _Document(mechanism, values, motion).content()}
 
@@ -39,6 +39,7 @@ class _Document:
     def __init__(
         self, mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None
     ) -> None:
+        values = values if motion is None else motion.start
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from app.collision.outer import Outer, outer
+from app.collision.outer import Outer
 from app.control.solid import Solid
 from app.errors import InputError
 from app.exchange import creases
@@ -85,11 +85,10 @@ def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = N
     """
     format = Format.of(file)
     metres = None if unit is None else unit_of(unit)
-    shape = read_shape_guarded(data, format, file, metres, up)
+    shape, found = read_shape_guarded(data, format, file, metres, up)
     sign = next(sign for sign, length in UNITS.items() if length == shape.unit)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     foot = np.array((*(0.5 * (low + high)[:2]), low[2]))
-    found = outer(shape.vertices)
     told = f"{format.value} {sign} {'' if up is None else up.value}\n".encode()
     key = hashlib.sha256(told + data).hexdigest()[:32]
     x, y, z = (high - low).tolist()

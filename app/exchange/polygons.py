@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-import numpy.typing as npt
 
 from app.geometry.arrays import FloatArray, IntArray
 
@@ -18,8 +17,8 @@ def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntAr
 
     vertices: (n, 3) finite. corners: (k,) indices of them, polygon after polygon. sizes: (p,)
     corners each. A polygon of k corners gives k - 2 triangles, in its own sense of turning; one
-    that crosses itself gives as many, somehow. The effort grows as the square of the corners of a
-    concave one.
+    that crosses itself gives as many, somehow. The effort grows with the corners of a concave one
+    times those of them that lie as far along it as an ear does.
     """
     starts = np.cumsum(sizes) - sizes
     triangles, owners = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
@@ -65,8 +64,8 @@ def _ears(points: FloatArray) -> IntArray:
     count = len(flat)
     before, ahead = [*range(-1, count - 1)], [*range(1, count), 0]
     before[0] = count - 1
-    left = np.ones(count, dtype=bool)
-    is_ear = [_is_ear(flat, left, before[b], b, ahead[b]) for b in range(count)]
+    rest = _Rest(flat)
+    is_ear = [rest.is_ear(before[b], b, ahead[b]) for b in range(count)]
     ears = deque(b for b in range(count) if is_ear[b])
     found: list[tuple[int, int, int]] = []
     b = 0
@@ -77,32 +76,46 @@ def _ears(points: FloatArray) -> IntArray:
         b = ears.popleft() if ears else ahead[b]
         a, c = before[b], ahead[b]
         found.append((a, b, c))
-        left[b] = is_ear[b] = False
+        rest.left[b] = is_ear[b] = False
         ahead[a], before[c] = c, a
         # Of the others none becomes an ear by this, or ceases to be one.
         for corner in (a, c):
             was, is_ear[corner] = (
                 is_ear[corner],
-                _is_ear(flat, left, before[corner], corner, ahead[corner]),
+                rest.is_ear(before[corner], corner, ahead[corner]),
             )
             if is_ear[corner] and not was:
                 ears.append(corner)
     return np.array(found, dtype=np.int64)
 
 
-def _is_ear(flat: FloatArray, left: npt.NDArray[np.bool_], a: int, b: int, c: int) -> bool:
-    """Whether the corner b turns left and none of those left is in its triangle."""
-    ends = flat[[a, b, c]]
-    if _turn(ends[0], ends[1], ends[2:])[0] <= 0.0:
-        return False
-    others = flat[left]
-    inside = (
-        (_turn(ends[0], ends[1], others) >= 0.0)
-        & (_turn(ends[1], ends[2], others) >= 0.0)
-        & (_turn(ends[2], ends[0], others) >= 0.0)
-    )
-    # Its own corners do not count, nor those that a bridge to a hole puts there once more.
-    return bool((others[inside][:, None] == ends).all(axis=2).any(axis=1).all())
+class _Rest:
+    """The corners (k, 2) of a polygon that are left, in order along the axis it is longer on."""
+
+    def __init__(self, flat: FloatArray) -> None:
+        self._flat = flat
+        self.left = np.ones(len(flat), dtype=bool)
+        self._axis = int(np.ptp(flat, axis=0).argmax())
+        self._order = np.argsort(flat[:, self._axis], kind="stable")
+        self._along = flat[self._order, self._axis]
+
+    def is_ear(self, a: int, b: int, c: int) -> bool:
+        """Whether the corner b turns left and none of those left is in its triangle."""
+        ends = self._flat[[a, b, c]]
+        if _turn(ends[0], ends[1], ends[2:])[0] <= 0.0:
+            return False
+        span = ends[:, self._axis]
+        first = self._along.searchsorted(span.min(), "left")
+        last = self._along.searchsorted(span.max(), "right")
+        near = self._order[first:last]
+        others = self._flat[near[self.left[near]]]
+        inside = (
+            (_turn(ends[0], ends[1], others) >= 0.0)
+            & (_turn(ends[1], ends[2], others) >= 0.0)
+            & (_turn(ends[2], ends[0], others) >= 0.0)
+        )
+        # Its own corners do not count, nor those that a bridge to a hole puts there once more.
+        return bool((others[inside][:, None] == ends).all(axis=2).any(axis=1).all())
 
 
 def _turn(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:

@@ -2,7 +2,8 @@
 
 ``python -m app.exchange.reading FORMAT NAME UNIT UP`` is what `read_shape_guarded` starts: a
 process that binds itself before it looks at anything. Keys of the .npz: vertices, faces, colours
-if there are any, unit and said; or error alone, a sentence.
+if there are any, unit and said, and corners, off, thickened and volume of the convex body round
+it; or error alone, a sentence.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 
 import numpy as np
 
+from app.collision.outer import outer
 from app.errors import InputError
 from app.exchange.shape_file import MEMORY, SECONDS, Format, Up, read_shape
 
@@ -33,12 +35,13 @@ def main(words: list[str]) -> None:
             float(unit) if unit else None,
             Up(up) if up else None,
         )
+        body = outer(shape.vertices)
     except InputError as error:
         found["error"] = str(error)
     else:
         found = {
             key: getattr(shape, key) for key in ("vertices", "faces", "colours", "unit", "said")
-        }
+        } | vars(body)
     made = io.BytesIO()
     arrays = {key: np.array(value) for key, value in found.items() if value is not None}
     np.savez(made, allow_pickle=False, **arrays)

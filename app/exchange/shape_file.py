@@ -19,19 +19,23 @@ from pathlib import Path
 import numpy as np
 
 import app
-from app.errors import InputError
+from app.collision.outer import Outer
+from app.errors import InputError, digits_beyond
 from app.exchange.gltf_file import read_gltf
 from app.exchange.obj_file import read_obj
 from app.exchange.ply_file import read_ply
 from app.exchange.stl_file import read_stl
 from app.exchange.surface import Colours, Reading, Surface
 from app.exchange.vrml_file import read_wrl
-from app.geometry.arrays import FloatArray, IntArray
+from app.geometry.arrays import FloatArray, IntArray, frozen
 
 MOST_BYTES = 20_000_000
 
 LARGEST, SMALLEST = 2.0, 1e-3
 """[m] Of the longest side; the same as of things in control/things, which takes long to load."""
+
+ROUNDING = 1e-6
+"""[1] Of a bound: what single precision makes of a length that is on it."""
 
 LONGEST_NAME = 40
 """Characters; of things too."""
@@ -142,8 +146,8 @@ def read_shape(
 
 def read_shape_guarded(
     data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
-) -> ShapeFile:
-    """As `read_shape`, in a process of its own.
+) -> tuple[ShapeFile, Outer]:
+    """As `read_shape`, with the convex body round it, both worked out in a process of its own.
 
     It has `SECONDS` and, where the system counts it, `MEMORY`; InputError beyond that too, and
     when it crashes.
@@ -180,7 +184,7 @@ def read_shape_guarded(
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
         if "error" in found:
             raise InputError(str(found["error"]))
-        return ShapeFile(
+        shape = ShapeFile(
             thing_name(name),
             found["vertices"],
             found["faces"],
@@ -188,6 +192,13 @@ def read_shape_guarded(
             float(found["unit"]),
             str(found["said"]),
         )
+        body = Outer(
+            frozen(found["corners"]),
+            float(found["off"]),
+            bool(found["thickened"]),
+            float(found["volume"]),
+        )
+        return shape, body
 
 
 def label(name: str) -> str:
@@ -234,7 +245,7 @@ def _unit(format: Format, longest: float, told: float | None) -> tuple[float, st
         return told, f"the unit is {_sign(told)}, as told"
     if format in (Format.GLB, Format.GLTF):
         return 1.0, "the unit is m, as glTF has it"
-    if longest > LARGEST:
+    if longest > LARGEST * (1.0 + ROUNDING):
         return 1e-3, f"the unit is taken as mm, since {longest:.4g} m would be too large"
     return 1.0, f"the unit is taken as m, since {longest:.4g} mm would be small"
 
@@ -244,12 +255,14 @@ def _sign(unit: float) -> str:
 
 
 def _check_size(longest: float, unit: float, file: str) -> None:
-    if SMALLEST <= longest * unit <= LARGEST:
+    length = longest * unit
+    if SMALLEST * (1.0 - ROUNDING) <= length <= LARGEST * (1.0 + ROUNDING):
         return
     fitting = [s for s, metres in UNITS.items() if SMALLEST <= longest * metres <= LARGEST]
     hint = f"it would fit with the unit {' or '.join(fitting)}" if fitting else "no unit would fit"
+    said = digits_beyond(1e3 * length, 1e3 * SMALLEST, 1e3 * LARGEST)
     raise InputError(
-        f"{file} would be {longest * unit * 1e3:.4g} mm long, with {_sign(unit)} as its unit; "
+        f"{file} would be {said} mm long, with {_sign(unit)} as its unit; "
         f"from {SMALLEST * 1e3:g} to {LARGEST * 1e3:g} mm can be shown, and {hint}."
     )
 

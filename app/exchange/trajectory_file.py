@@ -45,6 +45,11 @@ class Motion:
     t: FloatArray
     values: Mapping[str, FloatArray]
 
+    @property
+    def start(self) -> dict[str, float]:
+        """Value [rad, m] of every joint at the first sample."""
+        return {name: float(values[0]) for name, values in self.values.items()}
+
     def keys(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Times (k,) [s] and values (k,) of one joint, with more of them where it turns far."""
         values = self.values[name]

@@ -49,7 +49,11 @@ _TURN = so3.rotation_x(-math.pi / 2.0)
 def world_of(
     mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
 ) -> World:
-    """The whole mechanism at the joint `values` [rad, m]; with a motion it plays it by itself."""
+    """The whole mechanism at the joint `values` [rad, m]; with a motion it plays it by itself.
+
+    A motion also sets the static pose to its first sample, for programs that play none.
+    """
+    values = values if motion is None else motion.start
     names = Names(mechanism)
     root = _link(mechanism, mechanism.links[0], values, names, set())
     nodes = [

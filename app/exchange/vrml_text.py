@@ -43,7 +43,6 @@ _TOKEN = re.compile(
 )
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _ZERO_AFTER = re.compile(r"\.0(?![0-9e])")
-_BARE_ZERO = re.compile(r"(?<![0-9.])0(?=\.)")
 _INTEGER = re.compile(r"[+-]?(?:[0-9]{1,10}|0[xX][0-9a-fA-F]{1,8})")
 _NUMBERS, _INTEGERS = (
     re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
@@ -107,8 +106,8 @@ def _quoted(text: str) -> str:
 
 
 def _short(numbers: str) -> str:
-    """Without the zeros that say nothing: .5 for 0.5 and 2 for 2.0."""
-    return _BARE_ZERO.sub("", _ZERO_AFTER.sub("", numbers))
+    """Write 2 for 2.0. The zero of 0.5 stays: VTK reads .0122 as 0."""
+    return _ZERO_AFTER.sub("", numbers)
 
 
 def read_world(text: str, name: str = "The file") -> World:

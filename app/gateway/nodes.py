@@ -6,6 +6,7 @@ set to goes through the same door. The names are those of the exported files.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -14,9 +15,10 @@ import numpy as np
 
 from app.api import answers, requests
 from app.control import commands as cmd
-from app.control.arrangement import look_of
+from app.control.arrangement import look_of, shifted
 from app.control.looks import Colour, Trait
 from app.control.state import State
+from app.control.support import check_carried, is_loose
 from app.control.things import Surroundings, Thing
 from app.errors import InputError
 from app.exchange.machine import Machine
@@ -165,7 +167,17 @@ class Nodes:
             if field.put is None:
                 raise InputError(f"{name} can be read and not set.")
             field.put(orders, None if each.value is None else _fitting(name, field, each.value))
+        self._check_carried(orders)
         return orders.command()
+
+    def _check_carried(self, orders: _Orders) -> None:
+        """Raise InputError for an object that would stand on nothing once all is moved."""
+        moves = [each for each in orders.others if isinstance(each, cmd.Shift)]
+        things = functools.reduce(shifted, moves, orders.state).things
+        for name in {each.name for each in moves}:
+            thing = next(each for each in things if each.name == name)
+            if is_loose(thing):
+                check_carried(self._surroundings.table, things, thing)
 
     def _field(self, state: State, node: str, field: str) -> _Field:
         found = self._nodes(state).get(node)

@@ -11,6 +11,7 @@ from app.control import commands as cmd
 from app.control.pouring import BASIN, CUP
 from app.control.room import free_place
 from app.control.solid import PLAIN, Look
+from app.control.support import check_carried, check_mounted, is_loose
 from app.control.things import MOST, Form, Mount, Thing, named
 from app.errors import InputError
 from app.gateway.hub import Hub
@@ -58,7 +59,10 @@ class Placing:
             T = arm.robot.T_base_shoulder @ T
         if thing.fixed:
             T = arm.surroundings.into_hand(T, arm.state.x)
-        return replace(thing, T=T)
+        placed = replace(thing, T=T)
+        if is_loose(placed):
+            check_carried(arm.surroundings.table, arm.state.things, placed)
+        return placed
 
     def _shaped(self, asked: requests.Place, known: Thing | None) -> Thing:
         """What it is, wherever that is."""
@@ -110,6 +114,7 @@ class Placing:
         to = Mount(asked.to.value)
         hand = arm.surroundings.hand
         if asked.T is None or hand is None:
+            check_mounted(arm.surroundings, arm.state.things, thing, to, arm.state.x)
             return cmd.Attach(asked.name, to)
         if to is not Mount.HAND:
             raise InputError("T is where on the hand it is to be; to put it elsewhere, `place` it.")

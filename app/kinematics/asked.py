@@ -19,6 +19,8 @@ class Asked(NamedTuple):
     x, y, z: where the point of {K} is to be, or one that is `beside` it as the plane sees it.
     tool: where the tool point is to be. along: the roll axis asked for, or None where any plane
     will do. orientation: of {K} with the plane at theta1 = 0, or in any where any will do.
+    inward: whether the roll axis points towards axis 1; None where the plane at theta1 shows it.
+    Counts only where the yaw does not.
     """
 
     x: float
@@ -29,6 +31,7 @@ class Asked(NamedTuple):
     along: Vector | None
     orientation: PlaneOrientation
     reading: Reading
+    inward: bool | None = None
 
     @staticmethod
     def pose(T_C_K: FloatArray, tool: Vector, reading: Reading) -> Asked:
@@ -52,6 +55,9 @@ class Asked(NamedTuple):
         if self.reading is Reading.POSE:
             return seen
         pitch = self.pitch(theta1)
+        if seen.overlap(pitch) <= tolerances.TOUCHING:
+            # Half a turn away every roll is equally near, so take the one asked for.
+            seen = self.orientation.seen_from(theta1 + math.pi)
         return PlaneOrientation.turned(pitch, seen.best_roll(pitch))
 
     def heading(self, theta1: float) -> Vector:
@@ -72,7 +78,9 @@ class Asked(NamedTuple):
             return self.orientation.best()[0]
         outward, sideways, down = self.heading(theta1)
         if self.reading is not Reading.POSE:
-            outward = math.copysign(math.hypot(outward, sideways), outward)
+            flat = math.hypot(outward, sideways)
+            inward = outward < 0.0 if self.inward is None else self.inward
+            outward = -flat if inward else flat
         return math.atan2(down, outward)
 
     @property
@@ -99,6 +107,10 @@ class Asked(NamedTuple):
     def pitched(self, arm: FiveAxisArm, pitch: float) -> Asked:
         """The same five freedoms but for the `pitch`."""
         return Asked.five(arm, self.tool, pitch, self.orientation.best()[1], self.reading)
+
+    def faced(self, *, inward: bool) -> Asked:
+        """The same with the roll axis pointing towards axis 1, or away from it."""
+        return self._replace(inward=inward)
 
     def moved(self, dx: float, dy: float, dz: float) -> Asked:
         """With another point, and the tool point asked as before."""

@@ -62,6 +62,11 @@ class PlaneOrientation(NamedTuple):
         c, s = math.cos(0.5 * phi), math.sin(0.5 * phi)
         return 2.0 * math.atan2(c * self.x - s * self.z, c * self.w + s * self.y)
 
+    def overlap(self, phi: float) -> float:
+        """Cosine of half the angle that the nearest roll leaves for a given phi."""
+        c, s = math.cos(0.5 * phi), math.sin(0.5 * phi)
+        return math.hypot(c * self.x - s * self.z, c * self.w + s * self.y)
+
     def best_pitch(self, psi: float) -> float:
         """The phi nearest for a given psi."""
         c, s = math.cos(0.5 * psi), math.sin(0.5 * psi)

@@ -43,7 +43,8 @@ class Projection:
     arrays are read-only. position_error [m] and rotation_error [rad]: between the asked pose and
     `T`. yaw_error [rad]: between the asked tool's roll axis and the arm's plane, which no five-axis
     arm can follow. pitch_error [rad]: between the two roll axes within that plane, or the two
-    pitches where the reading has the pitch count and not the yaw.
+    pitches where the reading has the pitch count and not the yaw. roll_error [rad]: the roll that
+    is missing where the pitch is kept and the yaw does not count, else 0.
     What keeps the arm from coming nearer: limits: indices (from 0) of the axes whose limit does.
     axis1: axis 1 is in the way, since the branch has no place across it, or the plane passes beside
     it. reach: the links do, which reach no farther that way.
@@ -56,6 +57,7 @@ class Projection:
     rotation_error: float
     yaw_error: float
     pitch_error: float
+    roll_error: float
     limits: tuple[int, ...]
     axis1: bool
     reach: bool
@@ -114,7 +116,12 @@ def measured(
     flat = math.hypot(outward, down)
     yaw_error, pitch_error = math.atan2(abs(sideways), flat), 0.0
     if asked.reading is not Reading.POSE or flat > tolerances.ON_AXIS:
-        pitch_error = abs(wrapped(arm.pitch(stance.alpha) - asked.pitch(theta1)))
+        pitch = arm.pitch(stance.alpha)
+        pitch_error = abs(wrapped(pitch - asked.pitch(theta1)))
+        if asked.reading is Reading.PITCH and asked.along is not None:
+            turned = math.pi - asked.pitch(theta1)
+            pitch_error = min(pitch_error, abs(wrapped(pitch - turned)))
+    pitch_kept = asked.reading is not Reading.POSE and pitch_error <= tolerances.SAME_ROTATION
     axis1 = position_error > tolerances.SAME_POSITION and _axis_1_binds(arm, asked, stance)
     # A yaw that is given up changes the pitch that is nearest.
     pitched = asked.reading is not Reading.POSE or yaw_error <= tolerances.SAME_ROTATION
@@ -127,6 +134,7 @@ def measured(
         rotation_error=so3.angle(reached[:3, :3], T[:3, :3]),
         yaw_error=yaw_error,
         pitch_error=pitch_error,
+        roll_error=in_plane.rotation_error if pitch_kept else 0.0,
         limits=limits,
         axis1=axis1,
         reach=(in_plane.posture_bound and in_plane.posture.stretched)

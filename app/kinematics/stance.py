@@ -54,14 +54,47 @@ def nearest_stance(
     branch: the one to stay on; None takes the one that comes nearest, and of equals the one nearest
     to the angles `hint`. A pitch that is held and that no posture has is not held.
     """
-    best = _solved(limited, asked, branch, hint)
-    if best is None:
-        asked = asked._replace(reading=Reading.POSITION)
-        best = _solved(limited, asked, branch, hint)
+    best = _reached(limited, asked, branch, hint)
+    if asked.reading is Reading.PITCH:
+        if asked.along is not None and (best is None or not _exact(best)):
+            best = _faced(limited, asked, branch, hint)
+        if best is None:
+            asked = asked._replace(reading=Reading.POSITION)
+            best = _reached(limited, asked, branch, hint)
     assert best is not None
-    if limited.arm.off_axis > 0.0:
+    return best
+
+
+def _reached(
+    limited: LimitedArm, asked: Asked, branch: Branch | None, hint: Five | None
+) -> Stance | None:
+    best = _solved(limited, asked, branch, hint)
+    if best is not None and limited.arm.off_axis > 0.0:
         return _shifted(limited, asked, best, branch, hint)
     return best
+
+
+def _faced(
+    limited: LimitedArm, asked: Asked, branch: Branch | None, hint: Five | None
+) -> Stance | None:
+    """The stance with the pitch kept, whichever way round the tool faces; None if there is none.
+
+    The yaw does not count, so a roll axis with the asked pitch may point away from axis 1 or
+    towards it. The way that keeps the roll is preferred, since the position is to give way.
+    """
+    branches = (branch,) if branch else dict(limited.planar(None))
+    ways = asked.faced(inward=False), asked.faced(inward=True)
+    tried = (_reached(limited, way, each, hint) for each in branches for way in ways)
+    found = [stance for stance in tried if stance is not None]
+    kept = [stance for stance in found if stance.rotation_error <= tolerances.SAME_ROTATION]
+    return _nearest(limited, asked, kept or found, hint) if found else None
+
+
+def _exact(stance: Stance) -> bool:
+    return (
+        stance.position_error <= tolerances.SAME_POSITION
+        and stance.rotation_error <= tolerances.SAME_ROTATION
+    )
 
 
 def _shifted(

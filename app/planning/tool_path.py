@@ -15,8 +15,9 @@ from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.arm import arm_of
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
-from app.kinematics.projection import project
+from app.kinematics.limited import LimitedArm
 from app.kinematics.reading import Reading
+from app.kinematics.stance import nearest_stance
 from app.kinematics.tool import ToolTarget
 from app.planning.curve import Curve, Tool
 from app.planning.jet import Coefficient, Jet
@@ -143,11 +144,9 @@ class ToolPath:
             _, qd = self._loose(np.array([middle]))
             good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
         target = self._target(failing)
-        theta1 = target.facing(self.chain, self.branch, float(self.near[0]))
-        T = target.pose(self.chain, theta1)
-        best = project(
-            self.chain, T, branch=self.branch, within_limits=False, reading=Reading.PITCH
-        )
+        limited = LimitedArm.of(self.chain, within_limits=False)
+        asked = target.asked(limited.arm, Reading.PITCH)
+        best = nearest_stance(limited, asked, self.branch, limited.arm.angles(self.near))
         short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
         raise InputError(
             f"The path leaves what the arm reaches on the branch {self.branch} "

@@ -10,6 +10,7 @@ import numpy as np
 
 from app.control import commands as cmd
 from app.control.room import girth
+from app.control.support import check_carried
 from app.control.things import Thing
 from app.errors import InputError
 from app.geometry import se3
@@ -67,6 +68,7 @@ class Put:
             raise InputError(f"{self.name} is in the hand: set it down first.")
         T = se3.from_rotation_translation(thing.T[:3, :3], (self.x, self.y, 0.0))
         put = replace(thing, T=T)
+        check_carried(bench.rig.session.surroundings.table, bench.state.things, put)
         # Each of them is looked at when it comes to where it stays.
         moved = {put.name for put in takewhile(_is_put, bench.ahead) if isinstance(put, Put)}
         for other in bench.state.things:

@@ -63,7 +63,8 @@ def listener(put: Callable[[cmd.Command], int]) -> Listen:
 
 
 def refuse(
-    event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any], error: KatanaError
+    event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any] | viser.TransformControlsEvent,
+    error: KatanaError,
 ) -> None:
     """Tell whoever asked why it is not done, in their window."""
     if event.client is not None:

@@ -14,7 +14,8 @@ from app.control import commands as cmd
 from app.control.pouring import BASIN, CUP
 from app.control.solid import FAINTEST, Look
 from app.control.state import State
-from app.control.things import LEAST_SCALE, MOST_SCALE, Mount, Thing, named
+from app.control.support import check_mounted
+from app.control.things import LEAST_SCALE, MOST_SCALE, Mount, Surroundings, Thing, named
 from app.errors import InputError
 from app.geometry import so3
 from app.geometry.arrays import frozen
@@ -36,8 +37,10 @@ class ObjectsPanel:
         server: viser.ViserServer,
         put: Callable[[cmd.Command], int],
         state: Callable[[], State],
+        surroundings: Surroundings,
     ) -> None:
-        """``state``: the newest."""
+        """``state``: the newest. ``surroundings``: what objects stand on and are fixed to."""
+        self._surroundings = surroundings
         self._put = put
         self._state = state
         self._things = state().things
@@ -93,7 +96,7 @@ class ObjectsPanel:
         self._on(self._scale, lambda thing: _scaled(thing, self._scale.value))
         self._on(self._turn, lambda thing: _turned(thing, math.radians(self._turn.value)))
         self._on(self._hidden, lambda thing: _looking(thing, hidden=self._hidden.value))
-        self._on(self._mounts, lambda thing: cmd.Attach(thing.name, MOUNTS[self._mounts.value]))
+        self._on(self._mounts, self._mounted)
         self._on(self._acts, self._acted)
         self._choice.on_update(lambda _: self._show(self._chosen(), anew=True))
         self._show(self._chosen(), anew=True)
@@ -128,6 +131,11 @@ class ObjectsPanel:
         yaw = math.degrees(so3.to_rpy(thing.T[:3, :3])[2])
         if abs(math.remainder(self._turn.value - yaw, 360.0)) > 0.5:
             set_value(self._turn, round(yaw) + 0.0)
+
+    def _mounted(self, thing: Thing) -> cmd.Command:
+        to, state = MOUNTS[self._mounts.value], self._state()
+        check_mounted(self._surroundings, state.things, thing, to, state.x)
+        return cmd.Attach(thing.name, to)
 
     def _acted(self, thing: Thing) -> cmd.Command:
         if self._acts.value == REMOVE:

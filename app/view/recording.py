@@ -23,6 +23,24 @@ CLEAR = "<style>canvas { opacity: 1 !important }</style>"
 """viser draws faintly until the light of the room is loaded. Where drawing takes as long as that it
 loses count and leaves the picture faint for good; and in a recording it loads again each time."""
 
+KEEP_LIGHT = """<script>{
+  const append = document.head.appendChild;
+  document.head.appendChild = function (node) {
+    if (node.type === 'module') {
+      delete document.head.appendChild;
+      const reset = /[\\w$]+\\.useEnvironment\\.set\\([\\w$]+\\(\\)\\)/;
+      node.textContent = node.textContent.replace(reset, 'void 0');
+    }
+    return append.call(this, node);
+  };
+}</script>"""
+"""Leaves the light of the room alone when somebody seeks backwards, and when the run begins anew.
+
+viser's player puts back its own environment map before it plays the messages from the start. Ours
+is then decoded again, and the scene is nearly black until that is done. The program of viser's
+page is unpacked in the browser, so it is changed there, on its way into the page.
+"""
+
 
 def recorded(
     model: RobotModel, session: Session, states: Iterable[State], interval: float, title: str
@@ -39,7 +57,7 @@ def recorded(
                 recording.insert_sleep(interval)
             scenery.show(state)
             traces.follow(state)
-        head = f"<title>{html.escape(title)}</title>{CLEAR}"
+        head = f"<title>{html.escape(title)}</title>{CLEAR}{KEEP_LIGHT}"
         return recording.as_html().replace(TITLE, head, 1)
     finally:
         close_server(server)

@@ -94,9 +94,7 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.YAW_FIXED: lambda f: (
         f"wrist yaw is fixed by position: {_short(math.degrees(f.amount))}° off"
     ),
-    Reason.PITCH_CHANGED: lambda f: (
-        f"pitch gives way by {_short(math.degrees(f.amount))}° to keep the position"
-    ),
+    Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {_short(math.degrees(f.amount))}°",
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
     Reason.LOPSIDED: _lopsided,
     Reason.NOT_AT_START: lambda f: (

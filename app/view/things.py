@@ -13,13 +13,16 @@ import viser
 from app.control.commands import Command, Place
 from app.control.solid import Solid
 from app.control.state import State
+from app.control.support import check_carried, is_loose
 from app.control.things import Form, Surroundings, Thing
+from app.errors import InputError
 from app.exchange.creases import Drawn, drawn, glb
 from app.exchange.meshes import Meshes
 from app.geometry import se3, so3
 from app.geometry.arrays import FloatArray, frozen
 from app.robot.props import Props
 from app.robot.visual import Visual
+from app.view.controls import refuse
 from app.view.guard import WORKSPACE
 from app.view.posing import place, turn
 from app.view.tint import Tint
@@ -155,7 +158,18 @@ class ThingNodes:
             self._dragged = None
         x, y, _ = (float(each) for each in event.target.position)
         T = se3.from_rotation_translation(thing.T[:3, :3], (x, y, float(thing.T[2, 3])))
-        self._put(Place(replace(thing, T=T)))
+        moved = replace(thing, T=T)
+        try:
+            if is_loose(moved):
+                check_carried(self._surroundings.table, self._seen, moved)
+        except InputError as error:
+            # It waits at the edge, and the handle comes back to it.
+            if event.phase == "end":
+                px, py, pz = thing.T[:3, 3].tolist()
+                place(self._handles[name], (px, py, pz))
+                refuse(event, error)
+            return
+        self._put(Place(moved))
 
 
 class _Shape:

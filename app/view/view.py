@@ -112,7 +112,9 @@ class View(Follower):
         self._tool = ""
         self._T_base_goal = np.eye(4)
         self._panel = Panel(server, model, mailbox.put, session.choices, shows, state)
-        self._objects = ObjectsPanel(server, mailbox.put, lambda: board.snapshot.state)
+        self._objects = ObjectsPanel(
+            server, mailbox.put, lambda: board.snapshot.state, session.surroundings
+        )
         self._programs: ProgramsPanel | None = None
         if besides.programs is not None:
             steering, scripts = besides.programs

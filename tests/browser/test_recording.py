@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from app.cli.main import main
@@ -28,6 +30,16 @@ FAINTEST = """() => {
   return getComputedStyle(canvas).opacity;
 }"""
 """How clear the picture is while viser would have it faint."""
+
+COUNT_IMAGES = """
+  window.images = 0;
+  const made = URL.createObjectURL;
+  URL.createObjectURL = (blob) => {
+    window.images += Number(blob.type === 'image/jpeg');
+    return made.call(URL, blob);
+  };
+"""
+"""Counts the pictures that are decoded; the light of the room comes as one."""
 
 NOW = "() => Number(document.querySelector('[role=slider]').getAttribute('aria-valuenow'))"
 
@@ -72,6 +84,47 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
         assert all(url.startswith(("file:", "blob:", "data:")) for url in asked)
     finally:
         context.close()
+
+
+def test_picture_stays_as_bright_when_somebody_seeks(browser: Browser, recording: Path) -> None:
+    """The light of the room is decoded once, and not again with every step backwards."""
+    page = browser.new_page(viewport={"width": 480, "height": 320})
+    page.add_init_script(COUNT_IMAGES)
+    try:
+        page.goto(f"{recording.as_uri()}?fixedDpr=0.5")
+        assert page.title() == "katana450: m"
+        page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
+        page.wait_for_function("() => window.images > 0")
+        page.locator("button").first.click()
+        before = settled_brightness(page)
+        images = page.evaluate("() => window.images")
+        for share in (0.8, 0.1, 0.6, 0.3):
+            box = page.locator(TRACK).bounding_box()
+            assert box is not None
+            page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+            page.wait_for_timeout(300)
+            assert brightness(page) == pytest.approx(before, rel=0.1)
+        assert page.evaluate("() => window.images") == images
+    finally:
+        page.close()
+
+
+def brightness(page: Page) -> float:
+    """Mean of the picture of the scene, 0 to 255."""
+    shot = page.locator("canvas[data-engine]").screenshot()
+    return float(np.asarray(Image.open(io.BytesIO(shot)).convert("L")).mean())
+
+
+def settled_brightness(page: Page) -> float:
+    """That of a picture that no longer changes."""
+    last = brightness(page)
+    for _ in range(60):
+        page.wait_for_timeout(500)
+        now = brightness(page)
+        if abs(now - last) < 0.5:
+            return now
+        last = now
+    return last
 
 
 def pan(page: Page) -> float:

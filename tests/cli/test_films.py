@@ -75,7 +75,7 @@ def test_the_pages_of_both_demos_are_small_and_ask_nobody(tmp_path: Path) -> Non
         assert main(["export", "html", "--out", str(path), "--run", run]) == 0
         assert path.stat().st_size < PAGE_AT_MOST
         text = path.read_text(encoding="utf-8")
-        assert f"<title>{run}</title>" in text
+        assert f"<title>katana450: {run}</title>" in text
         assert "__VISER_EMBED_DATA__" in text
 
 

@@ -41,6 +41,17 @@ def test_any_points_are_held(
     check_holds(outer(points), points)
 
 
+@pytest.mark.parametrize("count", [300, 30_000])
+def test_points_all_on_a_sphere_are_held(count: int) -> None:
+    """Every one is a corner of the true hull, and more than are looked for."""
+    points = np.random.default_rng(3).normal(size=(count, 3))
+    points = 0.1 * points / np.linalg.norm(points, axis=1, keepdims=True)
+    found = outer(points)
+    check_holds(found, points)
+    assert found.off < 0.02
+    assert found.volume == pytest.approx(4.0 / 3.0 * np.pi * 0.1**3, rel=0.07)
+
+
 def test_a_box_of_many_triangles_is_a_box() -> None:
     box = trimesh.creation.box((0.1, 0.2, 0.3)).subdivide().subdivide()
     points = box.vertices @ so3.exp((0.3, -0.2, 0.5)).T

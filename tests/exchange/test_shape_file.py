@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,14 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 from trimesh.exchange.gltf import export_gltf
 
+from app.collision.outer import outer
 from app.control import things
 from app.control.things import Form, Thing
 from app.errors import InputError
 from app.exchange import shape_file
 from app.exchange.glb import glb_files
 from app.exchange.mechanism import Mechanism
+from app.exchange.meshes import read_mesh
 from app.exchange.shape_file import (
     LARGEST,
     LONGEST_NAME,
@@ -279,6 +282,22 @@ def test_bounds_are_those_of_things() -> None:
     assert things.LONGEST_NAME == LONGEST_NAME
 
 
+def test_gltf_of_2_m_is_read_and_a_longer_one_is_told_from_the_bound() -> None:
+    """In single precision a side of 2 m is longer than 2 m by rounding."""
+    side = float(np.nextafter(np.float32(2.0), np.float32(3.0)))
+
+    def cube(side: float) -> bytes:
+        return bytes(trimesh.creation.box((side, 0.1, 0.1)).export(file_type="glb"))
+
+    mesh = read_mesh(cube(side), "long.glb")
+    assert Thing("long", Form.MESH, (), np.eye(4), solid=mesh.solid).size[0] > 2.0
+    with pytest.raises(InputError) as refused:
+        read_shape(cube(2.0002), Format.GLB, "long.glb")
+    found = re.search(r"would be ([0-9.]+) mm long, .* from 1 to 2000 mm", str(refused.value))
+    assert found
+    assert float(found[1]) > 2000.0
+
+
 def test_formats_go_by_the_end_of_a_name() -> None:
     assert [Format.of(f"a.{each.value.upper()}") for each in Format] == list(Format)
     assert Format.of("a.b.wrz") is Format.WRL
@@ -291,12 +310,13 @@ def test_a_guarded_reading_is_the_same() -> None:
     for file, unit, up in (("castle.wrl", None, Up.Z), ("gmsh.stl", 1e-3, None)):
         data = (FOREIGN / file).read_bytes()
         here = read_shape(data, Format.of(file), f"-{file}", unit, up)
-        there = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
+        there, body = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
         assert (there.name, there.unit, there.said) == (here.name, here.unit, here.said)
         np.testing.assert_array_equal(there.vertices, here.vertices)
         np.testing.assert_array_equal(there.faces, here.faces)
         np.testing.assert_array_equal(there.colours, here.colours)
         assert there.vertices.dtype == np.float64
+        np.testing.assert_array_equal(body.corners, outer(here.vertices).corners)
 
 
 def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> None:

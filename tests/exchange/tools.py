@@ -19,6 +19,7 @@ import pytest
 
 PACKAGES = {
     "gcc": "gcc",
+    "g++": "g++",
     "make": "make",
     "clang": "clang",
     "cmake": "cmake",
@@ -42,6 +43,11 @@ PYBULLET = "pybullet==3.2.7"
 
 PYBULLET_FOLDER = Path(__file__).parents[2] / ".cache" / PYBULLET
 
+VTK = "vtk==9.7.2"
+"""Reads VRML worlds, from PyPI; kept apart from what the project depends on."""
+
+VTK_FOLDER = Path(__file__).parents[2] / ".cache" / VTK
+
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
@@ -58,6 +64,11 @@ def x_ite() -> Path | None:
     """Its script, if it is there."""
     script = X_ITE_FOLDER / "package" / "dist" / "x_ite.min.js"
     return script if script.is_file() else None
+
+
+def vtk_folder() -> Path | None:
+    """Its folder of modules, if it is there."""
+    return VTK_FOLDER if (VTK_FOLDER / "vtkmodules").is_dir() else None
 
 
 def needs(*names: str) -> pytest.MarkDecorator:
@@ -113,10 +124,10 @@ def fetch_x_ite() -> None:
         archive.unlink()
 
 
-def fetch_pybullet() -> str:
-    """Bring its wheel, and no other package; return why that was not possible."""
+def fetch(package: str, folder: Path) -> str:
+    """Unpack the wheel of ``package`` into ``folder``; return why that was not possible."""
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", "install"]
-    place = ["--no-deps", "--only-binary=:all:", "--target", str(PYBULLET_FOLDER), PYBULLET]
+    place = ["--no-deps", "--only-binary=:all:", "--target", str(folder), package]
     print("Running:", *pip, *place, flush=True)
     try:
         done = subprocess.run(
@@ -142,8 +153,10 @@ def main() -> None:
     if x_ite() is None and shutil.which("npm"):
         fetch_x_ite()
     print("X_ITE for the tests:", x_ite() or f"not here; npm brings {X_ITE}")
-    why = "" if pybullet() else fetch_pybullet()
+    why = "" if pybullet() else fetch(PYBULLET, PYBULLET_FOLDER)
     print("PyBullet for the tests:", pybullet() or f"not here; {why}")
+    why = "" if vtk_folder() else fetch(VTK, VTK_FOLDER)
+    print("VTK for the tests:", vtk_folder() or f"not here; {why}")
     packages = missing(list(PACKAGES))
     print(
         f"Exports are tested less; on Debian and Ubuntu: apt-get install {' '.join(packages)}"

@@ -360,12 +360,15 @@ def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> Non
     now = {each.name: each for each in program.look(answers.Things).things}
     assert set(now) == {"cup", "basin"}
     np.testing.assert_array_equal(now["cup"].T, T)
+    beyond_the_table = T.copy()
+    beyond_the_table[:2, 3] = (1.5, 0.0)
     for wrong in (
         requests.Place(name="ball", T=_rows(wall)),
         requests.Place(name="ball", T=_rows(wall), form=requests.Form.BOX, size=[0.1]),
         requests.Place(name="table", T=_rows(wall)),
         requests.Place(name="wrist_link", T=_rows(wall), form=requests.Form.SPHERE, size=[0.1]),
         requests.Place(name="cup", T=_rows(np.zeros((4, 4)))),
+        requests.Place(name="cup", T=_rows(beyond_the_table)),
     ):
         with pytest.raises(RefusedError):
             program.ask(wrong)

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.api import answers, requests
+from app.cli.assembly import described
 from app.client import Client, RefusedError, connect
 from app.control import commands as cmd
 from app.control.looks import Trait
@@ -218,6 +219,17 @@ def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
     held = replace(state, things=(replace(state.things[0], held=True),))
     with pytest.raises(InputError, match="open the gripper first"):
         nodes.command(held, [setting("left_cube", "translation", [0, 0, 0])])
+
+
+def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(
+    model: RobotModel, katana: Mechanism
+) -> None:
+    session = described(Settings(), URDF_PATH, None).session
+    nodes = Nodes(katana, body_of(model, katana), session.surroundings)
+    begun = session.begin(session.ready, 0.0, 0.0)
+    nodes.command(begun, [setting("cup", "translation", [0.5, -0.5, 0.0])])
+    with pytest.raises(InputError, match="nothing carries it there"):
+        nodes.command(begun, [setting("cup", "translation", [1.5, 0.0, 0.0])])
 
 
 def test_a_bare_arm_has_no_names_for_the_gripper(model: RobotModel, katana: Mechanism) -> None:

@@ -15,6 +15,7 @@ from app.kinematics.arm import arm_of
 from app.kinematics.branch import Branch
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
+from app.kinematics.freedoms import pitch_and_roll
 from app.kinematics.projection import Projection, project
 from app.kinematics.reading import Reading
 from tests.kinematics.conftest import katana
@@ -72,6 +73,12 @@ def misses(p: Projection, reading: Reading) -> tuple[float, ...]:
     return p.position_error, p.pitch_error
 
 
+def same_way(chain: Chain, a: Projection, b: Projection) -> bool:
+    """Whether both tools face away from axis 1, or both towards it."""
+    (one, _), (two, _) = (pitch_and_roll(chain, each.q) for each in (a, b))
+    return abs(math.remainder(one - two, math.tau)) <= SAME
+
+
 def gained(before: tuple[float, ...], after: tuple[float, ...], least: float) -> int:
     """1 where `after` is nearer, -1 where it is farther, by more than `least`; else 0."""
     for miss, miss_after in zip(before, after, strict=True):
@@ -99,7 +106,9 @@ def test_what_is_named_binds_and_nothing_else(name: str, reading: Reading) -> No
         pitched = reading is not Reading.PITCH or p.pitch_error <= SAME
         if p.position_error > SAME and pitched and not p.limits:
             free = project(chain, T, reading=reading, branch=p.branch, within_limits=False)
-            assert gained(missed, misses(free, reading), SAME) <= 0
+            # With the pitch kept, a limit may be why the tool does not face the other way.
+            if reading is not Reading.PITCH or same_way(chain, p, free):
+                assert gained(missed, misses(free, reading), SAME) <= 0
 
         # The roll counts least, and depends on its own limit alone.
         named[4] *= reading is Reading.POSE
@@ -126,7 +135,8 @@ def test_the_limit_of_the_roll_is_named_where_it_binds(reading: Reading) -> None
         beyond = not chain.lower[4] - 1e-9 <= wide.q[4] <= chain.upper[4] + 1e-9
         assert (4 in p.limits) == beyond
         named += beyond
-    assert named > 0
+    # With the pitch kept the tool rather faces the other way.
+    assert named > 0 or reading is Reading.PITCH
 
 
 def test_axis_1_is_named_where_the_branch_ends_on_it() -> None:

@@ -53,7 +53,7 @@ def test_cup_and_basin_change_places(stage: Stage) -> None:
     ("between", "last", "said"),
     [
         # What stands still meanwhile is in the way.
-        ("  - wait: 0.1\n", (-300.0, 300.0), "cup would stand in basin"),
+        ("  - wait: 0.1\n", (-200.0, 300.0), "cup would stand in basin"),
         # And so is what is put there last.
         ("", None, "basin would stand in cup"),
     ],
@@ -66,6 +66,26 @@ def test_an_arrangement_in_which_things_stand_in_each_other_is_refused(
     text = puts(("cup", basin)) + "\n" + between + puts(("basin", last))[7:]
     with pytest.raises(ScriptError, match=said):
         compiled(parse(text), stage.rig, stage.begin())
+
+
+@pytest.mark.parametrize("name", ["cup", "basin"])
+@pytest.mark.parametrize("spot", [(1500.0, 0.0), (300.0, -720.0), (-260.0, 300.0)])
+def test_an_object_beyond_the_table_is_refused_before_anything_moves(
+    stage: Stage, name: str, spot: tuple[float, float]
+) -> None:
+    text = puts((name, spot)).replace("steps:\n", "steps:\n  - home\n")
+    x, y = spot
+    said = rf"line 3.*{name} would be in the air at x {x:.1f}, y {y:.1f} mm: nothing carries it"
+    with pytest.raises(ScriptError, match=said) as refused:
+        compiled(parse(text), stage.rig, stage.begin())
+    assert "from x -250 to 750 and from y -700 to 700 mm" in str(refused.value)
+
+
+def test_an_object_at_the_edge_of_the_table_is_carried(stage: Stage) -> None:
+    program = compiled(parse(puts(("cup", (740.0, 690.0)))), stage.rig, stage.begin())
+    _, states = stage.play(program, stage.begin())
+    at = {each.name: 1e3 * each.T[:2, 3] for each in states[-1].things}
+    assert at["cup"] == pytest.approx((740.0, 690.0))
 
 
 def test_the_same_step_is_planned_anew_when_things_stand_elsewhere(stage: Stage) -> None:
@@ -153,5 +173,5 @@ def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
 @pytest.mark.usefixtures("untimed")
 def test_those_that_were_tried_are_told(stage: Stage) -> None:
     with pytest.raises(InputError, match=r"another pitch .* tried 30, .* and \d+ deg") as told:
-        layout(stage, PourDemo(basin=(900.0, 100.0)).text)[1].all()
+        layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].all()
     assert "with a pitch of 30.0 deg" in str(told.value)

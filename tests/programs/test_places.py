@@ -15,8 +15,10 @@ from app.programs.source import ScriptError
 from tests.programs.conftest import Stage
 from tests.programs.test_pour import check_poured
 
-CASES = range(50) if "KATANA450_LONG" in os.environ else (1, 2, 9)
-"""Cup out of reach, basin out of reach, another pitch; all of them with `KATANA450_LONG`."""
+CASES = range(50) if "KATANA450_LONG" in os.environ else (1, 2, 9, 11)
+"""Cup out of reach, cup beyond the table, another pitch, basin out of reach.
+
+All of them with `KATANA450_LONG`."""
 
 
 def spots(number: int) -> tuple[Spot, Spot]:
@@ -43,4 +45,10 @@ def test_every_place_does_or_is_refused(stage: Stage, number: int) -> None:
     check_poured(stage, program)
 
 
-REASONS = ("cannot be taken where it stands", "cannot be emptied into", "would stand in", "no room")
+REASONS = (
+    "cannot be taken where it stands",
+    "cannot be emptied into",
+    "would stand in",
+    "no room",
+    "nothing carries it there",
+)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from app.robot.props import load_props
 from app.view.objects import NOTHING, ObjectsPanel
 from app.view.things import ThingNodes
 from app.view.tint import Tint
+from app.water.around import Table
 
 PATH = "/things/1"
 
@@ -119,11 +122,40 @@ def test_faces_are_apart_at_creases_and_colours_and_one_where_they_bend(mesh: Me
     np.testing.assert_allclose(np.ptp(back.bounds, axis=0), mesh.solid.size, atol=1e-6)
 
 
+def test_cup_dragged_beyond_the_table_waits_at_its_edge(
+    server: viser.ViserServer, session: Session
+) -> None:
+    """The person hears why when they let go, and the handle comes back to the cup."""
+    put: list[cmd.Command] = []
+    around = Surroundings(None, None, Table((-0.25, 0.75), (-0.7, 0.7), -0.025))
+    nodes = ThingNodes(server, load_props(), around, put.append, Meshes())
+    cup = Thing("cup", Form.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
+    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))
+    told: list[str] = []
+    client = SimpleNamespace(add_notification=lambda _title, text, **_: told.append(text))
+
+    def drag(phase: str, x: float) -> None:
+        target = SimpleNamespace(position=(x, 0.1, 0.0))
+        event: Any = SimpleNamespace(phase=phase, target=target, client=client)
+        nodes._moved("cup", event)
+
+    drag("start", 0.7)
+    drag("update", 0.74)
+    drag("update", 1.5)
+    assert [each.thing.T[0, 3] for each in put if isinstance(each, cmd.Place)] == [0.7, 0.74]
+    assert not told
+    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), put[-1].thing))  # type: ignore[union-attr]
+    drag("end", 1.5)
+    assert len(put) == 2
+    assert "nothing carries it there" in told[0]
+    assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
+
+
 def test_the_panel_shows_the_object_there_is(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ObjectsPanel(server, lambda _: 0, lambda: state)
+    panel = ObjectsPanel(server, lambda _: 0, lambda: state, session.surroundings)
     assert panel._choice.value == NOTHING
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid, scale=2.0, look=Look((9, 8, 7)))
     other = replace(thing, name="other", scale=1.0)

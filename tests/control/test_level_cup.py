@@ -1,0 +1,87 @@
+"""A level cup typed with yaw 0 in the live session, from any posture the arm may stand in."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from app.control import commands as cmd
+from app.control.findings import of_projection
+from app.control.session import Session
+from app.control.state import Reason, State
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.kinematics.projection import project
+from app.kinematics.reading import Reading
+from app.view.texts import told
+
+COUNT = 300
+
+LEVEL = 1e-6
+"""[rad]"""
+
+
+def typed(session: Session, q: FloatArray, T: FloatArray) -> State:
+    """The state just after the pose ``T`` (4, 4) is typed with the arm at ``q`` (5,) [rad]."""
+    state = session.begin(q, 0.0, 0.0)
+    return session.step(state, (cmd.SetReading(Reading.PITCH), cmd.SetPose(T)), 0.01)
+
+
+def tilt(session: Session, q: FloatArray) -> float:
+    """Angle [rad] between the tool's z axis and the vertical at ``q`` (5,) [rad]."""
+    T = forward(session.arm.chain, q)
+    return math.atan2(math.hypot(T[0, 2], T[1, 2]), T[2, 2])
+
+
+def test_typed_level_cup_stays_level_from_any_posture(session: Session) -> None:
+    chain, rng = session.arm.chain, np.random.default_rng(5)
+    gave_way = behind = 0
+    for azimuth in np.linspace(-math.pi, math.pi, COUNT):
+        radius, height = rng.uniform(0.1, 0.7), rng.uniform(-0.3, 0.5)
+        place = np.array((radius * math.cos(azimuth), radius * math.sin(azimuth), height))
+        start = rng.uniform(chain.lower, chain.upper)
+        T = se3.from_rotation_translation(np.eye(3), place)
+        state = typed(session, start, T)
+        away = math.dist(forward(chain, state.goal)[:3, 3], place)
+        reasons = {finding.reason: finding for finding in state.findings}
+        if state.branch.shoulder == "front":
+            assert tilt(session, state.goal) <= LEVEL, (azimuth, radius, height, start)
+            assert Reason.PITCH_CHANGED not in reasons
+            assert (Reason.POSITION_CHANGED in reasons) == (away > 5e-5)
+            gave_way += away > 5e-5
+        else:
+            # Bent over backwards the cup is level with a roll of 180 deg, which axis 5 has not.
+            limit = math.pi - float(chain.upper[4])
+            assert tilt(session, state.goal) <= limit + LEVEL
+            assert abs(reasons[Reason.ROLL_CHANGED].amount - limit) < LEVEL
+            behind += 1
+    assert gave_way > 20
+    assert behind > 20
+
+
+def test_kept_pitch_is_still_kept_when_the_arm_arrives(session: Session) -> None:
+    azimuth = math.radians(-160.0)
+    place = np.array((0.3 * math.cos(azimuth), 0.3 * math.sin(azimuth), 0.25))
+    T = se3.from_rotation_translation(np.eye(3), place)
+    state = typed(session, session.ready, T)
+    for _ in range(1000):
+        state = session.observe(session.step(state, (), state.t + 0.01), state.setpoint, 0.0)
+    assert not state.moving
+    assert tilt(session, state.setpoint) <= LEVEL
+    assert math.dist(forward(session.arm.chain, state.setpoint)[:3, 3], place) < 1e-6
+
+
+def test_lost_pitch_is_reported_also_out_of_reach(session: Session) -> None:
+    narrow = np.full(5, math.radians(20.0))
+    chain = dataclasses.replace(session.arm.chain, lower=-narrow, upper=narrow)
+    T = se3.from_rotation_translation(so3.rotation_y(math.pi / 2.0), np.array((1.0, 0.0, 0.0)))
+    p = project(chain, T, reading=Reading.PITCH)
+    assert p.pitch_error > 0.1
+    found = of_projection(chain, p, Reading.PITCH, yaw_was_wished=True)
+    amounts = {each.reason: each.amount for each in found}
+    assert amounts[Reason.OUT_OF_REACH] == p.position_error
+    assert amounts[Reason.PITCH_CHANGED] == p.pitch_error
+    assert all(told(each) for each in found)

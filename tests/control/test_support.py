@@ -1,0 +1,99 @@
+"""What needs something to stand on is refused in the air, and what may hang there is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.cli.assembly import described
+from app.control import commands as cmd
+from app.control.support import check_carried, check_mounted, is_loose
+from app.control.things import Form, Mount, Surroundings, Thing
+from app.errors import InputError
+from app.geometry import se3, so3
+from app.geometry.arrays import FloatArray
+from app.settings import Settings
+from app.water.around import Table
+from robot_description import URDF_PATH
+
+TABLE = Table((-0.25, 0.75), (-0.7, 0.7), -0.025)
+
+
+def at(x: float, y: float, z: float, R: FloatArray | None = None) -> FloatArray:
+    return se3.from_rotation_translation(np.eye(3) if R is None else R, (x, y, z))
+
+
+def can(T: FloatArray, name: str = "can") -> Thing:
+    return Thing(name, Form.CYLINDER, (0.03, 0.1), T, can_be_held=True)
+
+
+def crate(T: FloatArray) -> Thing:
+    return Thing("crate", Form.BOX, (0.2, 0.1, 0.15), T)
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.3, 0.0), (-0.249, 0.0), (0.749, 0.699), (0.0, -0.699)])
+def test_table_carries_what_has_its_middle_over_it(x: float, y: float) -> None:
+    check_carried(TABLE, (), can(at(x, y, 0.0)))
+
+
+@pytest.mark.parametrize(("x", "y"), [(1.5, 0.0), (-0.251, 0.0), (0.0, 0.701), (0.751, -0.701)])
+def test_nothing_carries_an_object_beyond_the_table(x: float, y: float) -> None:
+    with pytest.raises(InputError, match="nothing carries it there") as refused:
+        check_carried(TABLE, (), can(at(x, y, 0.0)))
+    assert f"x {1e3 * x:.1f}, y {1e3 * y:.1f} mm" in str(refused.value)
+    assert "from x -250 to 750 and from y -700 to 700 mm" in str(refused.value)
+
+
+def test_object_above_the_table_is_in_the_air() -> None:
+    with pytest.raises(InputError, match=r"120\.0 mm above what is below it"):
+        check_carried(TABLE, (), can(at(0.3, 0.0, 0.12)))
+
+
+def test_object_lying_on_its_side_stands_on_its_lowest_point() -> None:
+    lying = so3.rotation_y(np.pi / 2.0)
+    check_carried(TABLE, (), can(at(0.3, 0.0, 0.03, lying)))
+    with pytest.raises(InputError, match=r"20\.0 mm above"):
+        check_carried(TABLE, (), can(at(0.3, 0.0, 0.05, lying)))
+
+
+def test_object_stands_on_another_one() -> None:
+    below = crate(at(0.3, 0.2, 0.0, so3.rotation_z(np.pi / 2.0)))
+    check_carried(TABLE, (below,), can(at(0.3, 0.29, 0.15)))
+    with pytest.raises(InputError, match=r"150\.0 mm above"):
+        check_carried(TABLE, (below,), can(at(0.39, 0.2, 0.15)))
+    beyond = crate(at(1.5, 0.0, 0.0))
+    check_carried(TABLE, (beyond,), can(at(1.5, 0.0, 0.15)))
+
+
+def test_work_cell_may_hang_in_the_air_and_what_can_be_held_may_not() -> None:
+    far = at(1.5, 0.0, 0.4)
+    assert not is_loose(crate(far))
+    assert is_loose(can(far))
+    assert is_loose(Thing("basin", Form.CYLINDER, (0.1, 0.1), far))
+
+
+def test_scene_with_the_cup_in_the_air_is_refused_as_a_whole() -> None:
+    session = described(Settings(), URDF_PATH, None).session
+    table = session.surroundings.table
+    assert table is not None
+    assert (table.x, table.y) == (TABLE.x, TABLE.y)
+    session.check(cmd.Furnish((can(at(0.3, 0.0, 0.0)), crate(at(1.5, 0.0, 0.4)))))
+    with pytest.raises(InputError, match="can would be in the air"):
+        session.check(cmd.Furnish((can(at(1.5, 0.0, 0.0)), crate(at(0.5, 0.3, 0.0)))))
+    session.check(cmd.Furnish((can(at(1.5, 0.0, 0.15)), crate(at(1.5, 0.0, 0.0)))))
+
+
+def test_object_is_not_left_in_the_air_when_it_is_taken_off_the_hand() -> None:
+    rules = described(Settings(), URDF_PATH, None).session
+    x = rules.begin(rules.ready, 0.0, 0.0).x
+    around: Surroundings = rules.surroundings
+    held = around.mounted(can(at(0.3, 0.0, 0.3)), Mount.HAND, x)
+    assert held.fixed
+    check_mounted(around, (), held, Mount.TABLE, x)
+    with pytest.raises(InputError, match=r"300\.0 mm above"):
+        check_mounted(around, (), held, Mount.WORLD, x)
+    camera = around.mounted(crate(at(0.3, 0.0, 0.3)), Mount.HAND, x)
+    check_mounted(around, (), camera, Mount.WORLD, x)
+    beside = around.mounted(crate(at(0.3, 0.9, 0.3)), Mount.HAND, x)
+    with pytest.raises(InputError, match="nothing carries it there"):
+        check_mounted(around, (), beside, Mount.TABLE, x)

@@ -1,0 +1,47 @@
+"""What is changed of viser's page for a recording is there to be changed, and only once."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import viser
+import zstandard
+
+from app.view.recording import KEEP_LIGHT
+
+PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
+
+DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
+"""Of the base 88 in which viser's page holds its own program: 5 of them are 4 bytes."""
+
+
+def program() -> str:
+    """viser's program, as its page unpacks it."""
+    found = re.search(r'<script data-p="([^"]*)" data-ss="(\d+)"', PAGE.read_text(encoding="utf-8"))
+    assert found
+    value = np.zeros(128, dtype=np.uint64)
+    value[np.frombuffer(DIGITS.encode(), dtype=np.uint8)] = np.arange(88)
+    digits = value[np.frombuffer(found[1].encode(), dtype=np.uint8)]
+    whole = len(digits) // 5 * 5
+    powers = np.array([88**power for power in range(4, -1, -1)], dtype=np.uint64)
+    packed = (digits[:whole].reshape(-1, 5) @ powers).astype(">u4").tobytes()
+    rest = digits[whole:].tolist()
+    if rest:
+        number = 0
+        for digit in rest:
+            number = 88 * number + digit
+        packed += number.to_bytes(len(rest) - 1, "big")
+    unpacked = zstandard.ZstdDecompressor().decompressobj().decompress(packed)
+    return unpacked[int(found[2]) :].decode("utf-8")
+
+
+def test_reset_of_the_light_is_found_once_in_the_player() -> None:
+    pattern = re.search(r"const reset = /(.*)/;", KEEP_LIGHT)
+    assert pattern
+    text = program()
+    places = [found.start() for found in re.finditer(pattern[1], text)]
+    assert len(places) == 1
+    # Next to it the player hides what it shows, before it plays from the start.
+    assert "useSceneTree.getAll()" in text[places[0] : places[0] + 200]
