@@ -32,10 +32,7 @@ def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding
         target=target,
         goal=goal,
         findings=pause + met + findings + kept,
-        since=None,
-        let_go=False,
-        jogging=None,
-        servo=None,
+        mode=None,
     )
     return leaving(aimed)
 
@@ -85,7 +82,7 @@ def kept_up(state: State, aimed: State, qd: FloatArray | None, speed: FloatArray
             dt = state.t - before.t
             # Streams come unevenly.
             qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
-    return replace(aimed, servo=Servoing(aimed.goal, frozen(np.clip(qd, -speed, speed)), state.t))
+    return replace(aimed, mode=Servoing(aimed.goal, frozen(np.clip(qd, -speed, speed)), state.t))
 
 
 def begun(chain: Chain, state: State, plan: Plan) -> State:

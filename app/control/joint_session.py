@@ -106,7 +106,7 @@ class JointSession:
         """Hold after an error of our own: no target survives it."""
         here = state.setpoint
         held = replace(state, motion=Motion.rest(here), goal=here, target=JointTarget(here))
-        return replace(held, servo=None, findings=(Finding(Reason.INTERNAL),))
+        return replace(held, mode=None, findings=(Finding(Reason.INTERNAL),))
 
     def _ahead(self, state: State, dt: float) -> Motion:
         limiter, motion, servo = self._limiter, state.motion, state.servo
