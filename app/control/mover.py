@@ -16,7 +16,6 @@ from app.collision.clearance import SETTLING, STOP, advance, surely_clear
 from app.collision.contact import Contact
 from app.collision.world import LONGEST_WAY, World
 from app.control.arm import Arm
-from app.control.commands import JOG_TIME
 from app.control.follower import Follower
 from app.control.following import Following
 from app.control.state import Finding, Jogging, Reason, State
@@ -27,6 +26,7 @@ from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitched_frame
 from app.kinematics.velocity import JogFrame, jog, tool_speed
 from app.motion.limiter import Limiter, Limits, Motion
+from app.motion.pursuit import stream_step
 
 PROBE = 0.02
 """[rad] An arm that waits goes on once the way is clear so far; from less it would only come back
@@ -169,9 +169,7 @@ class Mover:
             if rates is not None:
                 ahead = self._any.at_rate(motion, share * rates, dt)
             elif state.servo is not None:
-                late = min(state.t - state.servo.t, JOG_TIME)
-                now = chain.clamp(state.servo.q + late * state.servo.qd)
-                ahead = limiter.beside(motion, now, state.servo.qd, dt, share)
+                ahead = stream_step(limiter, motion, state.servo, state.t, dt, share)
             else:
                 ahead = limiter.towards(motion, state.goal, dt, share)
             speed = tool_speed(chain, ahead.q, ahead.qd)

@@ -15,10 +15,11 @@ from app.control.aims import (
     begun,
     gone,
     gone_along,
-    kept_up,
     leaving,
     paused,
     resumed,
+    stamped,
+    streamed,
     turned,
     without,
 )
@@ -136,7 +137,7 @@ class Session:
         """
         for command in commands:
             self.check(command)
-            state = self._take(state, command)
+            state = self._take(state, stamped(command, t))
         if isinstance(state.target, ToolTarget) and isinstance(state.mode, Dragging):
             state = self._follow(state, state.target, state.mode)
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
@@ -197,9 +198,9 @@ class Session:
                 return self._aim(state, turned(state, command))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
-            case cmd.Servo(q=q, qd=qd):
+            case cmd.Servo(q=q):
                 aimed = self._aim(state, JointTarget(q))
-                return kept_up(state, aimed, qd, self.arm.chain.speed)
+                return streamed(state, aimed, command, self.arm.limits.acceleration)
             case cmd.Home():
                 return self._aim(state, JointTarget(self.ready))
             case cmd.Stretch():

@@ -17,6 +17,7 @@ from app.kinematics.reading import Reading
 from app.kinematics.tool import ToolTarget
 from app.kinematics.velocity import JogFrame
 from app.motion.limiter import Motion
+from app.motion.stream import Stream
 
 __all__ = [
     "Dragging",
@@ -27,7 +28,6 @@ __all__ = [
     "Mode",
     "PoseTarget",
     "Reason",
-    "Servoing",
     "State",
     "Status",
     "Target",
@@ -131,16 +131,6 @@ class Jogging:
 
 
 @dataclass(frozen=True, eq=False)
-class Servoing:
-    """A stream of joint angles: the last of them, q (n,) [rad], how fast they change, qd (n,)
-    [rad/s], and when it came, t [s]."""
-
-    q: FloatArray
-    qd: FloatArray
-    t: float
-
-
-@dataclass(frozen=True, eq=False)
 class Dragging:
     """A target that is followed along the way of the hand.
 
@@ -152,7 +142,7 @@ class Dragging:
     let_go: bool = False
 
 
-Mode = Jogging | Servoing | Dragging
+Mode = Jogging | Stream | Dragging
 """What moves the goal from tick to tick; there is one at a time."""
 
 
@@ -253,9 +243,9 @@ class State:
         return self.mode if isinstance(self.mode, Jogging) else None
 
     @property
-    def servo(self) -> Servoing | None:
+    def servo(self) -> Stream | None:
         """The stream that is followed, if one is."""
-        return self.mode if isinstance(self.mode, Servoing) else None
+        return self.mode if isinstance(self.mode, Stream) else None
 
     @property
     def since(self) -> ToolTarget | None:

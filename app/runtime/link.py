@@ -21,6 +21,7 @@ from app.control.ledger import Entry
 from app.control.things import same
 from app.errors import InputError
 from app.runtime.board import Board, Snapshot
+from app.runtime.clock import MonotonicClock
 from app.runtime.lateness import Lateness
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
@@ -197,6 +198,9 @@ class FrontEnd:
     def put(self, command: cmd.Command) -> int:
         """Send ``command`` to the arm; returns its ticket. Raises InputError for what cannot be."""
         self._check(command)
+        if isinstance(command, cmd.Servo):
+            # The sooner it is stamped, the less of our own delays looks like its motion.
+            command = replace(command, t=MonotonicClock().now())
         with self._sending:
             self._number += 1
             if isinstance(command, cmd.Follow):

@@ -11,9 +11,10 @@ import pytest
 
 from app.control import commands as cmd
 from app.control.session import Session
-from app.control.state import Dragging, Jogging, Servoing, State, ToolTarget
+from app.control.state import Dragging, Jogging, State, ToolTarget
 from app.geometry.arrays import FloatArray
 from app.kinematics.forward import forward
+from app.motion.stream import Stream
 
 TICK = 0.01
 
@@ -83,7 +84,7 @@ def test_a_drag_during_a_stream_is_followed(session: Session, state: State) -> N
 
 BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
     Jogging: lambda session, state: run(session, state, JOG),
-    Servoing: lambda session, state: streamed(session, state, 1),
+    Stream: lambda session, state: streamed(session, state, 1),
     Dragging: lambda session, state: run(session, state, FAR_DRAG),
 }
 
