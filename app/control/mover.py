@@ -24,7 +24,7 @@ from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitched_frame
-from app.kinematics.velocity import JogFrame, jog, tool_speed
+from app.kinematics.velocity import JogFrame, jog, tool_speed, tool_speed_bound
 from app.motion.limiter import Limiter, Limits, Motion
 from app.motion.pursuit import stream_step
 
@@ -40,6 +40,13 @@ AHEAD = 0.3
 
 SLOWINGS = 4
 """How often a step is planned slower when the tool would be too fast."""
+
+SURE = 0.97
+"""[1] Of the tool's most, what it keeps below in the samples of a brake: between them it may be
+faster."""
+
+COARSE, FINE = 0.02, 0.005
+"""[s] Between the first of them: for a step of many, and for leaving a plan, which is done once."""
 
 
 class Mover:
@@ -63,6 +70,7 @@ class Mover:
             self._touching = frozenset(
                 frozenset((names[world.first[pair]], names[world.second[pair]])) for pair in soft
             )
+        self._most = tool_speed
         self._tool_speed = PLANNED * tool_speed
         self._follower = Follower(world)
         self._any = Limiter(arm.limits)
@@ -133,9 +141,15 @@ class Mover:
 
     def may_leave(self, state: State) -> bool:
         """Whether the arm may brake beside the plan it follows, as hard as it can."""
-        if self._world is None or state.motion.at_rest:
+        if state.motion.at_rest:
             return True
-        return self._met(state, state.motion, None, state.gripper_setpoint) is None
+        chain = self._arm.chain_to(state.tool)
+        if not self._below(self._most, chain, state.motion, FINE):
+            return False
+        return (
+            self._world is None
+            or self._met(state, state.motion, None, state.gripper_setpoint) is None
+        )
 
     def _free_to_leave(self, state: State) -> bool:
         # How far a stop takes has been said, so it goes on as it began.
@@ -152,13 +166,18 @@ class Mover:
         return ahead.motion(), ahead
 
     def _beside(self, state: State, dt: float) -> Motion:
-        """The next motion of an arm that follows no plan."""
+        """The next motion of an arm that follows no plan.
+
+        From every step the arm could brake with the tool below its most speed all the way: where no
+        step towards the goal is such a one, this brake is what the arm does.
+        """
         limiter, motion = self.limiter(state), state.motion
         if state.halted is not None:
             return self._any.stop(motion, dt)
-        if state.paused:
-            return limiter.pause(motion, state.goal, dt)
         chain = self._arm.chain_to(state.tool)
+        if state.paused:
+            pause = limiter.pause(motion, state.goal, dt)
+            return self._slow_or_braking(chain, motion, pause, dt)
         share = min(state.speed, self._share(chain, state))
         rates = None
         if state.jogging is not None:
@@ -173,10 +192,28 @@ class Mover:
             else:
                 ahead = limiter.towards(motion, state.goal, dt, share)
             speed = tool_speed(chain, ahead.q, ahead.qd)
-            if speed <= max(self._tool_speed, tool_speed(chain, motion.q, motion.qd)):
-                break
-            share *= 0.9 * self._tool_speed / speed
-        return ahead
+            enough = max(self._tool_speed, tool_speed(chain, motion.q, motion.qd))
+            if speed <= enough and self._slow_to_rest(chain, ahead):
+                return ahead
+            share *= 0.9 * min(1.0, self._tool_speed / speed)
+        return self._slow_or_braking(chain, motion, ahead, dt)
+
+    def _slow_or_braking(self, chain: Chain, now: Motion, ahead: Motion, dt: float) -> Motion:
+        return ahead if self._slow_to_rest(chain, ahead) else self._any.stop(now, dt)
+
+    def _slow_to_rest(self, chain: Chain, motion: Motion) -> bool:
+        """Whether the tool keeps below its most speed if every joint brakes now."""
+        return self._below(SURE * self._most, chain, motion, COARSE)
+
+    def _below(self, most: float, chain: Chain, motion: Motion, spacing: float) -> bool:
+        """Whether the tool keeps below ``most`` [m/s] in samples of a brake begun now."""
+        for braking in self._any.braking(motion, spacing):
+            if tool_speed(chain, braking.q, braking.qd) > most:
+                return False
+            # The joints only become slower: soon no posture can make the tool too fast.
+            if tool_speed_bound(chain, self._any.fastest(braking)) <= most:
+                return True
+        return True
 
     def _brake(self, state: State, dt: float) -> tuple[Motion, Following | None]:
         """The very way to rest that the tick before found clear."""

@@ -9,6 +9,7 @@ any state there is a way to stop. Angles in rad, times in s, arrays of one value
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,9 @@ DONE = (Result.Working, Result.Finished)
 
 CALM = 0.7
 """Of acceleration and jerk, what a joint that is led along a bound brakes with."""
+
+SPREADING = 0.15
+"""[1] By how much of the first interval the next ones grow."""
 
 LEAST_SHARE = 1e-3
 """Of the speed; slower than that takes ages and is a hold."""
@@ -193,6 +197,26 @@ class Limiter:
         pieces = max(1, math.ceil(2.0 * float(np.abs(np.array(end) - now.q).sum()) / longest))
         times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
         return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
+
+    def braking(self, now: Motion, spacing: float) -> Iterator[Motion]:
+        """The motion at some times from now until the joints rest, when they brake now.
+
+        spacing: [s] between the first of the times; later ones lie farther apart.
+        To be used before anything else is asked of this limiter.
+        """
+        yield now
+        self._brake(now)
+        trajectory, number, t = self._trajectory, 1, spacing
+        while t < trajectory.duration:
+            q, qd, qdd = trajectory.at_time(t)
+            yield Motion(np.array(q), np.array(qd), np.array(qdd))
+            number += 1
+            t = spacing * number * (1.0 + SPREADING * number)
+
+    def fastest(self, now: Motion) -> FloatArray:
+        """(n,) the greatest rates while they brake from now on [rad/s]: they may still rise."""
+        rise = now.qdd * np.abs(now.qdd) / (2.0 * self.limits.jerk)
+        return np.maximum(np.abs(now.qd), np.abs(now.qd + rise))
 
     def time_to_halt(self, now: Motion) -> float:
         """[s] until then."""
