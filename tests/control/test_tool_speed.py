@@ -64,9 +64,28 @@ def test_orders_of_every_kind_keep_below_it(session: Session, seed: int) -> None
     assert 0.5 * TOOL_SPEED < max(found) <= TOOL_SPEED
 
 
-@pytest.mark.parametrize("kind", ["drags", "joints", "streams"])
+@pytest.mark.parametrize("kind", ["joints", "streams"])
 def test_fast_jumps_of_one_kind_keep_below_it(session: Session, kind: str) -> None:
     assert 0.8 * TOOL_SPEED < max(speeds(session, ORDERS[kind], 2500, 7)) <= TOOL_SPEED
+
+
+@pytest.mark.parametrize(("size", "longest", "seed"), [(0.4, 30, 2), (0.9, 30, 3), (0.9, 80, 5)])
+def test_fast_jump_drags_keep_below_it(
+    session: Session, size: float, longest: int, seed: int
+) -> None:
+    """The hand leaps up to ``size`` [m] away every few ticks."""
+    rng, wait, fastest = np.random.default_rng([450, seed]), 0, 0.0
+    state = session.begin(anywhere(rng, session.arm), 0.0, 0.0)
+    for _ in range(2500):
+        commands: list[cmd.Command] = []
+        if wait == 0:
+            commands = [cmd.MoveTool(rng.uniform(-size, size, 3))]
+            wait = int(rng.integers(1, longest))
+        else:
+            wait -= 1
+        state = session.step(state, commands, state.t + TICK)
+        fastest = max(fastest, speed(session, state))
+    assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
 
 
 def test_a_lower_limit_is_kept_as_well(arm: Arm, session: Session) -> None:
