@@ -9,7 +9,7 @@ in rad, times in s.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,6 +66,7 @@ class Stream:
         qd: (k, n) how fast each says it changes [rad/s]; None where the sender does not say.
         lower, upper: (n,) the extremes of all samples so far [rad].
         hardness: (n,) the most that it accelerated with of late, of what the joints can, from 1.
+        parabola: (3, n) coefficients of q by time from the newest sample on.
         period: mean interval between samples [s]; 0 before the second.
         jitter: mean deviation of the intervals from it [s].
     """
@@ -76,6 +77,7 @@ class Stream:
     lower: FloatArray
     upper: FloatArray
     hardness: FloatArray
+    parabola: FloatArray
     period: float = 0.0
     jitter: float = 0.0
 
@@ -83,7 +85,9 @@ class Stream:
     def begun(t: float, q: FloatArray, qd: FloatArray | None) -> Stream:
         """The stream whose first sample ``q`` (n,), changing at ``qd``, came at ``t`` [s]."""
         rates = None if qd is None else qd[None]
-        return Stream(np.array([t]), q[None], rates, q, q, np.ones(len(q)))
+        times, samples = np.array([t]), q[None]
+        parabola = _fitted(times, samples, rates)
+        return Stream(times, samples, rates, q, q, np.ones(len(q)), parabola)
 
     @property
     def t(self) -> float:
@@ -122,39 +126,46 @@ class Stream:
             window = WINDOW if qd is not None else WINDOW + min(MORE_WINDOW * jitter, MOST_WINDOW)
             first = int(np.searchsorted(self.times, t - window))
             kept = slice(max(min(first, len(self.times) - FEWEST + 1), 0), None)
-        new = Stream(
-            np.append(self.times[kept], t if interval >= SPACING else self.t),
-            np.vstack((self.q[kept], q)),
-            None if rates is None or qd is None else np.vstack((rates[kept], qd)),
+        times = np.append(self.times[kept], t if interval >= SPACING else self.t)
+        samples = np.vstack((self.q[kept], q))
+        if rates is not None and qd is not None:
+            rates = np.vstack((rates[kept], qd))
+        parabola = _fitted(times, samples, rates)
+        fading = math.exp(-max(interval, 0.0) / MEMORY)
+        hardness = np.maximum(1.0 + fading * (self.hardness - 1.0), 1.0)
+        if times[-1] - times[0] >= SPREAD:
+            seen = MARGIN * np.abs(2.0 * parabola[2]) / acceleration
+            hardness = np.maximum(hardness, np.minimum(seen, MOST_HARDNESS))
+        return Stream(
+            times,
+            samples,
+            rates,
             np.minimum(self.lower, q),
             np.maximum(self.upper, q),
-            np.maximum(1.0 + math.exp(-max(interval, 0.0) / MEMORY) * (self.hardness - 1.0), 1.0),
+            hardness,
+            parabola,
             period,
             jitter,
         )
-        if new.times[-1] - new.times[0] < SPREAD:
-            return new
-        seen = np.minimum(MARGIN * np.abs(2.0 * new._parabola()[2]) / acceleration, MOST_HARDNESS)
-        return replace(new, hardness=np.maximum(new.hardness, seen))
 
     def at(self, now: float) -> Motion:
         """What the stream does, as seen at ``now`` [s]: q, qd, qdd (n,) a short lag ago."""
         seen = min(now, self.sure_until)
         late, known = now - seen, seen - self._lag - self.t
-        c0, c1, c2 = self._parabola()
+        c0, c1, c2 = self.parabola
         q, qd = c0 + known * (c1 + known * c2), c1 + 2.0 * known * c2
         qdd = 2.0 * c2 if late == 0.0 else 0.0 * c2
         return Motion(frozen(q + late * qd), frozen(qd), frozen(qdd))
 
-    def _parabola(self) -> FloatArray:
-        """(3, n) its coefficients by time from the newest sample on."""
-        s = self.times - self.times[-1]
-        rows, values = np.stack((s**0, s, s * s), axis=1), self.q
-        degree = min(3, len(s))
-        if self.qd is not None:
-            slopes = np.stack((0.0 * s, s**0, 2.0 * s), axis=1)
-            rows = np.concatenate((rows, RATES_WEIGHT * slopes))
-            values = np.concatenate((values, RATES_WEIGHT * self.qd))
-            degree = 2 if len(s) == 1 else 3
-        found = np.linalg.lstsq(rows[:, :degree], values, rcond=None)[0]
-        return np.concatenate((found, np.zeros((3 - degree, values.shape[1]))))
+
+def _fitted(times: FloatArray, q: FloatArray, qd: FloatArray | None) -> FloatArray:
+    """(3, n) coefficients of the parabola through samples, by time from the newest on."""
+    s, values, degree = times - times[-1], q, min(3, len(times))
+    rows = np.stack((s**0, s, s * s), axis=1)
+    if qd is not None:
+        slopes = np.stack((0.0 * s, s**0, 2.0 * s), axis=1)
+        rows = np.concatenate((rows, RATES_WEIGHT * slopes))
+        values = np.concatenate((values, RATES_WEIGHT * qd))
+        degree = min(3, 1 + len(times))
+    found = np.linalg.lstsq(rows[:, :degree], values, rcond=None)[0]
+    return np.concatenate((found, np.zeros((3 - degree, q.shape[1]))))
