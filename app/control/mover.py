@@ -46,7 +46,7 @@ SURE = 0.97
 faster."""
 
 COARSE, FINE = 0.02, 0.005
-"""[s] Between the first of them: for a step of many, and for leaving a plan, which is done once."""
+"""[s] Between them at least: for a step of many, and for leaving a plan, which is done once."""
 
 
 class Mover:
@@ -206,14 +206,28 @@ class Mover:
         return self._below(SURE * self._most, chain, motion, COARSE)
 
     def _below(self, most: float, chain: Chain, motion: Motion, spacing: float) -> bool:
-        """Whether the tool keeps below ``most`` [m/s] in samples of a brake begun now."""
-        for braking in self._any.braking(motion, spacing):
-            if tool_speed(chain, braking.q, braking.qd) > most:
-                return False
-            # The joints only become slower: soon no posture can make the tool too fast.
-            if tool_speed_bound(chain, self._any.fastest(braking)) <= most:
+        """Whether the tool keeps below ``most`` [m/s] in samples of a brake begun now.
+
+        They are ``spacing`` [s] apart, or as long as the tool needs in any case to get as fast.
+        """
+        fastest = self._any.fastest(motion)
+        if tool_speed_bound(chain, fastest) <= most:
+            return True
+        limits = self._any.limits
+        # Braking, the joints turn the tool about each other's axes and slow it down or speed it up.
+        pull = tool_speed_bound(chain, limits.acceleration + fastest * float(fastest.sum()))
+        rising = float((np.abs(motion.qdd) / limits.jerk).max())
+        at, duration = self._any.braking(motion)
+        t, braking = 0.0, motion
+        while (speed := tool_speed(chain, braking.q, braking.qd)) <= most:
+            t += max(spacing, (most - speed) / pull)
+            if t >= duration:
                 return True
-        return True
+            braking = at(t)
+            # Soon they are so slow that no posture can make the tool too fast.
+            if t > rising and tool_speed_bound(chain, braking.qd) <= most:
+                return True
+        return False
 
     def _brake(self, state: State, dt: float) -> tuple[Motion, Following | None]:
         """The very way to rest that the tick before found clear."""

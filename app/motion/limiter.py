@@ -9,7 +9,7 @@ any state there is a way to stop. Angles in rad, times in s, arrays of one value
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,9 +36,6 @@ DONE = (Result.Working, Result.Finished)
 
 CALM = 0.7
 """Of acceleration and jerk, what a joint that is led along a bound brakes with."""
-
-SPREADING = 0.15
-"""[1] By how much of the first interval the next ones grow."""
 
 LEAST_SHARE = 1e-3
 """Of the speed; slower than that takes ages and is a hold."""
@@ -198,20 +195,14 @@ class Limiter:
         times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
         return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
 
-    def braking(self, now: Motion, spacing: float) -> Iterator[Motion]:
-        """The motion at some times from now until the joints rest, when they brake now.
+    def braking(self, now: Motion) -> tuple[Callable[[float], Motion], float]:
+        """The motion by time from now on [s] when every joint brakes, and how long that takes [s].
 
-        spacing: [s] between the first of the times; later ones lie farther apart.
         To be used before anything else is asked of this limiter.
         """
-        yield now
         self._brake(now)
-        trajectory, number, t = self._trajectory, 1, spacing
-        while t < trajectory.duration:
-            q, qd, qdd = trajectory.at_time(t)
-            yield Motion(np.array(q), np.array(qd), np.array(qdd))
-            number += 1
-            t = spacing * number * (1.0 + SPREADING * number)
+        at = self._trajectory.at_time
+        return lambda t: Motion(*map(np.array, at(t))), self._trajectory.duration
 
     def fastest(self, now: Motion) -> FloatArray:
         """(n,) the greatest rates while they brake from now on [rad/s]: they may still rise."""
