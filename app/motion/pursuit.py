@@ -64,8 +64,8 @@ def pursued(
     here = braked(now.q, now.qd, now.qdd, A, J)
     low = np.minimum(np.maximum(bounds[0], limits.lower), here)
     high = np.maximum(np.minimum(bounds[1], limits.upper), here)
-    levelled = now.qd + now.qdd * np.abs(now.qdd) / (2.0 * J)
-    slowest, fastest = np.minimum(-V, levelled), np.maximum(V, levelled)
+    dip, peak = _rates_ahead(now.qd, now.qdd, J)
+    slowest, fastest = np.minimum(-V, dip), np.maximum(V, peak)
 
     def stepped(jerk: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         a = now.qdd + jerk * dt
@@ -75,8 +75,8 @@ def pursued(
     def beyond(jerk: FloatArray) -> tuple[BoolArray, BoolArray]:
         """Which joints would go too far or too fast, downwards and upwards."""
         q, v, a = stepped(jerk)
-        rest, level = braked(q, v, a, A, J), v + a * np.abs(a) / (2.0 * J)
-        return (rest < low) | (level < slowest), (rest > high) | (level > fastest)
+        rest, (dip, peak) = braked(q, v, a, A, J), _rates_ahead(v, a, J)
+        return (rest < low) | (dip < slowest), (rest > high) | (peak > fastest)
 
     least, most = np.maximum(-J, (-A - now.qdd) / dt), np.minimum(J, (A - now.qdd) / dt)
     jerk = np.clip(_wished_jerk(now, wanted.q, qd, qdd, A, V, dt), least, most)
@@ -96,6 +96,11 @@ def pursued(
         stop, brakes = limiter.stop(now, dt), down | up
         q, v, a = (np.where(brakes, x, y) for x, y in ((stop.q, q), (stop.qd, v), (stop.qdd, a)))
     return Motion(frozen(np.clip(q, limits.lower, limits.upper)), frozen(v), frozen(a))
+
+
+def _rates_ahead(v: FloatArray, a: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) the least and the greatest rate until the acceleration can be 0 [rad/s]."""
+    return v - np.minimum(a, 0.0) ** 2 / (2.0 * J), v + np.maximum(a, 0.0) ** 2 / (2.0 * J)
 
 
 def _wished_jerk(
