@@ -15,7 +15,7 @@ patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 .PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-crowd bench-drag \
-        bench-kinematics bench-load bench-start bench-view pictures lock clean
+        bench-kinematics bench-load bench-start bench-streams bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -82,6 +82,9 @@ bench-crowd: $(dev_ok) browser ## mouse event to drawn frame, alone and among 31
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)
+
+bench-streams: $(dev_ok)      ## how closely streams of joint angles are followed, beside peers
+	$(bin)/python -m benchmarks.streams $(ARGS)
 
 bench-collision: $(dev_ok)    ## distances and one control tick, beside raw meshes
 	$(bin)/python -m benchmarks.collision $(ARGS)

@@ -6,19 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.control.commands import SetAxes, SetJoint
+from app.control.commands import Command, Servo, SetAxes, SetJoint
 from app.control.following import Following
-from app.control.state import GRIPPER_LIMITS, Finding, JointTarget, Reason, Servoing, State, Target
+from app.control.state import GRIPPER_LIMITS, Finding, JointTarget, Reason, State, Target
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import branch_of
 from app.kinematics.chain import Chain
+from app.motion.stream import Stream
 from app.planning.plan import Plan
 
 AT_START = 1e-6
 """[rad] An arm that is no farther from the start of a plan stands there: no encoder tells it."""
 
-SEEN = 0.06
-"""[s] Over which it is seen how fast a stream changes."""
+OLDEST = 0.1
+"""[s] A sample that says it came earlier than this before its tick was stamped by another clock."""
 
 
 def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]) -> State:
@@ -32,10 +33,7 @@ def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding
         target=target,
         goal=goal,
         findings=pause + met + findings + kept,
-        since=None,
-        let_go=False,
-        jogging=None,
-        servo=None,
+        mode=None,
     )
     return leaving(aimed)
 
@@ -73,19 +71,23 @@ def resumed(state: State) -> State:
     return without(replace(state, paused=False), Reason.PAUSED)
 
 
-def kept_up(state: State, aimed: State, qd: FloatArray | None, speed: FloatArray) -> State:
+def streamed(state: State, aimed: State, command: Servo, acceleration: FloatArray) -> State:
     """``aimed``, which is ``state`` with the newest of a stream as its goal, in that stream.
 
-    qd: (n,) how fast the stream changes; where it is None that is seen. speed: (n,) the most of it.
+    acceleration: (n,) the most of each joint.
     """
-    before = state.servo
-    if qd is None:
-        qd = np.zeros(speed.size) if before is None else before.qd
-        if before is not None and state.t > before.t:
-            dt = state.t - before.t
-            # Streams come unevenly.
-            qd = qd - np.expm1(-dt / SEEN) * ((aimed.goal - before.q) / dt - qd)
-    return replace(aimed, servo=Servoing(aimed.goal, frozen(np.clip(qd, -speed, speed)), state.t))
+    t = state.t if command.t is None else command.t
+    if state.servo is None:
+        return replace(aimed, mode=Stream.begun(t, aimed.goal, command.qd))
+    stream = state.servo.followed_by(t, aimed.goal, command.qd, acceleration)
+    return replace(aimed, mode=stream)
+
+
+def stamped(command: Command, t: float) -> Command:
+    """``command`` in the tick at ``t`` [s]: one of a stream came then, unless it says when."""
+    if not isinstance(command, Servo) or (command.t is not None and 0.0 <= t - command.t < OLDEST):
+        return command
+    return replace(command, t=t)
 
 
 def begun(chain: Chain, state: State, plan: Plan) -> State:

@@ -113,16 +113,20 @@ class SetJoints:
 class Servo:
     """Keep up with ``q``, (n,) [rad], which is one of a stream; for JOG_TIME after the last.
 
-    qd: (n,) how fast it changes [rad/s]; without it that is seen from the stream.
+    qd: (n,) how fast it changes [rad/s]; without it that is seen from the stream. t: when it came
+    [s], on the clock of ``State.t``; None for the tick that takes it.
     """
 
     q: FloatArray
     qd: FloatArray | None = None
+    t: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", vector("The joint vector", self.q, None))
         if self.qd is not None:
             object.__setattr__(self, "qd", vector("The joint rates", self.qd, self.q.size))
+        if self.t is not None:
+            check_finite("The time of the sample", self.t)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 
 from app import tolerances
 from app.control import commands as cmd
-from app.control.aims import gone, kept_up, paused, resumed, turned, without
+from app.control.aims import gone, paused, resumed, stamped, streamed, turned, without
 from app.control.arrangement import dressed
 from app.control.choices import Choice
 from app.control.joints import Joints
@@ -27,6 +27,7 @@ from app.errors import InputError
 from app.geometry.arrays import FloatArray, frozen
 from app.kinematics.branch import BRANCHES
 from app.motion.limiter import Limiter, Motion
+from app.motion.pursuit import stream_step
 
 MOTIONS = (cmd.SetJoint, cmd.SetAxes, cmd.SetJoints, cmd.Servo, cmd.Home, cmd.Stretch, cmd.Settle)
 
@@ -87,7 +88,7 @@ class JointSession:
         """
         for command in commands:
             self.check(command)
-            state = self._take(state, command)
+            state = self._take(state, stamped(command, t))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = self._aim(state, self._limiter.halt(state.motion))
         dt = min(t - state.t, LONGEST_STEP)
@@ -106,7 +107,7 @@ class JointSession:
         """Hold after an error of our own: no target survives it."""
         here = state.setpoint
         held = replace(state, motion=Motion.rest(here), goal=here, target=JointTarget(here))
-        return replace(held, servo=None, findings=(Finding(Reason.INTERNAL),))
+        return replace(held, mode=None, findings=(Finding(Reason.INTERNAL),))
 
     def _ahead(self, state: State, dt: float) -> Motion:
         limiter, motion, servo = self._limiter, state.motion, state.servo
@@ -116,10 +117,7 @@ class JointSession:
             return limiter.pause(motion, state.goal, dt)
         if servo is None:
             return limiter.towards(motion, state.goal, dt, state.speed)
-        late = min(state.t - servo.t, cmd.JOG_TIME)
-        return limiter.beside(
-            motion, self.joints.clamp(servo.q + late * servo.qd), servo.qd, dt, state.speed
-        )
+        return stream_step(limiter, motion, servo, state.t, dt, state.speed)
 
     def _take(self, state: State, command: cmd.Command) -> State:
         if state.halted is not None and not isinstance(command, SAFE):
@@ -142,8 +140,9 @@ class JointSession:
                 return self._aim(state, turned(state, command).q)
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
-            case cmd.Servo(q=q, qd=qd):
-                return kept_up(state, self._aim(state, q), qd, self.joints.speed)
+            case cmd.Servo(q=q):
+                aimed = self._aim(state, q)
+                return streamed(state, aimed, command, self._limiter.limits.acceleration)
             case cmd.Home() | cmd.Stretch():
                 return self._aim(state, self.ready)
             case cmd.Dress():

@@ -16,7 +16,6 @@ from app.collision.clearance import SETTLING, STOP, advance, surely_clear
 from app.collision.contact import Contact
 from app.collision.world import LONGEST_WAY, World
 from app.control.arm import Arm
-from app.control.commands import JOG_TIME
 from app.control.follower import Follower
 from app.control.following import Following
 from app.control.state import Finding, Jogging, Reason, State
@@ -25,8 +24,9 @@ from app.kinematics.arm import arm_of
 from app.kinematics.chain import Chain
 from app.kinematics.forward import forward
 from app.kinematics.freedoms import pitched_frame
-from app.kinematics.velocity import JogFrame, jog, tool_speed
+from app.kinematics.velocity import JogFrame, jog, tool_speed, tool_speed_bound
 from app.motion.limiter import Limiter, Limits, Motion
+from app.motion.pursuit import stream_step
 
 PROBE = 0.02
 """[rad] An arm that waits goes on once the way is clear so far; from less it would only come back
@@ -40,6 +40,13 @@ AHEAD = 0.3
 
 SLOWINGS = 4
 """How often a step is planned slower when the tool would be too fast."""
+
+SURE = 0.97
+"""[1] Of the tool's most, what it keeps below in the samples of a brake: between them it may be
+faster."""
+
+COARSE, FINE = 0.02, 0.005
+"""[s] Between them at least: for a step of many, and for leaving a plan, which is done once."""
 
 
 class Mover:
@@ -63,6 +70,7 @@ class Mover:
             self._touching = frozenset(
                 frozenset((names[world.first[pair]], names[world.second[pair]])) for pair in soft
             )
+        self._most = tool_speed
         self._tool_speed = PLANNED * tool_speed
         self._follower = Follower(world, slides=arm.gripper.slides)
         self._any = Limiter(arm.limits)
@@ -133,9 +141,15 @@ class Mover:
 
     def may_leave(self, state: State) -> bool:
         """Whether the arm may brake beside the plan it follows, as hard as it can."""
-        if self._world is None or state.motion.at_rest:
+        if state.motion.at_rest:
             return True
-        return self._met(state, state.motion, None, state.gripper_setpoint) is None
+        chain = self._arm.chain_to(state.tool)
+        if not self._below(self._most, chain, state.motion, FINE):
+            return False
+        return (
+            self._world is None
+            or self._met(state, state.motion, None, state.gripper_setpoint) is None
+        )
 
     def _free_to_leave(self, state: State) -> bool:
         # How far a stop takes has been said, so it goes on as it began.
@@ -152,13 +166,18 @@ class Mover:
         return ahead.motion(), ahead
 
     def _beside(self, state: State, dt: float) -> Motion:
-        """The next motion of an arm that follows no plan."""
+        """The next motion of an arm that follows no plan.
+
+        From every step the arm could brake with the tool below its most speed all the way: where no
+        step towards the goal is such a one, this brake is what the arm does.
+        """
         limiter, motion = self.limiter(state), state.motion
         if state.halted is not None:
             return self._any.stop(motion, dt)
-        if state.paused:
-            return limiter.pause(motion, state.goal, dt)
         chain = self._arm.chain_to(state.tool)
+        if state.paused:
+            pause = limiter.pause(motion, state.goal, dt)
+            return self._slow_or_braking(chain, motion, pause, dt)
         share = min(state.speed, self._share(chain, state))
         rates = None
         if state.jogging is not None:
@@ -169,16 +188,46 @@ class Mover:
             if rates is not None:
                 ahead = self._any.at_rate(motion, share * rates, dt)
             elif state.servo is not None:
-                late = min(state.t - state.servo.t, JOG_TIME)
-                now = chain.clamp(state.servo.q + late * state.servo.qd)
-                ahead = limiter.beside(motion, now, state.servo.qd, dt, share)
+                ahead = stream_step(limiter, motion, state.servo, state.t, dt, share)
             else:
                 ahead = limiter.towards(motion, state.goal, dt, share)
             speed = tool_speed(chain, ahead.q, ahead.qd)
-            if speed <= max(self._tool_speed, tool_speed(chain, motion.q, motion.qd)):
-                break
-            share *= 0.9 * self._tool_speed / speed
-        return ahead
+            enough = max(self._tool_speed, tool_speed(chain, motion.q, motion.qd))
+            if speed <= enough and self._slow_to_rest(chain, ahead):
+                return ahead
+            share *= 0.9 * min(1.0, self._tool_speed / speed)
+        return self._slow_or_braking(chain, motion, ahead, dt)
+
+    def _slow_or_braking(self, chain: Chain, now: Motion, ahead: Motion, dt: float) -> Motion:
+        return ahead if self._slow_to_rest(chain, ahead) else self._any.stop(now, dt)
+
+    def _slow_to_rest(self, chain: Chain, motion: Motion) -> bool:
+        """Whether the tool keeps below its most speed if every joint brakes now."""
+        return self._below(SURE * self._most, chain, motion, COARSE)
+
+    def _below(self, most: float, chain: Chain, motion: Motion, spacing: float) -> bool:
+        """Whether the tool keeps below ``most`` [m/s] in samples of a brake begun now.
+
+        They are ``spacing`` [s] apart, or as long as the tool needs in any case to get as fast.
+        """
+        fastest = self._any.fastest(motion)
+        if tool_speed_bound(chain, fastest) <= most:
+            return True
+        limits = self._any.limits
+        # Braking, the joints turn the tool about each other's axes and slow it down or speed it up.
+        pull = tool_speed_bound(chain, limits.acceleration + fastest * float(fastest.sum()))
+        rising = float((np.abs(motion.qdd) / limits.jerk).max())
+        at, duration = self._any.braking(motion)
+        t, braking = 0.0, motion
+        while (speed := tool_speed(chain, braking.q, braking.qd)) <= most:
+            t += max(spacing, (most - speed) / pull)
+            if t >= duration:
+                return True
+            braking = at(t)
+            # Soon they are so slow that no posture can make the tool too fast.
+            if t > rising and tool_speed_bound(chain, braking.qd) <= most:
+                return True
+        return False
 
     def _brake(self, state: State, dt: float) -> tuple[Motion, Following | None]:
         """The very way to rest that the tick before found clear."""

@@ -15,10 +15,11 @@ from app.control.aims import (
     begun,
     gone,
     gone_along,
-    kept_up,
     leaving,
     paused,
     resumed,
+    stamped,
+    streamed,
     turned,
     without,
 )
@@ -31,6 +32,7 @@ from app.control.grip import gripped
 from app.control.mover import Mover, wished_twist
 from app.control.pouring import Pouring
 from app.control.state import (
+    Dragging,
     Finding,
     Halt,
     Jogging,
@@ -135,9 +137,9 @@ class Session:
         """
         for command in commands:
             self.check(command)
-            state = self._take(state, command)
-        if isinstance(state.target, ToolTarget) and state.since is not None:
-            state = self._follow(state, state.target, state.since)
+            state = self._take(state, stamped(command, t))
+        if isinstance(state.target, ToolTarget) and isinstance(state.mode, Dragging):
+            state = self._follow(state, state.target, state.mode)
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = self._aim(state, JointTarget(self._mover(state).halt(state)[0]))
         dt = min(t - state.t, LONGEST_STEP)
@@ -162,10 +164,7 @@ class Session:
             goal=state.setpoint,
             gripper_goal=state.gripper_setpoint,
             target=JointTarget(state.setpoint),
-            since=None,
-            let_go=False,
-            jogging=None,
-            servo=None,
+            mode=None,
             following=None,
         )
         return replace(held, findings=(Finding(Reason.INTERNAL),))
@@ -178,7 +177,7 @@ class Session:
                 return self._halt(state)
             case cmd.Release():
                 goal = self._mover(state).halt(state)[0]
-                free = replace(state, halted=None, goal=goal, target=JointTarget(goal))
+                free = replace(state, halted=None, goal=goal, target=JointTarget(goal), mode=None)
                 return leaving(without(free, Reason.HALTED))
             case cmd.Pause():
                 return paused(state)
@@ -194,14 +193,14 @@ class Session:
                 if state.paused:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
-                return leaving(replace(state, jogging=jogging, since=None, let_go=False))
+                return leaving(replace(state, mode=jogging, target=JointTarget(state.goal)))
             case cmd.SetJoint() | cmd.SetAxes():
                 return self._aim(state, turned(state, command))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
-            case cmd.Servo(q=q, qd=qd):
+            case cmd.Servo(q=q):
                 aimed = self._aim(state, JointTarget(q))
-                return kept_up(state, aimed, qd, self.arm.chain.speed)
+                return streamed(state, aimed, command, self.arm.limits.acceleration)
             case cmd.Home():
                 return self._aim(state, JointTarget(self.ready))
             case cmd.Stretch():
@@ -217,8 +216,8 @@ class Session:
             case cmd.SetPose(T=T):
                 return self._aim(state, PoseTarget(T))
             case cmd.Settle():
-                if state.since is not None:
-                    return replace(state, let_go=True)
+                if isinstance(state.mode, Dragging):
+                    return replace(state, mode=replace(state.mode, let_go=True))
                 # The findings stay: they say why the handle springs back.
                 goal = state.setpoint if state.blocked else state.goal
                 let_go = replace(state, goal=goal, target=JointTarget(goal), blocked=False)
@@ -281,24 +280,30 @@ class Session:
             case PoseTarget() as target:
                 return self._aim(state, target)
             case ToolTarget() as target:
-                return replace(self._drag(state, target), let_go=state.let_go)
+                let_go = isinstance(state.mode, Dragging) and state.mode.let_go
+                return self._drag(state, target, let_go=let_go)
         # Where a hand let go nothing is wished any more that could be reread.
         return state
 
-    def _drag(self, state: State, target: ToolTarget) -> State:
+    def _drag(self, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
         """Make ``target`` what is followed from now on, along the way the hand took there."""
         since = wish(self.arm, state) if state.since is None else state.since
-        return leaving(replace(state, target=target, since=since, let_go=False))
+        return leaving(replace(state, target=target, mode=Dragging(since, let_go)))
 
-    def _follow(self, state: State, target: ToolTarget, since: ToolTarget) -> State:
+    def _follow(self, state: State, target: ToolTarget, dragging: Dragging) -> State:
         """Take the goal on towards ``target``, as far as one tick has time for."""
         chain = self.arm.chain_to(state.tool)
         tracked = track(
-            chain, state.goal, target, branch=state.branch, reading=state.reading, since=since
+            chain,
+            state.goal,
+            target,
+            branch=state.branch,
+            reading=state.reading,
+            since=dragging.since,
         )
         if tracked.since is not None:
-            return replace(state, goal=tracked.best.q, since=tracked.since)
-        wished = JointTarget(tracked.best.q) if state.let_go else target
+            return replace(state, goal=tracked.best.q, mode=replace(dragging, since=tracked.since))
+        wished = JointTarget(tracked.best.q) if dragging.let_go else target
         return gone(state, wished, tracked.best.q, of_tracked(chain, tracked, state.reading))
 
     def _halt(self, state: State) -> State:
@@ -316,10 +321,7 @@ class Session:
             goal=goal,
             gripper_goal=state.gripper_setpoint,
             target=JointTarget(goal),
-            since=None,
-            let_go=False,
-            jogging=None,
-            servo=None,
+            mode=None,
         )
         return replace(halted, findings=(Finding(Reason.HALTED, way, time=time),))
 
@@ -340,7 +342,7 @@ class Session:
             target=JointTarget(goal),
             branch=branch_of(chain, goal),
             findings=contact + held,
-            jogging=jogging,
+            mode=jogging,
         )
 
     def taken(self, state: State, branch: Branch) -> State:

@@ -17,12 +17,15 @@ from app.kinematics.reading import Reading
 from app.kinematics.tool import ToolTarget
 from app.kinematics.velocity import JogFrame
 from app.motion.limiter import Motion
+from app.motion.stream import Stream
 
 __all__ = [
+    "Dragging",
     "Finding",
     "Halt",
     "Jogging",
     "JointTarget",
+    "Mode",
     "PoseTarget",
     "Reason",
     "State",
@@ -133,13 +136,19 @@ class Jogging:
 
 
 @dataclass(frozen=True, eq=False)
-class Servoing:
-    """A stream of joint angles: the last of them, q (n,) [rad], how fast they change, qd (n,)
-    [rad/s], and when it came, t [s]."""
+class Dragging:
+    """A target that is followed along the way of the hand.
 
-    q: FloatArray
-    qd: FloatArray
-    t: float
+    since: how far along that way the goal has been taken. let_go: whether the hand has let go
+    meanwhile, so that the goal becomes the target in the end.
+    """
+
+    since: ToolTarget
+    let_go: bool = False
+
+
+Mode = Jogging | Stream | Dragging
+"""What moves the goal from tick to tick; there is one at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,15 +170,12 @@ class State:
         halted: the stop that holds the arm until a person releases it; None when there is none.
         paused: whether the arm waits on its way because a person wants it to.
         speed: the share of every greatest speed that is allowed, above 0 and up to 1.
-        jogging: the jog under way, if one is.
-        servo: the stream that is kept up with, if one is.
-        since: how far along its way the target has been followed, while the goal is still on its
-            way to it; None once it is there. Until then the findings are those from before.
+        mode: the jog, stream or drag that moves the goal, if one does. A drag is over once the goal
+            is there; until then the findings are those from before.
         things: what stands around or is held, and can be put elsewhere.
         grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
         poured: the water of the cup; None where there is none.
         looks: how links and things are shown.
-        let_go: whether the hand has let go meanwhile, so that the goal becomes the wish in the end.
         following: the plan the arm is on and where on it, until it is told to go elsewhere; None
             when it is on none.
     """
@@ -190,10 +196,7 @@ class State:
     halted: Halt | None = None
     paused: bool = False
     speed: float = 1.0
-    jogging: Jogging | None = None
-    servo: Servoing | None = None
-    since: ToolTarget | None = None
-    let_go: bool = False
+    mode: Mode | None = None
     following: Following | None = None
     things: tuple[Thing, ...] = ()
     grip: float | None = None
@@ -238,6 +241,21 @@ class State:
         if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
             return Status.HELD
         return Status.LIMITED if self.findings else Status.OK
+
+    @property
+    def jogging(self) -> Jogging | None:
+        """The jog under way, if one is."""
+        return self.mode if isinstance(self.mode, Jogging) else None
+
+    @property
+    def servo(self) -> Stream | None:
+        """The stream that is followed, if one is."""
+        return self.mode if isinstance(self.mode, Stream) else None
+
+    @property
+    def since(self) -> ToolTarget | None:
+        """How far along its way a drag has been followed; None while the goal is on no such way."""
+        return self.mode.since if isinstance(self.mode, Dragging) else None
 
     @property
     def moving(self) -> bool:

@@ -188,6 +188,17 @@ def tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:
     return math.hypot(du - pan * arm.d, pan * u, dv) + beside
 
 
+def tool_speed_bound(chain: Chain, qd: FloatArray) -> float:
+    """[m/s] No posture has a greater `tool_speed` with rates of up to `qd` (5,) [rad/s] each."""
+    arm = arm_of(chain)
+    pan, first, second, third, roll = np.abs(qd).tolist()
+    l2, l3 = arm.l2 + arm.l3, arm.l3
+    reach: float = abs(arm.a) + arm.l1 + l2
+    plane: float = first * (arm.l1 + l2) + second * l2 + third * l3
+    beside: float = arm.off_axis * (pan + first + second + third + roll)
+    return math.hypot(pan * reach, plane + pan * abs(arm.d)) + beside
+
+
 def _excess(chain: Chain, qd: FloatArray) -> float:
     """By what factor the rates `qd` (n,) [rad/s] are too fast for the joints; at least 1."""
     return max(1.0, float((np.abs(qd) / chain.speed).max()))

@@ -9,6 +9,7 @@ any state there is a way to stop. Angles in rad, times in s, arrays of one value
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,36 +123,6 @@ class Limiter:
         # Each joint alone would still leave its limits, so it came too fast: stop first.
         return self.stop(now, dt)
 
-    def beside(
-        self, now: Motion, q: FloatArray, qd: FloatArray, dt: float, share: float = 1.0
-    ) -> Motion:
-        """The motion ``dt`` [s] on, on its way to go along with what passes ``q`` at ``qd`` (n,).
-
-        Each joint for itself, so that none waits for another. Where going along would lead beyond
-        the limits it goes to rest at ``q`` inside them.
-        """
-        if dt <= 0.0:
-            return now
-        most = max(share, LEAST_SHARE) * self.limits.speed
-        rate = np.clip(qd, -0.99 * most, 0.99 * most)
-        # Seen from what passes, this is a way to rest where it is.
-        plan = self._input
-        self._start(now, ControlInterface.Position, share)
-        plan.current_position = (now.q - q).tolist()
-        plan.current_velocity = (now.qd - rate).tolist()
-        plan.target_position = plan.target_velocity = [0.0] * len(q)
-        plan.max_velocity, plan.min_velocity = (most - rate).tolist(), (-most - rate).tolist()
-        plan.synchronization = Synchronization.No
-        planned = self._planned()
-        plan.min_velocity = None
-        if planned:
-            x, v, a = (np.array(each) for each in self._trajectory.at_time(dt))
-            ahead = Motion(frozen(q + dt * rate + x), frozen(rate + v), frozen(a))
-            halt = self.halt(ahead)
-            if ((halt >= self.limits.lower) & (halt <= self.limits.upper)).all():
-                return ahead
-        return self.towards(now, q, dt, share)
-
     def at_rate(self, now: Motion, qd: FloatArray, dt: float, share: float = 1.0) -> Motion:
         """The motion ``dt`` [s] on, on its way to the joint rates ``qd`` (n,) [rad/s].
 
@@ -223,6 +194,20 @@ class Limiter:
         pieces = max(1, math.ceil(2.0 * float(np.abs(np.array(end) - now.q).sum()) / longest))
         times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
         return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
+
+    def braking(self, now: Motion) -> tuple[Callable[[float], Motion], float]:
+        """The motion by time from now on [s] when every joint brakes, and how long that takes [s].
+
+        To be used before anything else is asked of this limiter.
+        """
+        self._brake(now)
+        at = self._trajectory.at_time
+        return lambda t: Motion(*map(np.array, at(t))), self._trajectory.duration
+
+    def fastest(self, now: Motion) -> FloatArray:
+        """(n,) the greatest rates while they brake from now on [rad/s]: they may still rise."""
+        rise = now.qdd * np.abs(now.qdd) / (2.0 * self.limits.jerk)
+        return np.maximum(np.abs(now.qd), np.abs(now.qd + rise))
 
     def time_to_halt(self, now: Motion) -> float:
         """[s] until then."""

@@ -21,6 +21,7 @@ from app.control.ledger import Entry
 from app.control.things import same
 from app.errors import InputError
 from app.runtime.board import Board, Snapshot
+from app.runtime.clock import MonotonicClock
 from app.runtime.lateness import Lateness
 from app.runtime.loop import ControlLoop
 from app.runtime.mailbox import Mailbox
@@ -218,6 +219,9 @@ class FrontEnd:
         """
         self._check(command)
         age = self.age
+        if isinstance(command, cmd.Servo):
+            # The sooner it is stamped, the less of our own delays looks like its motion.
+            command = replace(command, t=MonotonicClock().now())
         with self._sending:
             if isinstance(command, cmd.Stop):
                 # What has not gone yet is dead the moment it comes.

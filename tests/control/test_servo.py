@@ -46,6 +46,136 @@ def wave(session: Session, size: float = 0.2, period: float = 6.0) -> Stream:
     return at
 
 
+def on_axis_1(session: Session, signal: Callable[[float], float]) -> Stream:
+    """Axis 1 follows ``signal``, the others stay."""
+    return lambda t: session.ready + np.array((signal(t), 0.0, 0.0, 0.0, 0.0))
+
+
+def arriving(
+    session: Session,
+    signal: Callable[[float], float],
+    seconds: float,
+    hz: float = 50.0,
+    jitter: float = 0.0,
+    rates: bool = False,
+) -> list[State]:
+    """The ticks that take samples of ``signal`` which arrive late by ``jitter`` [s] on average.
+
+    Each is stamped with its arrival, as on a server; limits are checked in every tick.
+    """
+    rng, limits = np.random.default_rng(3), session.arm.limits
+    sent = np.arange(0.0, seconds, 1.0 / hz)
+    arrived = np.maximum.accumulate(sent + 0.004 + rng.exponential(jitter, len(sent)))
+    stream, due = on_axis_1(session, signal), 0
+    states = [session.begin(session.ready, 0.0, 0.0)]
+    for tick in range(1, int(seconds / DT)):
+        t, commands = tick * DT, []
+        while due < len(sent) and arrived[due] <= t:
+            s = float(sent[due])
+            qd = (stream(s + 1e-6) - stream(s - 1e-6)) / 2e-6 if rates else None
+            commands.append(cmd.Servo(stream(s), qd, float(arrived[due])))
+            due += 1
+        state = session.step(states[-1], commands, t)
+        before, now = states[-1].motion, state.motion
+        assert (np.abs(now.qd) <= limits.speed + 1e-9).all()
+        assert (np.abs(now.qdd) <= limits.acceleration + 1e-9).all()
+        assert (np.abs(now.qdd - before.qdd) <= limits.jerk * DT + 1e-6).all()
+        states.append(session.observe(state, state.setpoint, state.gripper_setpoint))
+    return states
+
+
+def lag_and_error(
+    states: list[State], signal: Callable[[float], float], since: float
+) -> tuple[float, float]:
+    """The lag [s] that explains axis 1 best, and the error [rad] that is left."""
+    late = [state for state in states if state.t > since]
+    found = []
+    for lag in np.arange(-0.02, 0.12, 0.002).tolist():
+        off = [abs(state.setpoint[0] - signal(state.t - lag)) for state in late]
+        found.append((max(off), lag))
+    error, lag = min(found)
+    return lag, error
+
+
+@pytest.mark.parametrize("rates", [False, True])
+@pytest.mark.parametrize("hz", [50.0, 100.0])
+@pytest.mark.parametrize("jitter", [0.0, 0.003])
+@pytest.mark.parametrize(("size", "period"), [(0.17, 2.0), (0.4, 3.0), (0.7, 5.0)])
+def test_a_sine_inside_the_limits_keeps_its_amplitude(
+    session: Session, size: float, period: float, jitter: float, hz: float, rates: bool
+) -> None:
+    """They use 0.45 to 0.7 of the acceleration there is."""
+
+    def sine(t: float) -> float:
+        return size * math.sin(math.tau * t / period)
+
+    states = arriving(session, sine, 3.0 * period, hz, jitter, rates)
+    # Over all of it: it does not overshoot while it catches up either.
+    assert max(abs(state.setpoint[0]) for state in states) == pytest.approx(size, rel=5e-3)
+    lag, error = lag_and_error(states, sine, period)
+    assert lag <= (0.03 if rates else 0.06)
+    assert error <= (0.012 if rates or not jitter else 0.04) * size
+
+
+@pytest.mark.parametrize("rates", [False, True])
+@pytest.mark.parametrize("period", [0.8, 1.0, 1.5, 2.0])
+def test_a_sine_beyond_the_limits_is_clipped_and_never_passed(
+    session: Session, period: float, rates: bool
+) -> None:
+    def sine(t: float) -> float:
+        return 0.4 * math.sin(math.tau * t / period)
+
+    states = arriving(session, sine, 8.0, 50.0, 0.002, rates)
+    assert 0.1 < max(abs(state.setpoint[0]) for state in states) <= 0.4 * (1.0 + 1e-3)
+
+
+def test_a_chirp_that_becomes_too_fast_is_hardly_passed(session: Session) -> None:
+    """From 6 s to 1 s a period: when it gets too fast is not known before."""
+
+    def chirp(t: float) -> float:
+        return 0.3 * math.sin(math.tau * (t / 6.0 + 0.5 * (1.0 - 1.0 / 6.0) * t * t / 18.0))
+
+    states = arriving(session, chirp, 18.0)
+    assert max(abs(state.setpoint[0]) for state in states) <= 0.3 * 1.01
+
+
+def test_steps_are_reached_and_not_passed(session: Session) -> None:
+    def steps(t: float) -> float:
+        return 0.5 * (int(t / 2.0) % 2)
+
+    q = np.array([state.setpoint[0] for state in arriving(session, steps, 8.0, jitter=0.002)])
+    assert q.min() >= -1e-4
+    assert q.max() <= 0.5 + 1e-4
+    assert q[int(3.9 / DT)] == pytest.approx(0.5, abs=1e-3)
+    assert q[int(5.9 / DT)] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_samples_that_arrive_together_are_no_leap(session: Session) -> None:
+    """A line that stalls for 0.1 s and then delivers all at once."""
+
+    def sine(t: float) -> float:
+        return 0.4 * math.sin(math.tau * t / 3.0)
+
+    stream, state = on_axis_1(session, sine), session.begin(session.ready, 0.0, 0.0)
+    for tick in range(1, 900):
+        t, commands = tick * DT, []
+        if tick % 2 == 0 and tick % 100 > 10:
+            commands = [cmd.Servo(stream(t), None, t)]
+        if tick % 100 == 10:
+            commands = [cmd.Servo(stream(t - late), None, t) for late in (0.08, 0.04, 0.0)]
+        state = session.step(state, commands, t)
+        assert abs(state.setpoint[0]) <= 0.4 * 1.05
+
+
+def test_a_time_of_another_clock_is_not_believed(session: Session, state: State) -> None:
+    for t in (-5.0, 1e6):
+        after = session.step(state, [cmd.Servo(session.ready, None, t)], DT)
+        assert after.servo is not None
+        assert after.servo.t == DT
+    with pytest.raises(InputError, match="time"):
+        cmd.Servo(session.ready, None, math.nan)
+
+
 @pytest.mark.parametrize("every", [1, 2, 5])
 def test_it_keeps_up_closely_with_what_the_arm_can_do(session: Session, every: int) -> None:
     stream = wave(session)

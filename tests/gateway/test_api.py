@@ -144,6 +144,20 @@ def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(program: Client) -
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("rates", [False, True])
+def test_a_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool) -> None:
+    """It uses 0.7 of the acceleration; the bounds leave room for a busy machine."""
+    began, size, omega, seen = time.monotonic(), 0.4, math.tau / 3.0, [0.0]
+    while (t := time.monotonic() - began) < 6.5:
+        q, qd = READY.copy(), np.zeros(5)
+        q[0] += size * math.sin(omega * t)
+        qd[0] = size * omega * math.cos(omega * t)
+        program.tell(requests.Servo(q=q.tolist(), qd=qd.tolist() if rates else None))
+        seen.append(program.look(answers.State).setpoint[0] - READY[0])
+        time.sleep(max(0.0, began + t + 0.02 - time.monotonic()))
+    assert 0.9 * size < max(abs(each) for each in seen) < 1.05 * size
+
+
 def test_states_come_as_often_as_they_are_wanted(program: Client) -> None:
     times = []
     for state in program.states(hz=50.0):

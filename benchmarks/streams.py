@@ -1,0 +1,266 @@
+"""How closely streams of joint angles are followed, beside two peers fed the same samples.
+
+    python -m benchmarks.streams
+
+One joint of the arm (axis 1) and its limits. Peers: ruckig, which plans each tick anew a way to the
+newest sample, extrapolated at its rate; and a first-order smoothing filter, like that in front of
+many servo controllers, with the limits of speed, acceleration and jerk behind it. Each gets the
+same samples at the same times. Of each stream are printed:
+
+* used: of the acceleration limit, what the stream itself needs (above 1 nobody can follow it).
+* beyond: how far the setpoint got beyond the extremes of the stream, of its amplitude.
+* amplitude: the greatest distance of the setpoint from the middle once it has settled, of the
+  stream's; and the lag [ms] that explains the setpoint best, with the error that is left.
+* ratio: the error left, of each peer over ours.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from ruckig import InputParameter, Result, Ruckig, Trajectory
+
+from app.geometry.arrays import FloatArray
+from app.motion.limiter import Limiter, Limits, Motion
+from app.motion.pursuit import stream_step
+from app.motion.stream import Stream
+from app.robot.model import load
+
+TICK = 0.01
+
+TRANSPORT = 0.004
+"""[s] From the sender to the arm, in the best case."""
+
+SMOOTHING = 0.06
+"""[s] Time constant of the peer that smooths."""
+
+Signal = Callable[[float], float]
+
+Follower = Callable[[Limiter, "Feed"], FloatArray]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A stream: its value [rad] at any time.
+
+    settled: [s] from when on amplitude and lag are judged. hz: samples a second. rates: whether
+    they say how fast they change. jitter: [s] mean of what each is late by, beyond TRANSPORT.
+    """
+
+    name: str
+    signal: Signal
+    settled: float
+    duration: float
+    hz: float = 50.0
+    rates: bool = False
+    jitter: float = 0.0
+
+    def rate(self, t: float) -> float:
+        """[rad/s] of the signal."""
+        return (self.signal(t + 1e-5) - self.signal(t - 1e-5)) / 2e-5
+
+    @property
+    def used(self) -> float:
+        """[rad/s^2] the most that the signal itself accelerates with, away from its corners."""
+        t, h = np.linspace(0.01, self.duration - 0.01, 4000), 1e-3
+        q = np.array([[self.signal(x + d) for x in t] for d in (-h, 0.0, h)])
+        return float(np.quantile(np.abs(q[0] - 2.0 * q[1] + q[2]) / h**2, 0.995))
+
+
+@dataclass(frozen=True)
+class Feed:
+    """What a follower gets: times of arrival, samples, and rates or None, by tick."""
+
+    ticks: list[list[tuple[float, float, float | None]]]
+
+    @staticmethod
+    def of(case: Case, seed: int = 450) -> Feed:
+        """The samples of ``case`` by the tick that takes them."""
+        rng = np.random.default_rng(seed)
+        sent = np.arange(0.0, case.duration, 1.0 / case.hz)
+        late = rng.exponential(case.jitter, len(sent)) if case.jitter else np.zeros(len(sent))
+        arrived = np.maximum.accumulate(sent + TRANSPORT + late)
+        ticks: list[list[tuple[float, float, float | None]]] = [
+            [] for _ in range(round(case.duration / TICK) + 1)
+        ]
+        for s, t in zip(sent.tolist(), arrived.tolist(), strict=True):
+            tick = math.ceil(t / TICK)
+            if tick < len(ticks):
+                ticks[tick].append((t, case.signal(s), case.rate(s) if case.rates else None))
+        return Feed(ticks)
+
+
+def ours(limiter: Limiter, feed: Feed) -> FloatArray:
+    """The app's own follower: (ticks, 3) q, qd, qdd."""
+    now, stream, found = Motion.rest(np.zeros(1)), None, []
+    for number, samples in enumerate(feed.ticks):
+        for t, q, qd in samples:
+            sample = np.array([q]), None if qd is None else np.array([qd])
+            stream = (
+                Stream.begun(t, *sample)
+                if stream is None
+                else stream.followed_by(t, *sample, limiter.limits.acceleration)
+            )
+        if stream is not None:
+            now = stream_step(limiter, now, stream, number * TICK, TICK)
+        found.append((now.q[0], now.qd[0], now.qdd[0]))
+    return np.array(found)
+
+
+def ruckigs(limiter: Limiter, feed: Feed) -> FloatArray:
+    """Ruckig towards the newest sample and its rate, told or by difference, each tick anew."""
+    planner, plan, trajectory = Ruckig(1), InputParameter(1), Trajectory(1)
+    limits = limiter.limits
+    plan.max_velocity, plan.max_acceleration, plan.max_jerk = (
+        each.tolist() for each in (limits.speed, limits.acceleration, limits.jerk)
+    )
+    now, last, found = (0.0, 0.0, 0.0), None, []
+    for number, samples in enumerate(feed.ticks):
+        for t, q, qd in samples:
+            seen = 0.0 if last is None or t <= last[0] else (q - last[1]) / (t - last[0])
+            last = t, q, seen if qd is None else qd
+        if last is not None:
+            t, q, rate = last
+            most = 0.99 * float(limits.speed[0])
+            rate = min(max(rate, -most), most)
+            plan.current_position, plan.current_velocity, plan.current_acceleration = (
+                [each] for each in now
+            )
+            plan.target_position = [q + (number * TICK - t) * rate]
+            plan.target_velocity = [rate]
+            if planner.calculate(plan, trajectory) in (Result.Working, Result.Finished):
+                (x,), (v,), (a,) = trajectory.at_time(TICK)
+                now = float(x), float(v), float(a)
+        found.append(now)
+    return np.array(found)
+
+
+def smoothed(limiter: Limiter, feed: Feed) -> FloatArray:
+    """A first-order filter of the samples, and the limits behind it."""
+    now, goal, low, found = Motion.rest(np.zeros(1)), None, np.zeros(1), []
+    for samples in feed.ticks:
+        for _, q, _ in samples:
+            goal = np.array([q])
+        if goal is not None:
+            low = low + (1.0 - math.exp(-TICK / SMOOTHING)) * (goal - low)
+            now = limiter.towards(now, low, TICK)
+        found.append((now.q[0], now.qd[0], now.qdd[0]))
+    return np.array(found)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a stream was followed; see the top of this file. peak: [1] amplitude; left: [rad]."""
+
+    beyond: float
+    peak: float
+    lag: float
+    left: float
+
+
+def judged(case: Case, motion: FloatArray) -> Outcome:
+    """What ``motion`` (ticks, 3) made of ``case``."""
+    t = TICK * np.arange(len(motion))
+    q = motion[:, 0]
+    asked = np.array([case.signal(x) for x in np.arange(0.0, case.duration, TICK / 4)])
+    beyond = max(
+        float(q.max() - max(asked.max(), 0.0)), float(min(asked.min(), 0.0) - q.min()), 0.0
+    )
+    late = t > case.settled
+    best, left = 0.0, math.inf
+    for lag in np.arange(-0.02, 0.4, 0.002).tolist():
+        off = q[late] - np.array([case.signal(x - lag) for x in t[late]])
+        if np.abs(off).max() < left:
+            best, left = lag, float(np.abs(off).max())
+    settled = asked[np.arange(0.0, case.duration, TICK / 4) > case.settled]
+    middle, half = 0.5 * (settled.max() + settled.min()), 0.5 * float(np.ptp(settled))
+    return Outcome(beyond / half, float(np.abs(q[late] - middle).max()) / half, best, left)
+
+
+def sine(amplitude: float, period: float) -> Signal:
+    """From the middle on."""
+    return lambda t: amplitude * math.sin(math.tau * t / period)
+
+
+def chirp(amplitude: float, first: float, last: float, duration: float) -> Signal:
+    """A sine whose period goes from ``first`` to ``last`` [s]."""
+    f0, f1 = 1.0 / first, 1.0 / last
+    return lambda t: amplitude * math.sin(math.tau * (f0 * t + 0.5 * (f1 - f0) * t * t / duration))
+
+
+def steps(size: float, every: float) -> Signal:
+    """To and fro between 0 and ``size``."""
+    return lambda t: size * (int(t / every) % 2)
+
+
+def hand(t: float) -> float:
+    """[rad] A hand about its work: strokes of several lengths and rests between them."""
+    return 0.5 * math.sin(0.9 * t) * math.sin(0.37 * t) + 0.1 * math.sin(2.1 * t) ** 3
+
+
+def cases() -> Iterator[Case]:
+    """All streams of the table."""
+    for hz in (50.0, 100.0):
+        for rates in (False, True):
+            for jitter in (0.0, 0.003):
+                how = hz, rates, jitter
+                for amplitude, period in ((0.17, 2.0), (0.4, 3.0), (0.9, 5.0), (2.4, 8.0)):
+                    signal = sine(amplitude, period)
+                    name = f"sine of {amplitude:g} rad, {period:g} s"
+                    yield Case(name, signal, period, 3.0 * period, *how)
+                slow, quick = chirp(0.3, 6.0, 2.7, 18.0), chirp(0.3, 6.0, 1.0, 18.0)
+                yield Case("hand", hand, 3.0, 20.0, *how)
+                yield Case("chirp of 0.3 rad, 6 to 2.7 s", slow, 3.0, 18.0, *how)
+                yield Case("too fast: sine of 0.4 rad, 2 s", sine(0.4, 2.0), 2.0, 8.0, *how)
+                yield Case("too fast: sine of 0.4 rad, 1 s", sine(0.4, 1.0), 2.0, 6.0, *how)
+                yield Case("too fast: chirp of 0.3 rad, 6 to 1 s", quick, 3.0, 18.0, *how)
+                if not rates:
+                    yield Case("too fast: steps of 0.5 rad", steps(0.5, 2.0), 2.0, 8.0, *how)
+
+
+PEERS: dict[str, Follower] = {"ours": ours, "ruckig": ruckigs, "smoothed": smoothed}
+
+
+def axis_1() -> Limiter:
+    """A limiter of the Katana's first axis alone."""
+    limits = load().arm.limits
+    return Limiter(
+        Limits(limits.lower[:1], limits.upper[:1], limits.speed[:1],
+               limits.acceleration[:1], limits.jerk[:1])
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Print the table as it stands in docs/benchmarks.md."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--hz", type=float, help="only streams of so many samples a second")
+    only = parser.parse_args().hz
+    limiter = axis_1()
+    print(
+        "| stream | Hz | qd | jitter, ms | used | beyond, % | amplitude, % | lag, ms "
+        "| ruckig beyond, % | amplitude, % | error, ratio "
+        "| smoothed beyond, % | amplitude, % | lag, ms |"
+    )
+    print("|---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
+    for case in cases():
+        if only and case.hz != only:
+            continue
+        feed = Feed.of(case)
+        own, other, low = (judged(case, follow(limiter, feed)) for follow in PEERS.values())
+        used = case.used / float(limiter.limits.acceleration[0])
+        rates, jitter = "yes" if case.rates else "no", 1e3 * case.jitter
+        print(
+            f"| {case.name} | {case.hz:g} | {rates} | {jitter:g} "
+            f"| {'-' if used > 9 else format(used, '.2f')} "
+            f"| {100 * own.beyond:.2f} | {100 * own.peak:.1f} | {1e3 * own.lag:.0f} "
+            f"| {100 * other.beyond:.1f} | {100 * other.peak:.1f} | {other.left / own.left:.1f} "
+            f"| {100 * low.beyond:.1f} | {100 * low.peak:.1f} | {1e3 * low.lag:.0f} |"
+        )
+
+
+if __name__ == "__main__":
+    main()

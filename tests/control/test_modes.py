@@ -1,0 +1,130 @@
+"""Jog, stream and drag replace each other: the later one counts, and nothing of the other stays."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.session import Session
+from app.control.state import Dragging, Jogging, State, ToolTarget
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import forward
+from app.motion.stream import Stream
+
+TICK = 0.01
+
+JOG = cmd.Jog(np.array([0.0, 0.08, 0.0, 0.0, 0.0]))
+
+FAR_DRAG = cmd.MoveTool(np.array([-0.2, 0.35, 0.1]))
+"""Farther than one tick has time for."""
+
+
+def run(session: Session, state: State, command: cmd.Command | None, ticks: int = 1) -> State:
+    """``ticks`` ticks with ``command`` in each of them."""
+    for _ in range(ticks):
+        commands = [] if command is None else [command]
+        state = session.step(state, commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    return state
+
+
+def streamed(session: Session, state: State, ticks: int) -> State:
+    """A stream that turns axis 1."""
+    q = np.array(state.goal)
+    for _ in range(ticks):
+        q[0] += 0.2 * TICK
+        state = run(session, state, cmd.Servo(q.copy()))
+    return state
+
+
+def point(session: Session, q: FloatArray) -> FloatArray:
+    return forward(session.arm.chain, q)[:3, 3]
+
+
+def test_a_jog_held_after_a_stream_keeps_going(session: Session, state: State) -> None:
+    state = streamed(session, state, 40)
+    jogged = run(session, state, JOG, 2)
+    for _ in range(60):
+        jogged = run(session, jogged, JOG)
+        assert jogged.jogging is not None
+        assert jogged.servo is None
+    moved = point(session, jogged.setpoint) - point(session, state.setpoint)
+    assert moved[1] > 0.04
+
+
+def test_a_drag_during_a_jog_is_followed_and_leaves_nothing_behind(
+    session: Session, state: State
+) -> None:
+    state = run(session, state, JOG, 30)
+    dragged = run(session, state, FAR_DRAG)
+    assert dragged.jogging is None
+    dragged = run(session, dragged, None, 300)
+    wanted = FAR_DRAG.position
+    np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
+    # The next drag takes its goal along its own line.
+    settled = run(session, dragged, cmd.Settle())
+    start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
+    for share in np.linspace(0.05, 1.0, 20):
+        settled = run(session, settled, cmd.MoveTool(start + share * way))
+        off = point(session, settled.goal) - start
+        assert np.linalg.norm(np.cross(off, way)) / np.linalg.norm(way) < 1e-6
+
+
+def test_a_drag_during_a_stream_is_followed(session: Session, state: State) -> None:
+    state = streamed(session, state, 40)
+    wanted = np.add(point(session, state.goal), (0.0, 0.0, 0.05))
+    dragged = run(session, run(session, state, cmd.MoveTool(wanted)), None, 200)
+    np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
+
+
+BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
+    Jogging: lambda session, state: run(session, state, JOG),
+    Stream: lambda session, state: streamed(session, state, 1),
+    Dragging: lambda session, state: run(session, state, FAR_DRAG),
+}
+
+
+@pytest.mark.parametrize(("first", "second"), list(itertools.permutations(BEGINNINGS, 2)))
+def test_the_later_mode_replaces_the_earlier_one(
+    session: Session, state: State, first: type, second: type
+) -> None:
+    begun = BEGINNINGS[first](session, state)
+    assert isinstance(begun.mode, first)
+    assert isinstance(BEGINNINGS[second](session, begun).mode, second)
+
+
+def test_random_orders_never_leave_a_drag_without_its_target(
+    session: Session, state: State
+) -> None:
+    rng = np.random.default_rng(13)
+    kinds: list[Callable[[State], cmd.Command]] = [
+        lambda _: JOG,
+        lambda state: cmd.Servo(state.goal + rng.normal(scale=0.01, size=5)),
+        lambda state: cmd.MoveTool(point(session, state.goal) + rng.normal(scale=0.1, size=3)),
+        lambda _: cmd.TurnTool(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)),
+        lambda _: cmd.Settle(),
+        lambda _: cmd.Home(),
+        lambda _: cmd.SetTool(str(rng.choice(list(session.arm.tools)))),
+        lambda _: cmd.Reset(),
+        lambda _: cmd.Pause(),
+        lambda _: cmd.Resume(),
+        lambda _: cmd.Stop(),
+        lambda _: cmd.Release(),
+    ]
+    for _ in range(1500):
+        command = kinds[rng.integers(len(kinds))](state)
+        state = run(session, state, command, int(rng.integers(1, 4)))
+        assert isinstance(state.target, ToolTarget) or not isinstance(state.mode, Dragging)
+        if state.halted is not None:
+            assert state.mode is None
+    # Left alone, every mode but a pause comes to an end.
+    state = run(session, run(session, state, cmd.Release()), cmd.Resume())
+    assert not math.isnan(state.setpoint.sum())
+    over = run(session, state, None, 600)
+    assert over.mode is None
+    assert not over.moving

@@ -1,0 +1,116 @@
+"""The tool is never faster than it may be, whatever is asked, and could always brake that way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.control import commands as cmd
+from app.control.arm import Arm
+from app.control.plans import plan_to
+from app.control.session import TOOL_SPEED, Session
+from app.control.state import State
+from app.geometry.arrays import FloatArray
+from app.kinematics.forward import jacobian_body
+from app.kinematics.velocity import tool_speed, tool_speed_bound
+
+TICK = 0.01
+
+Order = Callable[[np.random.Generator, Arm], cmd.Command]
+
+
+def anywhere(rng: np.random.Generator, arm: Arm) -> FloatArray:
+    return rng.uniform(arm.chain.lower, arm.chain.upper)
+
+
+ORDERS: dict[str, list[Order]] = {
+    "drags": [lambda rng, _: cmd.MoveTool(rng.uniform(-0.6, 0.6, 3))],
+    "streams": [lambda rng, arm: cmd.Servo(anywhere(rng, arm), rng.uniform(-2.0, 2.0, 5))],
+    "jogs": [lambda rng, _: cmd.Jog(rng.uniform(-0.5, 0.5, 5))],
+    "turns": [lambda rng, _: cmd.TurnTool(rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0))],
+    "joints": [lambda rng, arm: cmd.SetJoints(anywhere(rng, arm))],
+    "pauses": [lambda *_: cmd.Pause(), lambda *_: cmd.Resume(), lambda *_: cmd.Reset()],
+    "stops": [lambda *_: cmd.Together((cmd.Stop(), cmd.Release()))],
+}
+
+
+def speed(session: Session, state: State) -> float:
+    J = jacobian_body(session.arm.chain_to(state.tool), state.setpoint)
+    return float(np.linalg.norm(J[3:] @ state.motion.qd))
+
+
+def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list[float]:
+    """Of the tool [m/s], in ticks with an order at random times, most of them soon."""
+    rng, found, wait = np.random.default_rng([450, seed]), [], 0
+    state = session.begin(session.ready, 0.0, 0.0)
+    for _ in range(ticks):
+        commands = []
+        if wait == 0:
+            commands = [orders[rng.integers(len(orders))](rng, session.arm)]
+            wait = int(rng.integers(60))
+        else:
+            wait -= 1
+        state = session.step(state, commands, state.t + TICK)
+        found.append(speed(session, state))
+        assert session.arm.chain.within_limits(state.setpoint, slack=0.0)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_orders_of_every_kind_keep_below_it(session: Session, seed: int) -> None:
+    found = speeds(session, [each for group in ORDERS.values() for each in group], 2500, seed)
+    assert 0.5 * TOOL_SPEED < max(found) <= TOOL_SPEED
+
+
+@pytest.mark.parametrize("kind", ["joints", "streams"])
+def test_fast_jumps_of_one_kind_keep_below_it(session: Session, kind: str) -> None:
+    assert 0.8 * TOOL_SPEED < max(speeds(session, ORDERS[kind], 2500, 7)) <= TOOL_SPEED
+
+
+@pytest.mark.parametrize(("size", "longest", "seed"), [(0.4, 30, 2), (0.9, 30, 3), (0.9, 80, 5)])
+def test_fast_jump_drags_keep_below_it(
+    session: Session, size: float, longest: int, seed: int
+) -> None:
+    """The hand leaps up to ``size`` [m] away every few ticks."""
+    rng, wait, fastest = np.random.default_rng([450, seed]), 0, 0.0
+    state = session.begin(anywhere(rng, session.arm), 0.0, 0.0)
+    for _ in range(2500):
+        commands: list[cmd.Command] = []
+        if wait == 0:
+            commands = [cmd.MoveTool(rng.uniform(-size, size, 3))]
+            wait = int(rng.integers(1, longest))
+        else:
+            wait -= 1
+        state = session.step(state, commands, state.t + TICK)
+        fastest = max(fastest, speed(session, state))
+    assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
+
+
+def test_a_lower_limit_is_kept_as_well(arm: Arm, session: Session) -> None:
+    slow = Session(arm, session.ready, tool_speed=0.1)
+    found = speeds(slow, [each for group in ORDERS.values() for each in group], 2000, 1)
+    assert 0.05 < max(found) <= 0.1
+
+
+def test_a_plan_is_left_without_passing_it(arm: Arm, session: Session) -> None:
+    rng, worst = np.random.default_rng(11), 0.0
+    orders: list[cmd.Command] = [cmd.Stop(), cmd.Home(), cmd.MoveTool(np.array([-0.3, 0.3, 0.2]))]
+    for number in range(12):
+        state = session.begin(anywhere(rng, arm), 0.0, 0.0)
+        plan = plan_to(arm, None, state, anywhere(rng, arm))
+        state = session.step(state, [cmd.Follow(plan)], TICK)
+        leave = int(rng.uniform(0.2, 0.8) * plan.duration / TICK)
+        for tick in range(leave + 150):
+            commands = [orders[number % 3]] if tick == leave else []
+            state = session.step(state, commands, state.t + TICK)
+            worst = max(worst, speed(session, state))
+    assert 0.6 * TOOL_SPEED < worst <= TOOL_SPEED
+
+
+def test_the_bound_of_the_tool_speed_is_one(arm: Arm) -> None:
+    rng, chain = np.random.default_rng(3), arm.chain
+    for _ in range(500):
+        qd = rng.uniform(-1.0, 1.0, 5)
+        assert tool_speed(chain, anywhere(rng, arm), qd) <= tool_speed_bound(chain, qd) + 1e-12
