@@ -38,18 +38,18 @@ class Welcome(Answer, frozen=True, kw_only=True):
 
 
 class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is accepted.
-
-    ``ticket``: for one that moves the arm; it is heeded in states whose ticket is no smaller.
-    """
+    """The request of that id is accepted. ``ticket``: of one that moves the arm; it is heeded in
+    states whose ticket is no smaller."""
 
     ticket: int | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):
-    """It is not, and nothing has changed; ``why`` says the reason and what to do."""
+    """Nothing has changed; ``why`` says the reason and what to do. ``retry``: too much was asked
+    at once, and after so many seconds there is time again."""
 
     why: str
+    retry: float | None = None
 
 
 class Echo(Answer, frozen=True, kw_only=True):
