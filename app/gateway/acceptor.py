@@ -101,7 +101,6 @@ class Acceptor:
         self._most = waiting
         self._waiting: dict[tuple[str, int], _Connection] = {}
         self._busy: dict[tuple[str, int], _Connection] = {}
-        self._peers: Counter[str] = Counter()
         self._tasks: list[asyncio.Task[None]] = []
         self._logged: dict[str, float] = {}
 
@@ -132,7 +131,6 @@ class Acceptor:
         if connection is None:
             yield
             return
-        self._peers[connection.client[0]] -= 1
         self._busy[connection.client] = connection
         try:
             yield
@@ -180,13 +178,13 @@ class Acceptor:
 
     def _wait(self, connection: _Connection) -> None:
         connection.since = asyncio.get_running_loop().time()
+        # The newest stands last, even where a port of the other side is used again.
+        self._waiting.pop(connection.client, None)
         self._waiting[connection.client] = connection
-        self._peers[connection.client[0]] += 1
 
     def _forget(self, connection: _Connection) -> None:
         if self._waiting.get(connection.client) is connection:
             del self._waiting[connection.client]
-            self._peers[connection.client[0]] -= 1
 
     def _make_room(self) -> None:
         """Close the connection that has waited longest of the address that has most of them."""
@@ -195,7 +193,8 @@ class Acceptor:
                 self._forget(connection)
         if len(self._waiting) <= self._most // 2:
             return
-        crowded, _ = self._peers.most_common(1)[0]
+        peers = Counter(address for address, _ in self._waiting)
+        crowded, _ = peers.most_common(1)[0]
         oldest = next(each for each in self._waiting.values() if each.client[0] == crowded)
         self._report(f"Too many connections wait; closed the oldest of {crowded}.")
         self._forget(oldest)
@@ -221,7 +220,6 @@ class Acceptor:
                         connection.closing, connection.since = True, t
                     elif t - connection.since > SILENCE:
                         connection.close()
-            self._peers += Counter()
 
     def _report(self, what: str) -> None:
         """Log it, unless it was logged just now."""
