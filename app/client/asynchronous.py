@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from app.api import answers, requests
 from app.api.fields import ROOT, Id
@@ -234,7 +234,7 @@ async def aconnect(
         socket = await open_websocket(
             address, additional_headers=headers, compression=None, close_timeout=GOODBYE
         )
-    except (OSError, InvalidStatus) as error:
+    except (OSError, InvalidHandshake) as error:
         raise LostError(f"There is no katana450 server at {url}: {error}.") from error
     try:
         async with asyncio.timeout(ASKED_FOR):

@@ -202,10 +202,14 @@ class Acceptor:
 
     async def _watch(self) -> None:
         loop = asyncio.get_running_loop()
+        t = loop.time()
         while True:
             await asyncio.sleep(CHECK_EVERY)
-            t = loop.time()
+            before, t = t, loop.time()
+            # What came while the loop was held up itself is not read yet.
+            held_up = max(t - before - 2.0 * CHECK_EVERY, 0.0)
             for connection in tuple(self._waiting.values()):
+                connection.since += held_up
                 transport = connection.transport
                 unsent = transport is not None and transport.get_write_buffer_size() > 0
                 if not connection.open:
