@@ -152,14 +152,14 @@ class Acceptor:
                     self._report(f"A connection could not be accepted: {error.strerror}.")
                     # Whoever was cut off while waiting in line leaves room for the next.
                     if error.errno in NO_ROOM:
-                        self._make_room()
+                        self._make_room(self._most // 2)
                         await asyncio.sleep(BACK_OFF)
                     break
                 connection = _Connection(sock, (address[0], address[1]), loop.time())
                 connection.opening = asyncio.create_task(self._open(connection, protocol, tls))
                 self._wait(connection)
                 if len(self._waiting) > self._most:
-                    self._make_room()
+                    self._make_room(self._most)
             # An accept that need not wait gives nobody else a turn.
             await asyncio.sleep(0)
 
@@ -186,12 +186,12 @@ class Acceptor:
         if self._waiting.get(connection.client) is connection:
             del self._waiting[connection.client]
 
-    def _make_room(self) -> None:
-        """Close the connection that has waited longest of the address that has most of them."""
+    def _make_room(self, most: int) -> None:
+        """Close the oldest of the address with most of them, if more than ``most`` wait."""
         for connection in tuple(self._waiting.values()):
             if not connection.open:
                 self._forget(connection)
-        if len(self._waiting) <= self._most // 2:
+        if len(self._waiting) <= most:
             return
         peers = Counter(address for address, _ in self._waiting)
         crowded, _ = peers.most_common(1)[0]

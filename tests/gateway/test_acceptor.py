@@ -62,6 +62,20 @@ def test_the_address_with_most_connections_loses_its_oldest() -> None:
     asyncio.run(act())
 
 
+def test_connections_that_have_ended_leave_room_for_others() -> None:
+    async def act() -> None:
+        async with _accepting() as (_, server):
+            early = [await _connected(server) for _ in range(WAITING // 2 + 1)]
+            for _ in range(3 * WAITING):
+                (await _connected(server)).close()
+                await asyncio.sleep(0.01)
+            assert all(_is_open(each) for each in early)
+            for each in early:
+                each.close()
+
+    asyncio.run(act())
+
+
 def test_a_connection_that_is_kept_is_not_closed_for_others() -> None:
     async def act() -> None:
         async with _accepting() as (acceptor, server):
