@@ -28,7 +28,9 @@ import uvicorn
 import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
+from app.gateway.acceptor import Acceptor
 from app.gateway.application import application
+from app.gateway.budget import Budgets
 from app.gateway.door import LOOPBACK_NAMES, Address, Door
 from app.gateway.hub import Hub
 from app.gateway.listen import listen
@@ -58,7 +60,7 @@ def serve() -> None:
     hub, door = Hub(time.monotonic), Door(None, port, address)
     proxy = Proxy(hub, door, Guard(server), server.get_port(), KEY)
     config = uvicorn.Config(
-        application(hub, door, proxy, address),
+        application(hub, door, Budgets(hub.clock), proxy, address, Acceptor(listening)),
         ws="websockets-sansio",
         ws_per_message_deflate=False,
         lifespan="off",

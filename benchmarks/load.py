@@ -4,9 +4,11 @@
 
 A program swings the arm all the time. In turn there are: nobody else; 32 watchers who say 30 times
 a second what they have seen; senders who flood the server; readers who read nothing; senders of
-messages no page can have sent. Of each turn are printed how late the control loop's ticks came (the
-server's own count) and how long a STOP takes: until the first tick known to brake, which includes
-the way to the server, and until the program that said it knows. Both processes read one clock.
+messages no page can have sent; connections that say nothing; thirty programs of one person that
+together ask for the branches twelve thousand times a second. Of each turn are printed how late the
+control loop's ticks came (the server's own count) and how long a STOP takes: until the first tick
+known to brake, which includes the way to the server, and until the program that said it knows. Both
+processes read one clock. A connection that is lost is printed as such, and the next turn follows.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ from websockets.exceptions import ConnectionClosed
 
 from app.api import answers, requests
 from app.client import AsyncClient, aconnect
+from app.errors import KatanaError
+from app.gateway.budget import DEBT, EACH
 from app.runtime.lateness import LOOKED_AT
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
@@ -36,6 +40,18 @@ PICTURES = 30.0
 """A second, of which each watcher says that it has seen them."""
 
 FLOODS, SLOW, HOSTILE = 2, 4, 2
+
+SILENT = 1100
+"""Connections that say nothing; each that is closed comes again."""
+
+ASKING, ASKED = 30, 390.0
+"""Programs that ask for the branches, and how many times a second each."""
+
+RECOVERY = DEBT / EACH + 1.0
+"""[s] Between two turns."""
+
+TURN_SECONDS = 120.0
+"""[s] A turn that takes longer is given up."""
 
 SWING = np.array((0.3, 0.15, 0.15, 0.2, 0.6))
 """[rad] Of each joint about the ready posture."""
@@ -123,6 +139,35 @@ async def poison(url: str) -> None:
                         await peer.set(label, value=value, disabled=True)
 
 
+async def keep_silent(url: str) -> None:
+    """Hold SILENT connections open, and open those anew that the server closes."""
+    address = (url.rpartition("/")[2].partition(":")[0], int(url.rpartition(":")[2]))
+    writers: list[asyncio.StreamWriter] = []
+    try:
+        while not _ended():
+            for _ in range(20):
+                with suppress(OSError):
+                    writers.append((await asyncio.open_connection(*address))[1])
+            writers = [each for each in writers if not each.transport.is_closing()]
+            await asyncio.sleep(0.01 if len(writers) < SILENT else 0.5)
+    finally:
+        for each in writers:
+            each.transport.abort()
+
+
+async def inquire(url: str) -> None:
+    """Ask for the branches ASKED times a second; when sent away, come again."""
+    while not _ended():
+        await asyncio.sleep(0.2)
+        with suppress(ConnectionClosed, OSError):
+            async with websocket(url, "/api/v1/socket?name=Inquire", max_queue=None) as socket:
+                due = time.monotonic()
+                while True:
+                    await socket.send('{"do":"look","at":"branches"}')
+                    due += 1.0 / ASKED
+                    await asyncio.sleep(max(due - time.monotonic(), 0.0))
+
+
 async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
     """[s] from saying STOP until a tick brakes, and until a state tells so, each time."""
     found: list[tuple[float, float]] = []
@@ -143,7 +188,19 @@ async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
 async def turn(
     url: str, name: str, others: list[Callable[[], Awaitable[None]]], stops: int
 ) -> None:
-    """One turn: print how late the ticks came, and how long a STOP took."""
+    """One turn: print how late the ticks came, and how long a STOP took; or what was lost."""
+    # Without links all programs here share a budget, which a turn may have used up.
+    await asyncio.sleep(RECOVERY)
+    try:
+        async with asyncio.timeout(TURN_SECONDS):
+            await _turn(url, name, others, stops)
+    except* (KatanaError, TimeoutError, OSError) as lost:
+        print(f"{name:20} given up: {lost.exceptions[0]!r}", flush=True)
+
+
+async def _turn(
+    url: str, name: str, others: list[Callable[[], Awaitable[None]]], stops: int
+) -> None:
     async with AsyncExitStack() as stack:
         group = await stack.enter_async_context(asyncio.TaskGroup())
         tasks = [group.create_task(_alone(other())) for other in others]
@@ -182,6 +239,8 @@ async def crowd(url: str, stops: int) -> None:
     await turn(url, f"{FLOODS} who flood", [lambda: flood(url)] * FLOODS, stops)
     await turn(url, f"{SLOW} who read nothing", [lambda: crawl(url)] * SLOW, stops)
     await turn(url, f"{HOSTILE} hostile", [lambda: poison(url)] * HOSTILE, stops)
+    await turn(url, f"{SILENT} silent", [lambda: keep_silent(url)], stops)
+    await turn(url, f"{ASKING} who inquire", [lambda: inquire(url)] * ASKING, stops)
 
 
 def main() -> None:
@@ -197,7 +256,9 @@ def main() -> None:
         root = Path(__file__).resolve().parents[1]
         # Clients in a process of their own, so that they do not slow the server's threads.
         command = [sys.executable, "-m", "benchmarks.load", "--url", server.url]
-        subprocess.run([*command, "--stops", str(options.stops)], cwd=root, check=True)
+        stops = ("--stops", str(options.stops))
+        # One turn more than there are, for what the turns themselves do not bound.
+        subprocess.run([*command, *stops], cwd=root, check=True, timeout=8.0 * TURN_SECONDS)
 
 
 if __name__ == "__main__":

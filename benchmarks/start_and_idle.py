@@ -75,7 +75,9 @@ def over_the_wire(url: str) -> dict[str, int]:
 def compressed(url: str, cookie: str) -> int:
     """Bytes of the answer to a browser, which takes gzip."""
     wanted = {"Cookie": cookie, "Accept-Encoding": "gzip"}
-    with urllib.request.urlopen(urllib.request.Request(url, headers=wanted)) as answer:
+    with urllib.request.urlopen(
+        urllib.request.Request(url, headers=wanted), timeout=SCENE_SECONDS
+    ) as answer:
         return len(answer.read())
 
 

@@ -67,7 +67,11 @@ form=requests.Form.MESH, mesh=key))` stands it in front of the arm; `arm.save_sc
 `arm.load_scene(data)` keep what stands around.
 
 `connect` gives the signs of life by itself. `aconnect` is the same for asyncio. What is refused
-raises `RefusedError`, whose text says why and what to do.
+raises `RefusedError`, whose text says why and what to do. No call waits for ever: a server that does
+not answer raises `LostError`.
+
+Questions cost processor time, of which each person has a [budget](access.md#limits). What exceeds it is
+refused with `retry`, the seconds until there is time again; over HTTP with status 429 and `Retry-After`.
 
 ## From GNU Octave
 

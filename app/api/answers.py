@@ -38,22 +38,20 @@ class Welcome(Answer, frozen=True, kw_only=True):
 
 
 class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is accepted.
-
-    ``ticket``: for one that moves the arm; it is heeded in states whose ticket is no smaller.
-    ``rotation_misfit``: for one with a pose ``T``, how far the columns of its rotation were off
-    orthonormal, as the largest entry of R^T R - I. The nearest rotation is used, so four printed
-    decimals are enough; more than 1e-3 is refused.
-    """
+    """The request of that id is accepted. ``ticket``: of one that moves the arm; it is heeded in
+    states whose ticket is no smaller. ``rotation_misfit``: of one with a pose, the largest entry of
+    R^T R - I of its rotation; the nearest rotation is used, and more than 1e-3 is refused."""
 
     ticket: int | None = None
     rotation_misfit: float | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):
-    """It is not, and nothing has changed; ``why`` says the reason and what to do."""
+    """Nothing has changed; ``why`` says the reason and what to do. ``retry``: too much was asked
+    at once, and after so many seconds there is time again."""
 
     why: str
+    retry: float | None = None
 
 
 class Echo(Answer, frozen=True, kw_only=True):
@@ -156,8 +154,8 @@ class State(Answer, frozen=True, kw_only=True):
         speed: share of full speed. holder: name of who holds the arm.
         stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
             newer than the request is stopped, then confirmed.
-        windows: how many pages and programs are open. water: of the cup; null where there is none.
-        program: that is planned or runs, or ran last. fields: of the VRML world that are watched.
+        windows: pages and programs that are open. water: of the cup; null where there is none.
+        program: planned, running or run last. fields: of the VRML world that are watched.
     """
 
     t: float
@@ -202,8 +200,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         joints: their names, in the order of every joint vector.
         lower, upper, speed, acceleration, jerk: (n,) their limits.
         ready: (n,) the posture that Home drives to.
-        tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one of
-            them.
+        tools: the tool frames by name, (4, 4) in {S} at the zero posture; default_tool: one.
         gripper: closed and open [rad], and its speed [rad/s]; null without fingers.
         gripper_slides: whether its fingers slide; its numbers are in m and m/s then.
         T_base_shoulder: (4, 4) the frame {S} in the base frame; null where there are only joints.
@@ -286,9 +283,7 @@ class Loop(Answer, frozen=True, kw_only=True):
 
 class Thing(msgspec.Struct, frozen=True, kw_only=True):
     """Something that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
-
-    ``fixed``: to the hand. ``colour``: null for its own.
-    """
+    ``fixed``: to the hand. ``colour``: null for its own."""
 
     name: str
     form: str
@@ -354,11 +349,8 @@ class Links(Answer, frozen=True, kw_only=True):
 
 
 class Mesh(Answer, frozen=True, kw_only=True):
-    """A file that was uploaded and can now be placed.
-
-    ``key``: for ``place``. ``name``: of the file, and of no thing there is. ``said``: what was
-    read, in words. ``size``: along x, y, z [m].
-    """
+    """A file that was uploaded and can now be placed. ``key``: for ``place``. ``name``: of the
+    file, and of no thing there is. ``said``: what was read. ``size``: along x, y, z [m]."""
 
     key: str
     name: str

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from app.api import answers, requests
 from app.api.fields import ROOT, Id
@@ -24,6 +24,9 @@ SOCKET = f"{ROOT}/socket"
 
 ASKED_FOR = 5.0
 """[s] An answer that takes longer does not come."""
+
+GOODBYE = 1.0
+"""[s] For hanging up properly; then the connection is cut off."""
 
 FOLLOWED = 30.0
 """[Hz] States while a motion is waited for."""
@@ -49,7 +52,7 @@ class AsyncClient:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        await self._socket.close()
+        await hang_up(self._socket)
 
     async def ask(self, request: requests.Request) -> answers.Answer:
         """The answer to any request. Raises RefusedError with the reason, LostError."""
@@ -57,10 +60,12 @@ class AsyncClient:
         request = msgspec.structs.replace(request, id=self._asked)
         future: asyncio.Future[answers.Answer] = asyncio.get_running_loop().create_future()
         self._waiting[self._asked] = future
-        await self._say(request)
         try:
+            await self._say(request)
             async with asyncio.timeout(ASKED_FOR):
                 return await future
+        except TimeoutError as error:
+            raise LostError(f"No answer has come in {ASKED_FOR:g} s.") from error
         finally:
             self._waiting.pop(request.id, None)
 
@@ -76,12 +81,16 @@ class AsyncClient:
         return answer
 
     async def states(self, hz: float = FOLLOWED) -> AsyncGenerator[answers.State, None]:
-        """The state, so many times a second; the newest, when it is asked for more slowly."""
+        """The state, so many times a second; the newest, when it is asked for more slowly.
+
+        Raises LostError when the server has hung up or sends no more.
+        """
         queue: asyncio.Queue[answers.State | None] = asyncio.Queue(1)
         self._states.append(queue)
         try:
             await self.ask(requests.Watch(hz=hz))
-            while (state := await queue.get()) is not None:
+            patience = ASKED_FOR + 1.0 / hz
+            while (state := await _next_of(queue, patience)) is not None:
                 yield state
             raise LostError(self._lost or "The server has hung up.")
         finally:
@@ -133,9 +142,13 @@ class AsyncClient:
         if self._lost is not None:
             raise LostError(self._lost)
         try:
-            await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
+            async with asyncio.timeout(ASKED_FOR):
+                await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
         except ConnectionClosed as error:
             raise LostError(f"The server has hung up: {error}.") from error
+        except TimeoutError as error:
+            self._lose(f"The server has read nothing for {ASKED_FOR:g} s.")
+            raise LostError(f"The server has read nothing for {ASKED_FOR:g} s.") from error
 
     async def _beat(self) -> None:
         while True:
@@ -149,6 +162,8 @@ class AsyncClient:
             self._lose("The server has hung up.")
         except ConnectionClosed as error:
             self._lose(f"The server has hung up: {error}.")
+        except msgspec.MsgspecError as error:
+            self._lose(f"The server speaks another language: {error}.")
 
     def _take(self, answer: answers.AnyAnswer) -> None:
         future = self._waiting.get(answer.id)
@@ -175,6 +190,27 @@ class AsyncClient:
                 future.set_exception(LostError(why))
 
 
+async def _next_of(
+    queue: asyncio.Queue[answers.State | None], seconds: float
+) -> answers.State | None:
+    try:
+        async with asyncio.timeout(seconds):
+            return await queue.get()
+    except TimeoutError as error:
+        raise LostError(f"No state has come for {seconds:.1f} s.") from error
+
+
+async def hang_up(socket: ClientConnection) -> None:
+    """Close ``socket``, at the latest after GOODBYE.
+
+    ``close`` alone first sends all that is left: it never ends if the server reads nothing.
+    """
+    with suppress(TimeoutError):
+        async with asyncio.timeout(GOODBYE):
+            await socket.close()
+    socket.transport.abort()
+
+
 def _plain(value: Any) -> Any:
     """Numbers and arrays of numpy's, as JSON has them."""
     if isinstance(value, np.ndarray | np.generic):
@@ -196,16 +232,21 @@ async def aconnect(
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     try:
         socket = await open_websocket(
-            address, additional_headers=headers, compression=None, close_timeout=1.0
+            address, additional_headers=headers, compression=None, close_timeout=GOODBYE
         )
-        welcome = answers.decoded(await socket.recv())
-    except (OSError, InvalidStatus) as error:
+    except (OSError, InvalidHandshake) as error:
         raise LostError(f"There is no katana450 server at {url}: {error}.") from error
+    try:
+        async with asyncio.timeout(ASKED_FOR):
+            welcome = answers.decoded(await socket.recv())
     except ConnectionClosed as error:
         why = error.rcvd.reason if error.rcvd is not None else str(error)
         raise RefusedError(why) from error
+    except (TimeoutError, msgspec.MsgspecError) as error:
+        await hang_up(socket)
+        raise LostError(f"There is no katana450 server at {url}: {error}.") from error
     if not isinstance(welcome, answers.Welcome):
-        await socket.close()
+        await hang_up(socket)
         raise LostError(f"The server at {url} speaks another language: {welcome}.")
     client = AsyncClient(socket, welcome, Site(url, token))
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import re
 from collections.abc import Awaitable, Callable
 
@@ -14,12 +15,14 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from app.api import answers, requests, schema
-from app.api.fields import ROOT
+from app.api.fields import ROOT, Id
 from app.control.lease import LOST_AFTER
 from app.errors import InputError, LeaseError
 from app.gateway import program
-from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, as_json, body_of
-from app.gateway.desk import Desk
+from app.gateway.admission import address_of, identity
+from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
+from app.gateway.budget import FIXED_HTTP, Budget, Budgets, BusyError
+from app.gateway.desk import Desk, driver_key
 from app.gateway.door import Door, Visitor
 from app.gateway.hub import Hub, Window
 from app.gateway.uploads import Uploads
@@ -38,15 +41,19 @@ KEY, NAME = "x-program", "x-name"
 
 TOO_SOON = 503
 
+LONGEST_PAUSE = 0.5
+"""[s] Before too frequent a request is refused."""
+
 
 class Api:
     """Its routes."""
 
-    def __init__(self, hub: Hub, door: Door) -> None:
+    def __init__(self, hub: Hub, door: Door, budgets: Budgets) -> None:
         self._hub = hub
+        self._budgets = budgets
         self._door = door
         self._desk = Desk(hub)
-        self._uploads = Uploads(hub, self._visitor)
+        self._uploads = Uploads(hub, door, self._visitor)
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
     def routes(self) -> list[BaseRoute]:
@@ -56,7 +63,7 @@ class Api:
             return Response(schema.openapi_json(), media_type="application/json")
 
         async def socket(socket: WebSocket) -> None:
-            await program.serve_socket(self._hub, self._door, socket)
+            await program.serve_socket(self._hub, self._door, self._budgets, socket)
 
         return [
             *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
@@ -69,14 +76,19 @@ class Api:
 
     def _read(self, at: str) -> Callable[[Request], Awaitable[Response]]:
         async def read(request: Request) -> Response:
-            visitor = self._visitor(request)
+            visitor, driver = self._visitor(request), ""
             if self._key(request, visitor) in self._posting:
                 # A program that looks is alive; a stranger's look is nothing.
-                self._hub.beat(self._window(request, visitor))
+                window = self._window(request, visitor)
+                driver = driver_key(self._hub, window)
+                self._hub.beat(window)
             try:
-                return as_json(self._desk.look(at))
+                with self._budget(request).charged(driver, fixed=FIXED_HTTP):
+                    return as_json(self._desk.look(at))
             except LeaseError as error:
                 raise HTTPException(TOO_SOON, str(error)) from error
+            except BusyError as error:
+                return await _too_much(error)
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
@@ -100,12 +112,17 @@ class Api:
             if isinstance(asked, requests.Hello | requests.Watch):
                 raise InputError("That is for a connection that lasts: the socket or the TCP port.")
             window = self._window(request, visitor)
-            return as_json(self._desk.do(window, asked))
+            return as_json(self._desk.do(window, asked, self._budget(request)))
+        except BusyError as error:
+            return await _too_much(error, requests.id_of(body))
         except InputError as error:
             refused = answers.Refused(why=str(error), id=requests.id_of(body))
             return as_json(refused, NOT_UNDERSTOOD)
         except LeaseError as error:
             return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
+
+    def _budget(self, request: Request) -> Budget:
+        return self._budgets.of(identity(self._door, request) or address_of(request))
 
     def _visitor(self, request: Request) -> Visitor:
         headers = request.headers
@@ -140,3 +157,11 @@ class Api:
     def _forget(self, key: str) -> None:
         window, _ = self._posting.pop(key)
         self._hub.leave(window, for_good=True)
+
+
+async def _too_much(error: BusyError, id: Id = None) -> Response:
+    # Who asks again at once is slowed down; STOP comes by another route.
+    await asyncio.sleep(min(error.retry, LONGEST_PAUSE))
+    answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)
+    answer.headers["Retry-After"] = str(math.ceil(error.retry))
+    return answer

@@ -16,9 +16,12 @@ from starlette.websockets import WebSocket
 
 from app.api.fields import LONGEST_PRESS
 from app.gateway import control_socket, files, headers, status, viser_page
+from app.gateway.acceptor import Acceptor
+from app.gateway.admission import Admission
 from app.gateway.api import Api
 from app.gateway.bodies import body_of
 from app.gateway.bucket import Bucket
+from app.gateway.budget import Budgets
 from app.gateway.door import Address, Door, Visitor
 from app.gateway.hub import Hub
 from app.gateway.proxy import Proxy
@@ -36,7 +39,9 @@ class _Entry(msgspec.Struct, forbid_unknown_fields=True):
     token: str
 
 
-def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp:
+def application(
+    hub: Hub, door: Door, budgets: Budgets, proxy: Proxy, address: Address, acceptor: Acceptor
+) -> ASGIApp:
     """Everything that answers at the port."""
     static = files.load()
     index = static.pop("index.html")
@@ -89,7 +94,7 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
         return PlainTextResponse("ok\n" if wrong is None else f"{wrong}\n", 503 if wrong else 200)
 
     async def control(socket: WebSocket) -> None:
-        await control_socket.serve(hub, door, socket)
+        await control_socket.serve(hub, door, budgets, socket)
 
     routes = [
         Route("/", page),
@@ -100,9 +105,10 @@ def application(hub: Hub, door: Door, proxy: Proxy, address: Address) -> ASGIApp
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
-        *Api(hub, door).routes(),
+        *Api(hub, door, budgets).routes(),
     ]
-    return headers.Threshold(Starlette(routes=routes), address)
+    admission = Admission(Starlette(routes=routes), door, acceptor)
+    return headers.Threshold(admission, address)
 
 
 def _known(door: Door, request: Request) -> Visitor:

@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket
 from app.api import requests
 from app.gateway import status
 from app.gateway.bucket import Bucket
+from app.gateway.budget import Budget, Budgets
 from app.gateway.conversation import Conversation, Line, SocketLine
 from app.gateway.door import NOT_YOU, Door
 from app.gateway.hub import Hub, Window
@@ -34,9 +35,11 @@ BAD_AT_MOST = 4
 class ControlSocket(Conversation):
     """One page's: it is told what is new of the status, on a slow line less often."""
 
-    def __init__(self, hub: Hub, line: Line) -> None:
+    def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
         t = hub.clock()
-        super().__init__(hub, line, often=Bucket(RATE, BURST, t), bad=Bucket(0.0, BAD_AT_MOST, t))
+        super().__init__(
+            hub, line, budget, often=Bucket(RATE, BURST, t), bad=Bucket(0.0, BAD_AT_MOST, t)
+        )
         self._told: dict[str, Any] = {}
         self._looked_at = float("-inf")
         self.window: Window | None = None
@@ -61,7 +64,7 @@ class ControlSocket(Conversation):
         return {"is": "status", **news}, PUSH_EVERY
 
 
-async def serve(hub: Hub, door: Door, socket: WebSocket) -> None:
+async def serve(hub: Hub, door: Door, budgets: Budgets, socket: WebSocket) -> None:
     """Answer a request for a control socket."""
     visitor = door.visitor(socket.cookies)
     page = socket.query_params.get("page", "")
@@ -70,7 +73,7 @@ async def serve(hub: Hub, door: Door, socket: WebSocket) -> None:
         await socket.close(NOT_YOU, "Come in by the front page.")
         return
     line = SocketLine(socket)
-    control = ControlSocket(hub, line)
+    control = ControlSocket(hub, line, budgets.of(visitor.session))
     control.window = window = hub.join(visitor, page, control.tell, line.arrival)
     try:
         if not await door.while_welcome(lambda: door.visitor(socket.cookies), control.run(window)):

@@ -18,7 +18,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from app.api import requests
 from app.api.fields import Id
 from app.errors import InputError, LeaseError
+from app.gateway.admission import TOO_MUCH
 from app.gateway.bucket import Bucket
+from app.gateway.budget import Budget, BusyError
 from app.gateway.desk import Desk
 from app.gateway.hub import Hub, Window
 from app.gateway.liveness import Arrival
@@ -31,9 +33,6 @@ ARRIVAL = "katana450.arrival"
 NOTICES = 64
 """Answers that may wait for a slow line; of more, the oldest are forgotten."""
 
-TOO_MUCH = 4429
-"""Close code for who asks too much at once."""
-
 NONSENSE = 1008
 """Close code for who says what is no request, again and again."""
 
@@ -41,7 +40,7 @@ FAREWELL = 1.0
 """[s] That who is sent away has for being told so: who reads nothing cannot be told."""
 
 
-QUESTIONS = (requests.Beat, requests.Look, requests.Get)
+ANSWERED = (requests.Beat, requests.Look, requests.Get)
 """Requests that are answered without an id too."""
 
 
@@ -91,9 +90,11 @@ class SocketLine:
 class Conversation(ABC):
     """One window's; what is told unasked is its kind's."""
 
-    def __init__(self, hub: Hub, line: Line, *, often: Bucket, bad: Bucket) -> None:
-        """``often``: how much may be asked. ``bad``: how much of it may be nonsense."""
+    def __init__(self, hub: Hub, line: Line, budget: Budget, *, often: Bucket, bad: Bucket) -> None:
+        """``budget``: of whoever asks, and of all their other windows. ``often``: how much may be
+        asked here. ``bad``: how much of it may be nonsense."""
         self.hub = hub
+        self.budget = budget
         self._desk = Desk(hub)
         self._line = line
         self._often = often
@@ -112,8 +113,8 @@ class Conversation(ABC):
 
     def answer(self, window: Window, request: requests.AnyRequest) -> None:
         """Do it and tell the answer, if the request has an id or is a question."""
-        answer = self._desk.do(window, request)
-        if request.id is not None or isinstance(request, QUESTIONS):
+        answer = self._desk.do(window, request, self.budget)
+        if request.id is not None or isinstance(request, ANSWERED):
             self.tell(answer)
 
     async def run(self, window: Window) -> None:
@@ -149,6 +150,12 @@ class Conversation(ABC):
                 return
             try:
                 self.answer(window, request)
+            except BusyError as error:
+                if error.gone:
+                    log.warning("%s asks on regardless and is sent away.", window.person.name)
+                    await self._send_away(TOO_MUCH, str(error))
+                    return
+                self.refuse(str(error), request.id, retry=error.retry)
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)
 
@@ -157,9 +164,9 @@ class Conversation(ABC):
             async with asyncio.timeout(FAREWELL):
                 await self._line.close(code, why)
 
-    def refuse(self, why: str, named: Id) -> None:
-        """Say that what was asked is not done."""
-        self.tell({"is": "refused", "why": why, "id": named})
+    def refuse(self, why: str, named: Id, **more: float) -> None:
+        """Say that what was asked is not done. ``more``: of ``answers.Refused``."""
+        self.tell({"is": "refused", "why": why, "id": named, **more})
 
     def wake(self) -> None:
         """There may be something to tell now."""

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import msgspec
 import numpy as np
 
 from app.api import answers, requests
 from app.control import commands as cmd
 from app.gateway import tell
+from app.gateway.arm import Arm
+from app.gateway.budget import Budget
+from app.gateway.derived import once
 from app.gateway.hub import Hub, Window
 from app.gateway.placing import Placing
 from app.geometry import se3, so3
@@ -24,6 +29,28 @@ BARE: dict[type[requests.AnyRequest], cmd.Command] = {
 }
 """What says all there is to say by its name."""
 
+FREE = (
+    requests.Stop,
+    requests.Reset,
+    requests.Beat,
+    requests.Acquire,
+    requests.Take,
+    requests.Ask,
+    requests.Withdraw,
+    requests.Give,
+    requests.Release,
+)
+"""Requests that cost nothing, however much else was asked: STOP, signs of life, and who drives."""
+
+QUESTIONS = (requests.Look, requests.Get, requests.Watch)
+"""Requests that change nothing."""
+
+
+def driver_key(hub: Hub, window: Window) -> str:
+    """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
+    actor = hub.performer.actor(window)
+    return window.person.key if hub.lease.holder == actor.person else ""
+
 
 class Desk:
     """Does what a window asks, or raises the LeaseError or InputError that says why not."""
@@ -32,9 +59,16 @@ class Desk:
         self._hub = hub
         self._placing = Placing(hub)
 
-    def do(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
-        """The answer, once it is done. Whatever is asked is a sign of life."""
-        return msgspec.structs.replace(self._done(window, request), id=request.id)
+    def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
+        """The answer, once it is done. Whatever is asked is a sign of life.
+
+        What it costs is taken from ``budget``; raises BusyError when that is used up. FREE requests
+        cost nothing, nor does what steers the arm for whoever holds it.
+        """
+        question, driver = isinstance(request, QUESTIONS), driver_key(self._hub, window)
+        free = isinstance(request, FREE) or (driver and not question)
+        with nullcontext() if free else budget.charged(driver, question=question):
+            return msgspec.structs.replace(self._done(window, request), id=request.id)
 
     def _done(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
         hub = self._hub
@@ -129,25 +163,27 @@ class Desk:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
         match at:
+            case "ledger":
+                return tell.ledger(hub.journal.lines)
+            case "state":
+                return tell.state(hub)
+        arm = hub.present()
+        if at == "loop":
+            return tell.loop(arm.lateness)
+        return once(arm.snapshot, at, lambda: self._derived(arm, at))
+
+    def _derived(self, arm: Arm, at: str) -> answers.Answer:
+        """What follows from the newest snapshot alone."""
+        match at:
             case "arm":
-                arm = hub.present()
                 return tell.arm(arm.model, arm.ready.tolist())
             case "links":
-                arm = hub.present()
                 return arm.nodes.links(arm.state)
-            case "ledger":
-                return answers.Ledger(lines=[tell.line(line) for line in hub.journal.lines])
             case "branches":
-                choices = hub.present().choices()
-                return answers.Branches(choices=[tell.choice(each) for each in choices])
-            case "things":
-                return tell.things(hub)
+                return answers.Branches(choices=[tell.choice(each) for each in arm.choices()])
             case "world":
-                arm = hub.present()
                 return arm.nodes.world(arm.state)
-            case "loop":
-                return tell.loop(hub.present().lateness)
-        return tell.state(hub)
+        return tell.things(arm)
 
 
 def _misfit(request: requests.AnyRequest) -> float | None:

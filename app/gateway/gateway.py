@@ -21,8 +21,10 @@ from websockets.http11 import Request
 
 from app.errors import ConfigurationError
 from app.exchange.meshes import Meshes
+from app.gateway.acceptor import Acceptor, raise_descriptor_limit
 from app.gateway.access import AccessFile
 from app.gateway.application import application
+from app.gateway.budget import Budgets
 from app.gateway.conversation import ARRIVAL
 from app.gateway.door import LOOPBACK_NAMES, Address, Door, public_origin
 from app.gateway.firewall import LARGEST
@@ -43,8 +45,11 @@ UNSENT = 16_384
 """Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
 
 UNREAD = 4_096
-"""Bytes that the machine may hold of what a browser sends: what is read at once is taken apart at
-once, and everybody waits for it."""
+"""Bytes that are read at once of what a browser sends: they are taken apart at once, and everybody
+waits for it."""
+
+UNREAD_TLS = 65_536
+"""Likewise where TLS reads them, which takes all that the machine holds."""
 
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
@@ -66,6 +71,7 @@ class Gateway:
         Raises ConfigurationError when it must not be served there as ``settings`` say.
         """
         _check_tls(settings)
+        raise_descriptor_limit()
         self._listening = listening
         self._lines_at = lines
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -84,12 +90,14 @@ class Gateway:
             self.steering = Steering(self._hub.performer, lambda: self._loop)
             door = Door(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
-            app = application(self._hub, door, proxy, self.address)
-            self._lines = Lines(self._hub, door)
+            acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
+            app = application(self._hub, door, budgets, proxy, self.address, acceptor)
+            self._lines = Lines(self._hub, door, budgets)
         except BaseException:
             self._listening.close()
             raise
-        self._server = uvicorn.Server(
+        self._server = _Server(
+            acceptor,
             uvicorn.Config(
                 app,
                 http="h11",
@@ -104,7 +112,7 @@ class Gateway:
                 timeout_graceful_shutdown=GOODBYE_SECONDS,
                 ssl_certfile=settings.tls_cert,
                 ssl_keyfile=settings.tls_key,
-            )
+            ),
         )
         self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
         self._started = threading.Event()
@@ -140,7 +148,7 @@ class Gateway:
         watch = asyncio.create_task(self._watch())
         try:
             async with self._lines.open(self._lines_at):
-                await self._server.serve(sockets=[self._listening])
+                await self._server.serve()
         finally:
             watch.cancel()
             with suppress(asyncio.CancelledError):
@@ -159,6 +167,28 @@ class Gateway:
             await asyncio.sleep(TICK)
 
 
+class _Server(uvicorn.Server):
+    """Serves what an acceptor lets in.
+
+    asyncio alone accepts thousands in a turn, bounds nothing, and logs a traceback per failure.
+    """
+
+    def __init__(self, acceptor: Acceptor, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._acceptor = acceptor
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:  # noqa: ARG002
+        await super().startup(sockets=[])
+        # It can be closed and waited for, as uvicorn does with its servers.
+        self.servers.append(cast(Any, self._acceptor.start(self._protocol, self.config.ssl)))
+
+    def _protocol(self) -> asyncio.Protocol:
+        protocol: asyncio.Protocol = cast(Any, self.config.http_protocol_class)(
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
+        return protocol
+
+
 class _BrowserSocket(WebSocketsSansIOProtocol):
     """A websocket in whose buffers little can wait, neither of what is sent nor of what comes."""
 
@@ -168,7 +198,12 @@ class _BrowserSocket(WebSocketsSansIOProtocol):
         line = transport.get_extra_info("socket")
         if line is None:
             return
-        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, UNREAD)
+        if hasattr(transport, "max_size"):
+            # A smaller buffer of the machine would do as well, but what does not fit in it is
+            # dropped, the receipts of what was sent the other way with it, and both ends stall.
+            cast(Any, transport).max_size = UNREAD
+        else:
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, UNREAD_TLS)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
             line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import secrets
 import socket
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager, nullcontext, suppress
 from typing import Any
 
 import msgspec
@@ -17,12 +18,17 @@ from app.api import answers, requests
 from app.control.lease import BEAT
 from app.errors import InputError
 from app.gateway import tell
+from app.gateway.acceptor import Acceptor
+from app.gateway.admission import address_of, identity, refuse
 from app.gateway.arm import Arm
 from app.gateway.bucket import Bucket
+from app.gateway.budget import Budget, Budgets, BusyError
 from app.gateway.conversation import NONSENSE, Conversation, GoneError, Line, SocketLine
+from app.gateway.desk import driver_key
 from app.gateway.door import NOT_YOU, Door, Visitor
 from app.gateway.hub import Hub, Window
 from app.gateway.liveness import Arrival
+from app.gateway.places import Places
 
 log = logging.getLogger(__name__)
 
@@ -32,22 +38,31 @@ RATE, BURST = 400.0, 800.0
 MISTAKES, FORGIVEN = 20, 1.0
 """Requests that are none: so many at once, and so many more a second."""
 
+COMPLAINED_EVERY = 5.0
+"""[s] Between two words to a program that watches more than its budget allows."""
+
 HELLO_SECONDS = 5.0
 """[s] A line that says nothing for so long is closed."""
 
 UNSENT = 4096
 """Bytes that may wait to be sent: a state or two, so that what is told is new."""
 
-MOST_LINES = 16
-"""TCP connections at a time."""
+LINES, LINES_EACH = 16, 8
+"""TCP connections at a time, of everybody together and of one identity."""
+
+
+TOO_MUCH_ASKED = "Too much is asked by your programs together. Wait a moment, and ask less often."
 
 
 class Program(Conversation):
     """One program's: it is told the state as often as it wants."""
 
-    def __init__(self, hub: Hub, line: Line) -> None:
+    def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
         t = hub.clock()
-        super().__init__(hub, line, often=Bucket(RATE, BURST, t), bad=Bucket(FORGIVEN, MISTAKES, t))
+        often, bad = Bucket(RATE, BURST, t), Bucket(FORGIVEN, MISTAKES, t)
+        super().__init__(hub, line, budget, often=often, bad=bad)
+        self._window: Window | None = None
+        self._complained = -math.inf
         self._period: float | None = None
         self._due = 0.0
         self._watched: tuple[requests.Named, ...] = ()
@@ -70,7 +85,17 @@ class Program(Conversation):
         if t < self._due:
             return None, self._due - t
         self._due = max(self._due + self._period, t)
-        return self._state(self.hub.arm), self._due - t
+        driver = "" if self._window is None else driver_key(self.hub, self._window)
+        try:
+            with self.budget.charged(driver):
+                return self._state(self.hub.arm), self._due - t
+        except BusyError as error:
+            self._due = max(self._due, t + error.retry)
+            if t - self._complained < COMPLAINED_EVERY:
+                return None, self._due - t
+            self._complained = t
+            why = f"States come less often than they are watched. {error}"
+            return answers.Refused(why=why, retry=error.retry), self._due - t
 
     def _state(self, arm: Arm) -> answers.State:
         """With the fields that are watched; those of a thing that is gone are left out."""
@@ -83,7 +108,7 @@ class Program(Conversation):
 
     def greet(self, window: Window) -> None:
         """Say who they are here."""
-        person = window.person
+        self._window, person = window, window.person
         self.tell(
             answers.Welcome(
                 name=person.name, number=window.number, role=person.role.value, beat=BEAT
@@ -91,24 +116,31 @@ class Program(Conversation):
         )
 
 
-async def serve_socket(hub: Hub, door: Door, socket: WebSocket) -> None:
+async def serve_socket(hub: Hub, door: Door, budgets: Budgets, socket: WebSocket) -> None:
     """Answer a program that asks for a websocket."""
     name = socket.query_params.get("name", "")
 
     def visitor() -> Visitor | None:
         return door.program(name, socket.headers.get("authorization", ""), socket.cookies)
 
+    budget = budgets.of(identity(door, socket) or address_of(socket))
+    if budget.is_exhausted():
+        await refuse(socket, TOO_MUCH_ASKED)
+        return
     await socket.accept()
-    await _serve(hub, door, SocketLine(socket), visitor)
+    await _serve(hub, door, budget, SocketLine(socket), visitor)
 
 
 class Lines:
     """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
     the connection, so that a page's request, which begins otherwise, gets nowhere."""
 
-    def __init__(self, hub: Hub, door: Door) -> None:
+    def __init__(self, hub: Hub, door: Door, budgets: Budgets) -> None:
         self._hub = hub
         self._door = door
+        self._budgets = budgets
+        self._places = Places(LINES, LINES_EACH)
+        self._acceptor: Acceptor | None = None
         self._writers: set[asyncio.StreamWriter] = set()
 
     @asynccontextmanager
@@ -117,13 +149,19 @@ class Lines:
         if listening is None:
             yield
             return
-        server = await asyncio.start_server(self.serve, sock=listening, limit=requests.LARGEST)
+        self._acceptor = Acceptor(listening, LINES)
+        self._acceptor.start(self._protocol)
         try:
             yield
         finally:
-            server.close()
+            self._acceptor.close()
+            await self._acceptor.wait_closed()
             for writer in self._writers:
                 writer.close()
+
+    def _protocol(self) -> asyncio.Protocol:
+        reader = asyncio.StreamReader(limit=requests.LARGEST)
+        return asyncio.StreamReaderProtocol(reader, self.serve)
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One connection, to its end."""
@@ -131,15 +169,9 @@ class Lines:
         line = _TcpLine(reader, writer)
         self._writers.add(writer)
         try:
-            if len(self._writers) > MOST_LINES:
-                await line.close(0, f"No more than {MOST_LINES} programs at a time.")
-                return
             hello = await self._hello(line)
             if hello is not None:
-                token = f"Bearer {hello.token}"
-                await _serve(
-                    self._hub, self._door, line, lambda: self._door.program(hello.name, token)
-                )
+                await self._converse(line, hello, writer.get_extra_info("peername"))
         except GoneError:
             return
         finally:
@@ -147,6 +179,25 @@ class Lines:
             writer.close()
             with suppress(ConnectionError):
                 await writer.wait_closed()
+
+    async def _converse(
+        self, line: _TcpLine, hello: requests.Hello, client: tuple[str, int]
+    ) -> None:
+        def visitor() -> Visitor | None:
+            return self._door.program(hello.name, f"Bearer {hello.token}")
+
+        found = visitor()
+        session = "" if found is None else found.session
+        # Without links all programs of this machine are one to the budget, but have places enough.
+        budget = self._budgets.of(session if self._door.asks else client[0])
+        acceptor = self._acceptor
+        kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
+        with self._places.taken(session) as free, kept:
+            if free:
+                await _serve(self._hub, self._door, budget, line, visitor)
+            else:
+                why = f"No more than {LINES} programs at a time, and {LINES_EACH} of one link."
+                await line.close(0, why)
 
     async def _hello(self, line: _TcpLine) -> requests.Hello | None:
         try:
@@ -163,12 +214,14 @@ class Lines:
         return None
 
 
-async def _serve(hub: Hub, door: Door, line: Line, visitor: Callable[[], Visitor | None]) -> None:
+async def _serve(
+    hub: Hub, door: Door, budget: Budget, line: Line, visitor: Callable[[], Visitor | None]
+) -> None:
     found = visitor()
     if found is None:
         await line.close(NOT_YOU, "A token is asked for; `katana450 access give` makes one.")
         return
-    program = Program(hub, line)
+    program = Program(hub, line, budget)
     window = hub.join(found, secrets.token_hex(16), program.tell, line.arrival)
     program.greet(window)
     try:

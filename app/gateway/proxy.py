@@ -18,10 +18,11 @@ from websockets.typing import Subprotocol
 
 from app.errors import LeaseError
 from app.gateway.control_socket import PAGE
-from app.gateway.door import NOT_YOU, Door
+from app.gateway.door import NOT_YOU, Door, Visitor
 from app.gateway.firewall import Firewall, Ruling, Verdict
 from app.gateway.flow import Flow
 from app.gateway.hub import Hub, key_of
+from app.gateway.places import Places
 from app.view.frames import HATCH_HEADER, Hatch
 from app.view.guard import Guard
 from app.view.server import KEY_HEADER
@@ -40,8 +41,8 @@ FRAME = 1.0 / 60.0
 LOOK_AGAIN = 0.1
 """[s] How soon a browser that is behind is looked at again, should it say nothing."""
 
-MOST = 64
-"""Browsers at one time."""
+BROWSERS, BROWSERS_EACH = 64, 16
+"""Browsers that are shown the scene at one time, and those of one identity."""
 
 REFUSALS_EVERY = 0.5
 """[s] A person who drags what is not theirs is told so, but not twenty times a second."""
@@ -57,7 +58,7 @@ class Proxy:
         self._guard = guard
         self._port = port
         self._key = key
-        self._open = 0
+        self._places = Places(BROWSERS, BROWSERS_EACH)
 
     async def serve(self, browser: WebSocket) -> None:
         """Answer a request for viser's socket."""
@@ -65,13 +66,16 @@ class Proxy:
         if visitor is None or SUBPROTOCOL not in browser.scope["subprotocols"]:
             await browser.close(1008)
             return
-        if self._open >= MOST:
-            await browser.close(1013)
-            return
+        with self._places.taken(visitor.session) as free:
+            if free:
+                await self._serve(browser, visitor)
+            else:
+                await browser.close(1013)
+
+    async def _serve(self, browser: WebSocket, visitor: Visitor) -> None:
         page = browser.query_params.get("page", "")
         # Without our page around it viser can be looked at, and no more.
         key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
-        self._open += 1
         hatch = Hatch()
         try:
             async with connect(
@@ -95,8 +99,6 @@ class Proxy:
             # Who has left meanwhile needs no farewell.
             with suppress(WebSocketDisconnect, RuntimeError):
                 await browser.close(1013)
-        finally:
-            self._open -= 1
 
 
 class _Line:

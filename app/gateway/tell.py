@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -14,6 +15,8 @@ from app.control.margins import Margins
 from app.control.pouring import Pouring
 from app.control.solid import Colour
 from app.exchange.machine import Machine
+from app.gateway.arm import Arm
+from app.gateway.derived import once
 from app.gateway.hub import Hub
 from app.gateway.journal import UNITS, Line
 from app.kinematics.forward import forward
@@ -21,6 +24,7 @@ from app.kinematics.tool import ToolTarget
 from app.kinematics.velocity import tool_speed
 from app.motion.limiter import Limits
 from app.robot.model import RobotModel
+from app.runtime.board import Snapshot
 from app.runtime.lateness import Lateness
 from app.view.texts import sentence, told
 from app.water.units import MILLILITRE
@@ -44,11 +48,26 @@ def state(hub: Hub) -> answers.State:
     """The newest. Raises LeaseError while there is no arm yet."""
     arm = hub.present()
     snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
+    return msgspec.structs.replace(
+        once(snapshot, "state", lambda: _state(arm, snapshot)),
+        told=hub.clock(),
+        moving=snapshot.state.moving or arm.busy,
+        holder=None if holder is None else holder.name,
+        stopped=None if stopped is None else stopped.why,
+        stop=None if stopped is None else stopped.stage,
+        age=arm.age,
+        windows=len(hub.windows),
+        program=hub.performer.told(),
+    )
+
+
+def _state(arm: Arm, snapshot: Snapshot) -> answers.State:
+    """What follows from ``snapshot`` alone; the rest is filled in for each answer."""
     now = snapshot.state
     tool = None if isinstance(arm.model, Machine) else _Tool.of(arm.model, now)
     return answers.State(
         t=now.t,
-        told=hub.clock(),
+        told=now.t,
         ticket=snapshot.ticket,
         q=now.q.tolist(),
         setpoint=now.setpoint.tolist(),
@@ -68,17 +87,17 @@ def state(hub: Hub) -> answers.State:
         branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
         reading=None if tool is None else now.reading.value,
         status=now.status.value,
-        moving=now.moving or arm.busy,
+        moving=now.moving,
         why=sentence(now),
         findings=[finding(each) for each in now.findings],
         speed=now.speed,
-        holder=None if holder is None else holder.name,
-        stopped=None if stopped is None else stopped.why,
-        stop=None if stopped is None else stopped.stage,
-        age=arm.age,
-        windows=len(hub.windows),
+        holder=None,
+        stopped=None,
+        stop=None,
+        age=0.0,
+        windows=0,
         water=water(arm.pouring, now),
-        program=hub.performer.told(),
+        program=None,
     )
 
 
@@ -171,6 +190,11 @@ class _Jointed(NamedTuple):
         )
 
 
+def ledger(lines: Sequence[Line]) -> answers.Ledger:
+    """What held the arm back of late."""
+    return answers.Ledger(lines=[line(each) for each in lines])
+
+
 def line(line: Line) -> answers.Line:
     """One of the journal's."""
     return answers.Line(
@@ -198,9 +222,8 @@ def choice(choice: Choice) -> answers.Choice:
     )
 
 
-def things(hub: Hub) -> answers.Things:
-    """What stands around or is held. Raises LeaseError while there is no arm yet."""
-    arm = hub.present()
+def things(arm: Arm) -> answers.Things:
+    """What stands around or is held."""
     now = arm.state
     x = now.x
     return answers.Things(

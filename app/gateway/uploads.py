@@ -17,21 +17,23 @@ from app.errors import InputError, LeaseError
 from app.exchange.meshes import read_mesh
 from app.exchange.scene_file import LARGEST_ZIP, read_scene_zip
 from app.exchange.shape_file import LONGEST_NAME, MOST_BYTES
-from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, as_json, body_of
+from app.gateway.admission import identity
+from app.gateway.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, TOO_SLOW, as_json, body_of
 from app.gateway.bucket import Bucket
-from app.gateway.door import Visitor
+from app.gateway.door import Door, Visitor
 from app.gateway.hub import Hub
+from app.gateway.places import Places
 
 RATE, AT_ONCE = 0.5, 10.0
 """Files a second, and at once, of everybody together."""
 
-WAITING = 4
-"""Files that are read or wait for it."""
+WAITING, WAITING_EACH = 4, 2
+"""Files that are read or wait for it, of everybody together and of one identity."""
 
 PATIENCE = 60.0
 """[s] Until a file is here and read, whoever sends it slowly."""
 
-NOT_ALLOWED, TOO_SLOW, TOO_MANY = 403, 408, 429
+NOT_ALLOWED = 403
 
 T = TypeVar("T")
 
@@ -39,13 +41,14 @@ T = TypeVar("T")
 class Uploads:
     """The routes. What comes is kept for a while, and used by a request that names its key."""
 
-    def __init__(self, hub: Hub, visitor: Callable[[Request], Visitor]) -> None:
+    def __init__(self, hub: Hub, door: Door, visitor: Callable[[Request], Visitor]) -> None:
         """``visitor``: who asks, or the HTTPException that turns them away."""
         self._hub = hub
+        self._door = door
         self._visitor = visitor
         self._often = Bucket(RATE, AT_ONCE, hub.clock())
         self._reading = asyncio.Lock()
-        self._waiting = 0
+        self._places = Places(WAITING, WAITING_EACH)
 
     def routes(self) -> list[BaseRoute]:
         """All of them."""
@@ -64,7 +67,7 @@ class Uploads:
         async def keep() -> answers.Answer:
             if len(name) > 4 * LONGEST_NAME:
                 raise InputError("The name of the file is too long.")
-            data = await body_of(request, MOST_BYTES)
+            data = await body_of(request, MOST_BYTES, PATIENCE)
             mesh = await self._off(lambda: read_mesh(data, name, unit or None))
             arm = self._hub.arm
             return self._hub.scenes.keep_mesh(mesh, None if arm is None else arm.state)
@@ -74,7 +77,7 @@ class Uploads:
     async def _load(self, request: Request) -> Response:
         async def keep() -> answers.Answer:
             arm = self._hub.present()
-            data = await body_of(request, LARGEST_ZIP)
+            data = await body_of(request, LARGEST_ZIP, PATIENCE)
             hand = arm.surroundings.hand
             T_palm_tool = None if hand is None else hand.T_palm_tool
             stored = await self._off(lambda: read_scene_zip(data, T_palm_tool))
@@ -98,21 +101,20 @@ class Uploads:
         """What ``keep`` answers, for somebody who may drive, and not too often."""
         if not self._visitor(request).role.may_drive:
             raise HTTPException(NOT_ALLOWED, "You may watch, not bring anything.")
-        if self._waiting >= WAITING or not self._often.take(self._hub.clock()):
-            why = "Too many files at once. Wait a moment."
-            return as_json(answers.Refused(why=why), TOO_MANY)
-        self._waiting += 1
-        try:
-            async with asyncio.timeout(PATIENCE):
-                return as_json(await keep())
-        except TimeoutError:
-            return as_json(answers.Refused(why=f"That took more than {PATIENCE:g} s."), TOO_SLOW)
-        except InputError as error:
-            return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
-        except LeaseError as error:
-            return as_json(answers.Refused(why=str(error)), NOT_NOW)
-        finally:
-            self._waiting -= 1
+        with self._places.taken(identity(self._door, request) or "") as free:
+            if not free or not self._often.take(self._hub.clock()):
+                why = "Too many files at once. Wait a moment."
+                return as_json(answers.Refused(why=why), TOO_MANY)
+            try:
+                async with asyncio.timeout(PATIENCE):
+                    return as_json(await keep())
+            except TimeoutError:
+                why = f"That took more than {PATIENCE:g} s."
+                return as_json(answers.Refused(why=why), TOO_SLOW)
+            except InputError as error:
+                return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
+            except LeaseError as error:
+                return as_json(answers.Refused(why=str(error)), NOT_NOW)
 
     async def _off(self, read: Callable[[], T]) -> T:
         """What ``read`` makes, one at a time: each may take a process and a gigabyte."""

@@ -63,12 +63,22 @@ def page_name() -> str:
     return secrets.token_hex(16)
 
 
+class _Websocket(connect):
+    """One whose end is bounded: ``close`` alone waits for ever for a server that reads nothing."""
+
+    async def __aexit__(self, *_error: object) -> None:
+        with suppress(TimeoutError):
+            async with asyncio.timeout(2 * FAREWELL):
+                await self.connection.close()
+        self.connection.transport.abort()
+
+
 def websocket(url: str, path: str, cookie: str = "", **options: Any) -> connect:
     """To be entered; ``origin`` is our own page's unless told otherwise."""
     origin = options.pop("origin", url)
     headers = {"Cookie": cookie} if cookie else {}
     headers |= options.pop("headers", {})
-    return connect(
+    return _Websocket(
         url.replace("http", "ws", 1) + path,
         origin=origin,
         additional_headers=headers,

@@ -19,10 +19,15 @@ class Lines:
     """A program on the TCP port of a server with ``--lines``."""
 
     def __init__(self, server: AppServer) -> None:
+        self.socket = socket.create_connection(("127.0.0.1", self.port(server)), timeout=5.0)
+        self.reader = self.socket.makefile("rb")
+
+    @staticmethod
+    def port(server: AppServer) -> int:
+        """Where the server listens for programs."""
         found = AT.search(server.output)
         assert found is not None
-        self.socket = socket.create_connection(("127.0.0.1", int(found[1])), timeout=5.0)
-        self.reader = self.socket.makefile("rb")
+        return int(found[1])
 
     def say(self, **request: Any) -> None:
         self.raw(json.dumps(request).encode() + b"\n")

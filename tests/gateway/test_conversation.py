@@ -7,6 +7,7 @@ import time
 from itertools import pairwise
 
 from app.control.lease import Role
+from app.gateway.budget import Budgets
 from app.gateway.conversation import FAREWELL, GoneError
 from app.gateway.door import Visitor
 from app.gateway.hub import Hub
@@ -49,7 +50,7 @@ class Deaf(Torrent):
 def test_who_has_asked_two_hundred_times_keeps_nobody_waiting() -> None:
     async def ask() -> list[int]:
         hub, torrent = Hub(time.monotonic), Torrent()
-        program = Program(hub, torrent)
+        program = Program(hub, torrent, Budgets(hub.clock).of("a"))
         window = hub.join(Visitor("session", "Torrent", Role.OPERATOR), "a-page", program.tell)
         asking = asyncio.create_task(program.run(window))
         taken = [torrent.left]
@@ -68,7 +69,7 @@ def test_who_asks_too_much_and_hears_nothing_is_left_all_the_same() -> None:
     async def ask() -> None:
         hub, deaf = Hub(time.monotonic), Deaf()
         deaf.left = 10**9
-        program = Program(hub, deaf)
+        program = Program(hub, deaf, Budgets(hub.clock).of("a"))
         window = hub.join(Visitor("session", "Deaf", Role.OPERATOR), "a-page", program.tell)
         async with asyncio.timeout(10.0 * FAREWELL):
             await program.run(window)

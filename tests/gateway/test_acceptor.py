@@ -1,0 +1,128 @@
+"""Which connections are accepted, kept and closed."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import socket
+import subprocess
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+
+from app.gateway.acceptor import WANTED_DESCRIPTORS, Acceptor
+from app.gateway.listen import listen
+
+WAITING = 8
+
+
+@asynccontextmanager
+async def _accepting() -> AsyncIterator[tuple[Acceptor, tuple[str, int]]]:
+    with listen("0.0.0.0", 0) as listening:
+        acceptor = Acceptor(listening, WAITING).start(asyncio.Protocol)
+        try:
+            yield acceptor, ("127.0.0.1", listening.getsockname()[1])
+        finally:
+            acceptor.close()
+            await acceptor.wait_closed()
+
+
+async def _connected(server: tuple[str, int], of: str = "127.0.0.1") -> socket.socket:
+    """A connection from the address ``of``, once the server has had time to accept it."""
+    connection = socket.create_connection(server, timeout=2.0, source_address=(of, 0))
+    connection.setblocking(False)
+    await asyncio.sleep(0.02)
+    return connection
+
+
+def _is_open(connection: socket.socket) -> bool:
+    try:
+        return connection.recv(1) != b""
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
+
+
+def test_the_address_with_most_connections_loses_its_oldest() -> None:
+    async def act() -> None:
+        async with _accepting() as (_, server):
+            lonely = await _connected(server, "127.0.0.2")
+            crowd = [await _connected(server) for _ in range(3 * WAITING)]
+            await asyncio.sleep(0.1)
+            found = [_is_open(each) for each in crowd]
+            assert found == [False] * (len(crowd) - WAITING + 1) + [True] * (WAITING - 1)
+            assert _is_open(lonely)
+            for each in (lonely, *crowd):
+                each.close()
+
+    asyncio.run(act())
+
+
+def test_connections_that_have_ended_leave_room_for_others() -> None:
+    async def act() -> None:
+        async with _accepting() as (_, server):
+            early = [await _connected(server) for _ in range(WAITING // 2 + 1)]
+            for _ in range(3 * WAITING):
+                (await _connected(server)).close()
+                await asyncio.sleep(0.01)
+            assert all(_is_open(each) for each in early)
+            for each in early:
+                each.close()
+
+    asyncio.run(act())
+
+
+def test_a_connection_that_is_kept_is_not_closed_for_others() -> None:
+    async def act() -> None:
+        async with _accepting() as (acceptor, server):
+            driver = await _connected(server)
+            host, port = driver.getsockname()
+            with acceptor.kept((host, port)):
+                crowd = [await _connected(server) for _ in range(3 * WAITING)]
+                assert _is_open(driver)
+            for each in (driver, *crowd):
+                each.close()
+
+    asyncio.run(act())
+
+
+def test_failures_to_accept_are_logged_once_and_do_not_keep_the_loop_busy(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    tried = []
+
+    async def fail(_listening: socket.socket) -> tuple[socket.socket, tuple[str, int]]:
+        tried.append(1)
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    async def act(monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(asyncio.get_running_loop(), "sock_accept", fail)
+        async with _accepting():
+            await asyncio.sleep(1.0)
+
+    with caplog.at_level(logging.WARNING), pytest.MonkeyPatch.context() as monkeypatch:
+        asyncio.run(act(monkeypatch))
+    assert 1 < len(tried) < 20
+    assert [each.getMessage() for each in caplog.records] == [
+        "A connection could not be accepted: Too many open files."
+    ]
+
+
+@pytest.mark.parametrize(("soft", "hard"), [(256, 2048), (256, 512)])
+def test_the_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard: int) -> None:
+    program = (
+        "import resource\n"
+        "from app.gateway.acceptor import raise_descriptor_limit\n"
+        f"resource.setrlimit(resource.RLIMIT_NOFILE, ({soft}, {hard}))\n"
+        "raise_descriptor_limit()\n"
+        "print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert int(done.stdout) == min(hard, WANTED_DESCRIPTORS)
+    assert ("Raise the limit to" in done.stderr) == (hard < 1024)

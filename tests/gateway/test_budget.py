@@ -1,0 +1,103 @@
+"""What questions may cost, and who pays."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.errors import InputError
+from app.gateway.budget import CROWD, DEBT, EACH, FIXED, Budget, Budgets, BusyError
+
+
+class Clocks:
+    """A clock, and a processor that works for a second of it when told to."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.used = 0.0
+
+    def budgets(self) -> Budgets:
+        return Budgets(lambda: self.now, lambda: self.used)
+
+    def ask(
+        self, budget: Budget, seconds: float, driver: str = "", *, question: bool = True
+    ) -> None:
+        with budget.charged(driver, question=question):
+            self.used += seconds
+
+
+def test_all_windows_of_an_identity_pay_from_one_budget() -> None:
+    clocks = Clocks()
+    budgets = clocks.budgets()
+    clocks.ask(budgets.of("a"), EACH)
+    with pytest.raises(BusyError) as refused:
+        clocks.ask(budgets.of("a"), 0.0)
+    assert refused.value.retry == pytest.approx(0.1)
+    assert isinstance(refused.value, InputError)
+    assert "Ask again in" in str(refused.value)
+    clocks.ask(budgets.of("b"), 0.01)
+    clocks.now += 1.01
+    clocks.ask(budgets.of("a"), 0.0)
+
+
+def test_the_retry_time_is_long_enough() -> None:
+    clocks = Clocks()
+    budget = clocks.budgets().of("a")
+    clocks.ask(budget, 3.0 * EACH)
+    with pytest.raises(BusyError) as refused:
+        clocks.ask(budget, 0.0)
+    clocks.now += refused.value.retry + 2.0 * FIXED / EACH
+    clocks.ask(budget, 0.0)
+
+
+def test_a_crowd_shares_a_budget_that_the_driver_does_not_need() -> None:
+    clocks = Clocks()
+    budgets = clocks.budgets()
+    viewers = [budgets.of(name) for name in "abc"]
+    for viewer in viewers[:2]:
+        clocks.ask(viewer, CROWD / 2.0)
+    with pytest.raises(BusyError) as refused:
+        clocks.ask(viewers[2], 0.0)
+    assert not refused.value.gone
+    # What is no question is kept from nobody by others, such as to ask for the arm.
+    clocks.ask(viewers[2], 0.0, question=False)
+    clocks.ask(viewers[2], EACH / 2.0, driver="c/page")
+    with pytest.raises(BusyError):
+        clocks.ask(viewers[0], 0.0, question=False)
+
+
+def test_another_window_of_the_driver_cannot_empty_the_drivers_budget() -> None:
+    clocks = Clocks()
+    budget = clocks.budgets().of("a")
+    clocks.ask(budget, 10.0 * EACH)
+    for _ in range(50):
+        clocks.ask(budget, 0.001, driver="a/page")
+    with pytest.raises(BusyError):
+        clocks.ask(budget, 0.0)
+
+
+def test_an_identity_that_asks_on_regardless_is_sent_away_and_forgiven() -> None:
+    clocks = Clocks()
+    budget = clocks.budgets().of("a")
+    clocks.ask(budget, EACH)
+    gone = []
+    for _ in range(int(1.1 * DEBT / FIXED)):
+        with pytest.raises(BusyError) as refused:
+            clocks.ask(budget, 0.0)
+        gone.append(refused.value.gone)
+    assert gone.index(True) == pytest.approx(DEBT / FIXED, rel=0.01)
+    assert budget.is_exhausted()
+    clocks.now += 0.6 * DEBT / EACH
+    assert not budget.is_exhausted()
+    clocks.now += 0.5 * DEBT / EACH
+    clocks.ask(budget, 0.0)
+
+
+def test_the_budget_has_room_for_several_windows_with_their_instruments() -> None:
+    """Thirty states and ten jogs a second, at three times what a state costs here."""
+    clocks = Clocks()
+    budgets = clocks.budgets()
+    for tick in range(10 * 30):
+        clocks.now = tick / 30.0
+        for window in range(4):
+            driver = "me/0" if window == 0 else ""
+            clocks.ask(budgets.of("me"), 0.0012, driver)

@@ -1,0 +1,111 @@
+"""No call of the client waits for ever, whatever the server does."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import msgspec
+import pytest
+from websockets.asyncio.server import ServerConnection, serve
+
+from app.api import answers, requests
+from app.client import AsyncClient, aconnect, asynchronous
+from app.client.files import LostError
+
+BOUND = 5.0
+"""[s] Far longer than the timeouts that are set here."""
+
+TIMEOUT = 0.3
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(asynchronous, "ASKED_FOR", TIMEOUT)
+
+
+def _talk(handler: Callable[[ServerConnection], Awaitable[None]], act: str) -> None:
+    """Have a client do ``act`` with a server that does ``handler``; it must end in a LostError."""
+
+    async def run() -> None:
+        async with serve(handler, "127.0.0.1", 0, compression=None, close_timeout=0.1) as server:
+            port = server.sockets[0].getsockname()[1]
+            async with asyncio.timeout(BOUND):
+                with pytest.raises(LostError):
+                    async with aconnect(f"http://127.0.0.1:{port}") as client:
+                        await ACTS[act](client)
+            server.close(close_connections=False)
+            for connection in server.connections:
+                connection.transport.abort()
+
+    asyncio.run(run())
+
+
+async def _ask(client: AsyncClient) -> None:
+    await client.ask(requests.Hold())
+
+
+async def _states(client: AsyncClient) -> None:
+    async for _ in client.states(100.0):
+        pass
+
+
+async def _tell(client: AsyncClient) -> None:
+    while True:
+        await client.tell(requests.Servo(q=[0.1] * 1000))
+
+
+ACTS = {"ask": _ask, "states": _states, "tell": _tell}
+
+WELCOME = msgspec.json.encode(answers.Welcome(name="x", number=1, role="admin", beat=10.0)).decode()
+
+
+async def _mute(connection: ServerConnection) -> None:
+    await connection.wait_closed()
+
+
+async def _welcoming(connection: ServerConnection) -> None:
+    await connection.send(WELCOME)
+    # It reads what comes, and answers nothing.
+    async for _ in connection:
+        pass
+
+
+async def _silent_watch(connection: ServerConnection) -> None:
+    await connection.send(WELCOME)
+    async for text in connection:
+        asked = msgspec.json.decode(text)
+        if asked["do"] == "watch":
+            await connection.send(msgspec.json.encode({"is": "done", "id": asked["id"]}).decode())
+
+
+async def _deaf(connection: ServerConnection) -> None:
+    await connection.send(WELCOME)
+    connection.transport.pause_reading()
+    await asyncio.sleep(2.0 * BOUND)
+
+
+async def _babbling(connection: ServerConnection) -> None:
+    await connection.send(WELCOME)
+    await connection.send("{}")
+    await connection.wait_closed()
+
+
+def test_a_server_that_never_welcomes_is_given_up() -> None:
+    _talk(_mute, "ask")
+
+
+def test_a_request_that_is_never_answered_is_given_up() -> None:
+    _talk(_welcoming, "ask")
+
+
+def test_states_that_never_come_are_given_up() -> None:
+    _talk(_silent_watch, "states")
+
+
+def test_a_server_that_reads_nothing_is_given_up() -> None:
+    _talk(_deaf, "tell")
+
+
+def test_a_server_that_speaks_another_language_is_given_up() -> None:
+    _talk(_babbling, "states")
