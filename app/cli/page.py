@@ -34,7 +34,7 @@ def write_page(options: argparse.Namespace) -> int:
 
 
 def _shown(run: str | None, trajectory: Path | None) -> str:
-    """What the page shows, for its title."""
+    """The name of what the page shows, for its title."""
     if trajectory is not None:
         return trajectory.stem
     return "one pose" if run is None else Path(run).stem

@@ -148,7 +148,7 @@ class Dragging:
 
 
 Mode = Jogging | Stream | Dragging
-"""What moves the goal from tick to tick; there is one at a time."""
+"""The cause that moves the goal from tick to tick; there is one at a time."""
 
 
 @dataclass(frozen=True, eq=False)

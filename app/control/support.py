@@ -1,4 +1,4 @@
-"""What carries an object: the table, or another object that it stands on."""
+"""The support of an object: the table, or another object that it stands on."""
 
 from __future__ import annotations
 
