@@ -298,7 +298,7 @@ class Program(Request, frozen=True, kw_only=True):
 class Steer(Request, frozen=True, kw_only=True):
     """Run, step, pause, resume or halt the program that is planned.
 
-    It drives by itself, under its own name; whoever started it stays connected. While it is being
+    It drives by itself, under its own name; its owner has to stay connected. While it is being
     planned, ``run`` and ``step`` take effect afterwards, unless the arm is told to move, hold or
     stop in between; ``pause`` makes it start paused, and ``halt`` cancels the planning. A program
     that is to run from another posture or scene than it was planned for is planned anew first. An

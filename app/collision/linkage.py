@@ -16,7 +16,7 @@ GROUND = 0
 
 @dataclass(frozen=True, eq=False)
 class Mover:
-    """What moves as one piece about one joint.
+    """Bodies that move as one piece about one joint.
 
     Attributes:
         parent: index of the piece it hangs on, smaller than its own.

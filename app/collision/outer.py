@@ -110,7 +110,7 @@ def _hull(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _over(
     points: FloatArray, normals: FloatArray, heights: FloatArray
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Of each face (m,) the point (m, 3) farthest over it and how far, and which are not inside.
+    """Return the farthest point (m, 3) over each face, its height, and which points are outside.
 
     Points within EXACT of a face count as inside. One pass over the points, in blocks that stay
     in the processor's cache.

@@ -23,7 +23,7 @@ SAME_PLACE = 1e-4
 MARGIN, 1 mm more than has to be."""
 
 SAME_FINGERS_TURN, SAME_FINGERS_SLIDE = 5e-3, 5e-4
-"""[rad, m] Likewise: half a millimetre at the pads."""
+"""[rad, m] Of the fingers: half a millimetre at the pads."""
 
 PROBE = 0.02
 """[1] Of a segment: an arm that waits goes on once the way is clear so far."""

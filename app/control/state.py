@@ -254,7 +254,7 @@ class State:
 
     @property
     def since(self) -> ToolTarget | None:
-        """How far along its way a drag has been followed; None while the goal is on no such way."""
+        """Target up to which a drag has been followed along its path; None without a drag."""
         return self.mode.since if isinstance(self.mode, Dragging) else None
 
     @property

@@ -1,7 +1,7 @@
 """A URDF with its meshes as a zip of a ROS package, to be unpacked into a workspace.
 
 Programs differ in what they find and read. `package://` names are for ROS, yourdfpy and PyBullet;
-MuJoCo drops folders from names and is told where the meshes are. PyBullet, RViz and Drake have
+MuJoCo drops folders from names; the URDF names the folder for it. PyBullet, RViz and Drake have
 trouble with glTF, so such meshes become OBJ, one file a material, and the URDF names the colours.
 """
 

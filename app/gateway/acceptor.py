@@ -32,7 +32,7 @@ SENDING = 120.0
 """[s] In which an answer has left for a slow reader, or is given up."""
 
 AT_ONCE = 8
-"""Connections accepted in one turn of the event loop: STOP waits for no more of them."""
+"""Connections accepted in one turn of the event loop: STOP waits for this many at most."""
 
 CHECK_EVERY = 0.5
 """[s] Between two looks at who has waited too long."""
@@ -150,7 +150,7 @@ class Acceptor:
                     sock, address = await loop.sock_accept(self._listening)
                 except OSError as error:
                     self._report(f"A connection could not be accepted: {error.strerror}.")
-                    # Whoever was cut off while waiting in line leaves room for the next.
+                    # A client that disconnected in the queue leaves room for the next.
                     if error.errno in NO_ROOM:
                         self._make_room(self._most // 2)
                         await asyncio.sleep(BACK_OFF)

@@ -1,4 +1,4 @@
-"""Who asks, and whether there is a place for one more connection or request of theirs.
+"""Identity of each client, and the limits on its connections and requests.
 
 Sits between the security headers and the application. A connection on which somebody known asks for
 something is spared by the acceptor for as long; all others may be closed to make room.
@@ -28,7 +28,7 @@ STOP_PATHS = ("/stop", f"{ROOT}/stop")
 TOO_MANY = 429
 
 TOO_MUCH = 4429
-"""Likewise the close code of a websocket."""
+"""Close code of a websocket whose client exceeds a limit."""
 
 RETRY = {"Retry-After": "1"}
 
