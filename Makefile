@@ -48,7 +48,7 @@ exchange: $(dev_ok)           ## find the programs that read our exports, or ins
 # browser or server that was starved of time meanwhile is tried once more when nothing else runs.
 tests: $(dev_ok)
 	@# Once, for the hundreds of processes that are started.
-	@$(bin)/python -m compileall -q app robot_description
+	@$(bin)/python -m compileall -q app/katana450 robot_description
 	@rm -rf $(VENV)/again*
 	@( $(lane)-servers $(servers) > $(VENV)/servers.log 2>&1 || echo servers >> $(VENV)/again; \
 	    $(patient) $(browser:%=--ignore=%) $(servers:%=--ignore=%) $(heavy:%=--ignore=%) \

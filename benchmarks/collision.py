@@ -18,14 +18,14 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
-from app.collision.clearance import advance
-from app.collision.shape import half_space
-from app.collision.world import World, obstacle
-from app.control.state import Status
-from app.geometry.arrays import FloatArray
-from app.robot.collision import world_of
-from app.robot.model import RobotModel, load
-from app.settings import READY_POSTURE_DEG
+from katana450.collision.clearance import advance
+from katana450.collision.shape import half_space
+from katana450.collision.world import World, obstacle
+from katana450.control.state import Status
+from katana450.geometry.arrays import FloatArray
+from katana450.robot.collision import world_of
+from katana450.robot.model import RobotModel, load
+from katana450.settings import READY_POSTURE_DEG
 
 TICK = 0.01
 TURNS = 5

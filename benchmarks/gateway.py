@@ -28,16 +28,16 @@ import uvicorn
 import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
-from app.gateway.acceptor import Acceptor
-from app.gateway.application import application
-from app.gateway.budget import Budgets
-from app.gateway.door import LOOPBACK_NAMES, Address, Door
-from app.gateway.hub import Hub
-from app.gateway.listen import listen
-from app.gateway.proxy import SUBPROTOCOL, Proxy
-from app.view.guard import Guard
-from app.view.server import KEY_HEADER, open_server
 from benchmarks.start_and_idle import cpu_seconds
+from katana450.gateway.acceptor import Acceptor
+from katana450.gateway.application import application
+from katana450.gateway.budget import Budgets
+from katana450.gateway.door import LOOPBACK_NAMES, Address, Door
+from katana450.gateway.hub import Hub
+from katana450.gateway.listen import listen
+from katana450.gateway.proxy import SUBPROTOCOL, Proxy
+from katana450.view.guard import Guard
+from katana450.view.server import KEY_HEADER, open_server
 from tests.gateway.client import enter, page_name, websocket
 
 KEY = "known to both halves of this benchmark"

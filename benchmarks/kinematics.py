@@ -23,16 +23,16 @@ from pathlib import Path
 
 import numpy as np
 
-from app.geometry import screws
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.robot.model import load
 from benchmarks import kinematics_report as report
 from benchmarks.kinematics_environment import prepare
 from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Machine, Row, Tables
 from benchmarks.kinematics_task import FloatArray, Task
+from katana450.geometry import screws
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.robot.model import load
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs" / "benchmarks.md"

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from app import tolerances
-from app.geometry import screws
-from app.kinematics.arm import arm_of
-from app.kinematics.batch import inverse_batch
-from app.kinematics.chain import Chain
-from app.kinematics.inverse import inverse
-from app.kinematics.solver import Solver
 from benchmarks.kinematics_task import FloatArray, Task
+from katana450 import tolerances
+from katana450.geometry import screws
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.batch import inverse_batch
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.inverse import inverse
+from katana450.kinematics.solver import Solver
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
 FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.geometry import so3
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
 from benchmarks.kinematics_task import SOLVED_POSITION, SOLVED_ROTATION, FloatArray
+from katana450.geometry import so3
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
 
 _SAME_ANGLES = 1e-6  # rad; answers nearer than this in every joint are one branch
 

@@ -19,21 +19,21 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from app.control import commands as cmd
-from app.control.commands import Command
-from app.control.session import Session
-from app.control.state import State
-from app.drivers.simulated import SimulatedDriver
-from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
-from app.robot.collision import standing_around, world_of
-from app.robot.model import RobotModel, load
-from app.robot.props import load_props
-from app.runtime.clock import Clock
-from app.runtime.loop import ControlLoop
-from app.runtime.mailbox import Mailbox
-from app.settings import Settings
-from app.view.view import View
+from katana450.control import commands as cmd
+from katana450.control.commands import Command
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.drivers.simulated import SimulatedDriver
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.forward import forward
+from katana450.robot.collision import standing_around, world_of
+from katana450.robot.model import RobotModel, load
+from katana450.robot.props import load_props
+from katana450.runtime.clock import Clock
+from katana450.runtime.loop import ControlLoop
+from katana450.runtime.mailbox import Mailbox
+from katana450.settings import Settings
+from katana450.view.view import View
 
 TICKS = 600
 EVERY = 3

@@ -8,10 +8,10 @@ import signal
 import numpy as np
 import pytest
 
-from app.control.arm import Arm
-from app.control.session import Session
-from app.robot.model import RobotModel, load
-from app.settings import Settings
+from katana450.control.arm import Arm
+from katana450.control.session import Session
+from katana450.robot.model import RobotModel, load
+from katana450.settings import Settings
 
 LONG = "KATANA450_LONG" in os.environ
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from robot_description.cad.build import CONDUITS, MESHES, Built, build, write_conduits
 from robot_description.cad.hulls import COLLISION, build_hulls, with_collisions
 from robot_description.cad.mass import write_inertials

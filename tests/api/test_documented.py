@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from app.api import answers, requests, schema
 from docs.api import PAGE, page
+from katana450.api import answers, requests, schema
 
 
 def test_the_page_is_what_the_shapes_say() -> None:

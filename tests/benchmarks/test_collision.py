@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.robot.model import RobotModel
 from benchmarks.collision import DRIVES, RawMeshes, main, tick_rows, world_on_table
+from katana450.robot.model import RobotModel
 
 
 def test_it_prints_both_tables(capsys: pytest.CaptureFixture[str]) -> None:

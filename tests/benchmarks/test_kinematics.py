@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.kinematics.forward import forward
-from app.kinematics.inverse import inverse
 from benchmarks import kinematics_report as report
 from benchmarks.kinematics import BATCH, ONE_BY_ONE, ROOT, main, measure, seeded_task
 from benchmarks.kinematics_own import Floor, chain_of
@@ -20,6 +18,8 @@ from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Tables
 from benchmarks.kinematics_task import SOLVED_POSITION, Task
 from benchmarks.kinematics_worker import SOLVERS
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import inverse
 
 POSES = 12
 HERE = Path(sys.executable)

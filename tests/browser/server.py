@@ -20,7 +20,7 @@ from typing import Self
 ROOT = Path(__file__).resolve().parents[2]
 # A machine that runs tests and draws their pictures without a graphics card starves its browsers;
 # what they have to say of being alive comes late then.
-ATTENTIVE_APP = (sys.executable, "-m", "app", "serve", "--port", "{port}")
+ATTENTIVE_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
 APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
@@ -54,7 +54,8 @@ class AppServer:
     """Context manager around a server process.
 
     `command` holds ``{port}`` where the port belongs, and the process prints a line
-    ``… is ready: URL`` once it can be used. `seconds` limits each start and each stop.
+    ``… is ready: URL`` once it can be used. `seconds` limits each start and each stop. The process
+    starts in `folder`.
     """
 
     def __init__(
@@ -64,10 +65,12 @@ class AppServer:
         port: int | None = None,
         seconds: float = 60.0,
         scheme: str = "http",
+        folder: Path = ROOT,
     ) -> None:
         self.port = free_port() if port is None else port
         self.url = f"{scheme}://127.0.0.1:{self.port}"
         self._command = [part.replace("{port}", str(self.port)) for part in command]
+        self._folder = folder
         self._seconds = seconds
         self._lines: deque[str] = deque(maxlen=KEPT_LINES)
         self._process: subprocess.Popen[str] | None = None
@@ -122,7 +125,7 @@ class AppServer:
             raise ServerError(f"{self._name} runs already")
         self._process = subprocess.Popen(
             self._command,
-            cwd=ROOT,
+            cwd=self._folder,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Locator
 
-from app.settings import Settings
+from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
-from app.control.lease import Role
-from app.gateway.access import AccessFile
-from app.gateway.files import STATIC
-from app.robot.model import RobotModel
-from app.settings import Settings
+from katana450.control.lease import Role
+from katana450.gateway.access import AccessFile
+from katana450.resources import STATIC
+from katana450.robot.model import RobotModel
+from katana450.settings import Settings
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer

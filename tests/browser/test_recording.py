@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from app.cli.main import main
+from katana450.cli.main import main
 from tests.browser.page import SCRIPTS
 
 pytestmark = pytest.mark.long

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.control.state import Status
-from app.geometry.arrays import FloatArray
-from app.view.room import DARK
+from katana450.control.state import Status
+from katana450.geometry.arrays import FloatArray
+from katana450.view.room import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Route
 
-from app.exchange.mechanism import Mechanism, camera
-from app.exchange.urdf_mechanism import load_mechanism
-from app.exchange.vrml import vrml_files
-from robot_description import URDF_PATH
+from katana450.exchange.mechanism import Mechanism, camera
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.exchange.vrml import vrml_files
+from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import X_ITE, x_ite

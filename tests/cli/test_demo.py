@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.kinematics.forward import forward
-from app.programs.circle import CircleDemo
-from app.programs.script import parse
-from app.robot.model import load
+from katana450.kinematics.forward import forward
+from katana450.programs.circle import CircleDemo
+from katana450.programs.script import parse
+from katana450.robot.model import load
 
 pytestmark = pytest.mark.long
 
@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def katana450(*options: str, seconds: float = 60.0) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "app", *options],
+        [sys.executable, "-m", "katana450", *options],
         capture_output=True,
         text=True,
         cwd=ROOT,
@@ -161,7 +161,7 @@ def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:
 
 
 def test_the_script_that_comes_along_is_the_demo() -> None:
-    path = ROOT / "app" / "programs" / "library" / "circle.yaml"
+    path = ROOT / "app" / "katana450" / "programs" / "library" / "circle.yaml"
     stored, demo = parse(path.read_text(encoding="utf-8")), parse(CircleDemo().text)
     assert (stored.about, stored.expected) == (demo.about, demo.expected)
     assert [repr(a.step) for a in stored.steps] == [repr(b.step) for b in demo.steps]

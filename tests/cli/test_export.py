@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.main import main
+from katana450.cli.main import main
 from tests.exchange.conftest import GANTRY
 
 pytestmark = pytest.mark.long

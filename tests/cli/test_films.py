@@ -14,7 +14,7 @@ import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 
-from app.cli.main import main
+from katana450.cli.main import main
 
 pytestmark = pytest.mark.long
 
@@ -27,7 +27,7 @@ PAGE_AT_MOST = 6e6
 
 
 def command(*words: str) -> list[str]:
-    return [sys.executable, "-m", "app", *words]
+    return [sys.executable, "-m", "katana450", *words]
 
 
 def test_a_film_of_a_motion(tmp_path: Path) -> None:

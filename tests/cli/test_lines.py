@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.cli.main import main
-from app.geometry import so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
-from app.robot.model import RobotModel
+from katana450.cli.main import main
+from katana450.geometry import so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.forward import forward
+from katana450.robot.model import RobotModel
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = json.loads((ROOT / "tests" / "golden" / "fk_reference.json").read_text(encoding="utf-8"))
@@ -219,7 +219,7 @@ def test_the_exit_status_is_1_when_every_line_failed() -> None:
 
 def test_bytes_that_are_not_utf_8_spoil_their_line_alone() -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "app", "fk"],
+        [sys.executable, "-m", "katana450", "fk"],
         input=b'\xff\xfe\n{"q": [0, 0, 0, 0, 0]}\n\xef\xbb\xbf{"q": [0, 0, 0, 0, 0]}\n',
         capture_output=True,
         cwd=ROOT,
@@ -238,7 +238,7 @@ def test_empty_lines_are_no_requests() -> None:
 def test_answers_come_line_by_line() -> None:
     """A program that keeps the pipe open gets each answer at once."""
     with subprocess.Popen(
-        [sys.executable, "-m", "app", "fk"],
+        [sys.executable, "-m", "katana450", "fk"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

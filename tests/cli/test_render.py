@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from app.cli.main import main
+from katana450.cli.main import main
 
 SMALL = ("--size", "160x100")
 

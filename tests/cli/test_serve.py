@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def serve(*options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "app", "serve", *options],
+        [sys.executable, "-m", "katana450", "serve", *options],
         capture_output=True,
         text=True,
         cwd=ROOT,
@@ -80,7 +80,7 @@ def test_an_address_that_cannot_be_is_told(options: tuple[str, ...], said: str) 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_stops_when_told(number: signal.Signals) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "app", "serve", "--port", str(free_port())],
+        [sys.executable, "-m", "katana450", "serve", "--port", str(free_port())],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -111,7 +111,7 @@ def test_a_start_that_fails_late_says_why_and_no_more(tmp_path: Path) -> None:
 def test_the_command_tells_its_version_and_its_ways() -> None:
     for option in ("--version", "--help"):
         done = subprocess.run(
-            [sys.executable, "-m", "app", option],
+            [sys.executable, "-m", "katana450", option],
             capture_output=True,
             text=True,
             cwd=ROOT,

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli.main import main
-from app.exchange.reachability_file import load_map
+from katana450.cli.main import main
+from katana450.exchange.reachability_file import load_map
 
 ROOT = Path(__file__).resolve().parents[2]
 COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4", "--samples", "30")
@@ -104,7 +104,7 @@ def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
     """A map fine enough to take minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()
     out = tmp_path / "map.npz"
-    command = [sys.executable, "-m", "app", "workspace", "--voxel", "2", "--out", str(out)]
+    command = [sys.executable, "-m", "katana450", "workspace", "--voxel", "2", "--out", str(out)]
     with (
         closing(os.fdopen(master, "rb", buffering=0)) as terminal,
         subprocess.Popen(command, cwd=ROOT, stderr=slave, stdout=subprocess.PIPE) as process,

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
-from app.collision.linkage import Linkage, Mover
-from app.collision.shape import box, cylinder
-from app.collision.world import Part, World, obstacle
-from app.geometry import se3
-from app.geometry.arrays import FloatArray
-from app.robot.model import RobotModel
+from katana450.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
+from katana450.collision.linkage import Linkage, Mover
+from katana450.collision.shape import box, cylinder
+from katana450.collision.world import Part, World, obstacle
+from katana450.geometry import se3
+from katana450.geometry.arrays import FloatArray
+from katana450.robot.model import RobotModel
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks together

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.collision.shape import cylinder, half_space
-from app.collision.world import World, obstacle
-from app.control.session import Session
-from app.control.state import State
-from app.geometry import se3
-from app.robot.collision import world_of
-from app.robot.model import RobotModel
+from katana450.collision.shape import cylinder, half_space
+from katana450.collision.world import World, obstacle
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.geometry import se3
+from katana450.robot.collision import world_of
+from katana450.robot.model import RobotModel
 
 
 @pytest.fixture

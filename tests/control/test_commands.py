@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.errors import InputError
+from katana450.control import commands as cmd
+from katana450.errors import InputError
 
 NAN = math.nan
 

@@ -12,20 +12,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.control.arm import NO_GRIPPER, Arm
-from app.control.choices import wish
-from app.control.session import Session
-from app.control.state import Reason, State, Status, ToolTarget
-from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
-from app.kinematics.branch import Branch
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.kinematics.freedoms import pitch_and_roll
-from app.kinematics.projection import POSITION_WORTH_TELLING
-from app.kinematics.reading import Reading
-from app.robot.model import load
+from katana450.control import commands as cmd
+from katana450.control.arm import NO_GRIPPER, Arm
+from katana450.control.choices import wish
+from katana450.control.session import Session
+from katana450.control.state import Reason, State, Status, ToolTarget
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.branch import Branch
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.freedoms import pitch_and_roll
+from katana450.kinematics.projection import POSITION_WORTH_TELLING
+from katana450.kinematics.reading import Reading
+from katana450.robot.model import load
 from tests.kinematics.family import random_member, random_pose
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

@@ -10,25 +10,25 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from app.collision.clearance import STOP
-from app.collision.world import World
-from app.control import commands as cmd
-from app.control.arm import Arm
-from app.control.plans import path_to, plan_along, plan_to
-from app.control.session import TOOL_SPEED, Session
-from app.control.state import JointTarget, Reason, State, Status
-from app.errors import BlockedError, InputError
-from app.geometry.arrays import FloatArray
-from app.kinematics.branch import branch_of
-from app.kinematics.forward import forward
-from app.kinematics.freedoms import pitch_and_roll
-from app.kinematics.tool import ToolTarget
-from app.planning.curve import Linear, ToolArc, ToolLine
-from app.planning.jet import Jet
-from app.planning.path import joint_derivatives
-from app.planning.plan import Plan
-from app.planning.tool_path import ToolPath
-from app.settings import Settings
+from katana450.collision.clearance import STOP
+from katana450.collision.world import World
+from katana450.control import commands as cmd
+from katana450.control.arm import Arm
+from katana450.control.plans import path_to, plan_along, plan_to
+from katana450.control.session import TOOL_SPEED, Session
+from katana450.control.state import JointTarget, Reason, State, Status
+from katana450.errors import BlockedError, InputError
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.branch import branch_of
+from katana450.kinematics.forward import forward
+from katana450.kinematics.freedoms import pitch_and_roll
+from katana450.kinematics.tool import ToolTarget
+from katana450.planning.curve import Linear, ToolArc, ToolLine
+from katana450.planning.jet import Jet
+from katana450.planning.path import joint_derivatives
+from katana450.planning.plan import Plan
+from katana450.planning.tool_path import ToolPath
+from katana450.settings import Settings
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m

@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.control.grip import touching
-from app.control.plans import plan_along, plan_to
-from app.control.session import Session
-from app.control.state import Reason, State
-from app.control.things import MOST, Form, Thing
-from app.errors import InputError
-from app.geometry import se3
-from app.geometry.arrays import FloatArray
-from app.kinematics.inverse import inverse
-from app.kinematics.tool import ToolTarget
-from app.planning.curve import ToolLine
-from app.planning.tool_path import ToolPath
-from app.robot.collision import hand_of, table, things_of, world_of
-from app.robot.model import RobotModel
-from app.robot.props import load_props
-from app.settings import Settings
+from katana450.control import commands as cmd
+from katana450.control.grip import touching
+from katana450.control.plans import plan_along, plan_to
+from katana450.control.session import Session
+from katana450.control.state import Reason, State
+from katana450.control.things import MOST, Form, Thing
+from katana450.errors import InputError
+from katana450.geometry import se3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.inverse import inverse
+from katana450.kinematics.tool import ToolTarget
+from katana450.planning.curve import ToolLine
+from katana450.planning.tool_path import ToolPath
+from katana450.robot.collision import hand_of, table, things_of, world_of
+from katana450.robot.model import RobotModel
+from katana450.robot.props import load_props
+from katana450.settings import Settings
 
 OPEN = 0.3
 PITCH = np.deg2rad(40.0)

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.control import commands as cmd
-from app.control.joint_session import JointSession
-from app.control.joints import Joints
-from app.control.looks import Choice, Trait
-from app.control.session import LONGEST_STEP
-from app.control.state import Reason, State, Status
-from app.errors import InputError
+from katana450.control import commands as cmd
+from katana450.control.joint_session import JointSession
+from katana450.control.joints import Joints
+from katana450.control.looks import Choice, Trait
+from katana450.control.session import LONGEST_STEP
+from katana450.control.state import Reason, State, Status
+from katana450.errors import InputError
 
 DT = 0.01
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.control.lease import LOST_AFTER, Lease, Person, Role
-from app.errors import LeaseError
+from katana450.control.lease import LOST_AFTER, Lease, Person, Role
+from katana450.errors import LeaseError
 
 ANNA = Person("a", "Anna", Role.OPERATOR)
 BERT = Person("b", "Bert", Role.OPERATOR)

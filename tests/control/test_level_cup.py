@@ -7,16 +7,16 @@ import math
 
 import numpy as np
 
-from app.control import commands as cmd
-from app.control.findings import of_projection
-from app.control.session import Session
-from app.control.state import Reason, State
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
-from app.kinematics.projection import project
-from app.kinematics.reading import Reading
-from app.view.texts import told
+from katana450.control import commands as cmd
+from katana450.control.findings import of_projection
+from katana450.control.session import Session
+from katana450.control.state import Reason, State
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.forward import forward
+from katana450.kinematics.projection import project
+from katana450.kinematics.reading import Reading
+from katana450.view.texts import told
 
 COUNT = 300
 

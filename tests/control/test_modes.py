@@ -9,12 +9,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.control.session import Session
-from app.control.state import Dragging, Jogging, State, ToolTarget
-from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
-from app.motion.stream import Stream
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.control.state import Dragging, Jogging, State, ToolTarget
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.forward import forward
+from katana450.motion.stream import Stream
 
 TICK = 0.01
 

@@ -8,16 +8,16 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.control.arm import Arm
-from app.control.session import LONGEST_STEP, Session
-from app.control.state import JointTarget, PoseTarget, Reason, State, Status
-from app.errors import InputError
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.branch import branch_of
-from app.kinematics.forward import forward
-from app.kinematics.freedoms import pitch_and_roll
+from katana450.control import commands as cmd
+from katana450.control.arm import Arm
+from katana450.control.session import LONGEST_STEP, Session
+from katana450.control.state import JointTarget, PoseTarget, Reason, State, Status
+from katana450.errors import InputError
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.branch import branch_of
+from katana450.kinematics.forward import forward
+from katana450.kinematics.freedoms import pitch_and_roll
 
 TICK = 0.01
 

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.cli.assembly import described
-from app.collision.clearance import STOP
-from app.collision.outer import outer
-from app.control import commands as cmd
-from app.control.room import free_place, girth
-from app.control.session import Session
-from app.control.solid import Look, Solid
-from app.control.state import Reason, State
-from app.control.things import MOST, Form, Mount, Thing, same
-from app.errors import InputError
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.settings import Settings
-from app.water.units import MILLILITRE
-from robot_description import URDF_PATH
+from katana450.cli.assembly import described
+from katana450.collision.clearance import STOP
+from katana450.collision.outer import outer
+from katana450.control import commands as cmd
+from katana450.control.room import free_place, girth
+from katana450.control.session import Session
+from katana450.control.solid import Look, Solid
+from katana450.control.state import Reason, State
+from katana450.control.things import MOST, Form, Mount, Thing, same
+from katana450.errors import InputError
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+from katana450.water.units import MILLILITRE
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.control.arm import Arm
-from app.drivers.simulated import SimulatedDriver
-from app.errors import InputError
+from katana450.control.arm import Arm
+from katana450.drivers.simulated import SimulatedDriver
+from katana450.errors import InputError
 
 START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app.exchange.mechanism import Mechanism
-from app.exchange.urdf_mechanism import load_mechanism
-from robot_description import URDF_PATH
+from katana450.exchange.mechanism import Mechanism
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.exchange.c_source import c_files
-from app.exchange.mechanism import Mechanism, camera
-from app.geometry import so3
-from app.settings import Settings
-from robot_description import URDF_PATH
+from katana450.exchange.c_source import c_files
+from katana450.exchange.mechanism import Mechanism, camera
+from katana450.geometry import so3
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -14,11 +14,11 @@ import pytest
 import trimesh
 import yourdfpy
 
-from app.exchange.glb import glb_files
-from app.exchange.mechanism import Mechanism
-from app.exchange.trajectory_file import load_motion
-from app.geometry import so3
-from robot_description import URDF_PATH
+from katana450.exchange.glb import glb_files
+from katana450.exchange.mechanism import Mechanism
+from katana450.exchange.trajectory_file import load_motion
+from katana450.geometry import so3
+from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.tools import needs, run
 

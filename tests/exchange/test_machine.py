@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli.assembly import Described, Jointed, recognised
-from app.control import commands as cmd
-from app.errors import InputError, RobotDescriptionError
-from app.exchange.c_source import c_files
-from app.exchange.glb import glb_files
-from app.exchange.machine import load_machine
-from app.exchange.urdf_package import package_files
-from app.exchange.vrml import vrml_files
-from app.exchange.vrml_text import read_world
-from app.settings import Settings
+from katana450.cli.assembly import Described, Jointed, recognised
+from katana450.control import commands as cmd
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.exchange.c_source import c_files
+from katana450.exchange.glb import glb_files
+from katana450.exchange.machine import load_machine
+from katana450.exchange.urdf_package import package_files
+from katana450.exchange.vrml import vrml_files
+from katana450.exchange.vrml_text import read_world
+from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 

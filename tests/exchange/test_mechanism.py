@@ -10,11 +10,11 @@ import pytest
 import trimesh
 import yourdfpy
 
-from app.errors import InputError, RobotDescriptionError
-from app.exchange.mechanism import FIELD_OF_VIEW, Mechanism, camera
-from app.exchange.names import distinct
-from app.exchange.urdf_mechanism import load_mechanism
-from robot_description import URDF_PATH
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.exchange.mechanism import FIELD_OF_VIEW, Mechanism, camera
+from katana450.exchange.names import distinct
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, POSES
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

@@ -20,11 +20,11 @@ import pytest
 import trimesh
 import yourdfpy
 
-from app.cli.main import main
-from app.errors import RobotDescriptionError
-from app.exchange.mechanism import Mechanism
-from app.exchange.urdf_package import Maintainer, package_files
-from robot_description import URDF_PATH
+from katana450.cli.main import main
+from katana450.errors import RobotDescriptionError
+from katana450.exchange.mechanism import Mechanism
+from katana450.exchange.urdf_package import Maintainer, package_files
+from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, POSES
 from tests.exchange.tools import needs_pybullet, pybullet, run
 

@@ -12,14 +12,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 
-from app.errors import InputError
-from app.exchange.mechanism import Mechanism, camera
-from app.exchange.trajectory_file import load_motion
-from app.exchange.vrml import DIGITS, part_world, vrml_files, world_of
-from app.exchange.vrml_node import FIELDS, KEYWORDS, LISTS, WIDTHS, Node, Type, Use, Value, World
-from app.exchange.vrml_text import HEADER, read_world, world_text
-from app.geometry import se3, so3
-from robot_description import URDF_PATH
+from katana450.errors import InputError
+from katana450.exchange.mechanism import Mechanism, camera
+from katana450.exchange.trajectory_file import load_motion
+from katana450.exchange.vrml import DIGITS, part_world, vrml_files, world_of
+from katana450.exchange.vrml_node import (
+    FIELDS,
+    KEYWORDS,
+    LISTS,
+    WIDTHS,
+    Node,
+    Type,
+    Use,
+    Value,
+    World,
+)
+from katana450.exchange.vrml_text import HEADER, read_world, world_text
+from katana450.geometry import se3, so3
+from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import SCREEN, needs, run

@@ -7,10 +7,10 @@ import gzip
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.exchange.shape_file import Format, ShapeFile, Up, read_shape
-from app.exchange.vrml_text import HEADER
-from app.geometry import so3
+from katana450.errors import InputError
+from katana450.exchange.shape_file import Format, ShapeFile, Up, read_shape
+from katana450.exchange.vrml_text import HEADER
+from katana450.geometry import so3
 from tests.exchange.solids import is_closed, sides, volume
 
 PRISM = 16.0 * np.sin(np.pi / 16.0)

@@ -15,17 +15,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from app.api import answers, requests, schema
-from app.api.fields import Matrix4
-from app.cli.main import main
-from app.client import AsyncClient, Client, RefusedError, aconnect, connect
-from app.client.files import LostError
-from app.kinematics.forward import forward
-from app.kinematics.reading import Reading
-from app.kinematics.statics import holding_torques
-from app.kinematics.velocity import limit_distances
-from app.robot.model import RobotModel
-from app.robot.weight import loads_of
+from katana450.api import answers, requests, schema
+from katana450.api.fields import Matrix4
+from katana450.cli.main import main
+from katana450.client import AsyncClient, Client, RefusedError, aconnect, connect
+from katana450.client.files import LostError
+from katana450.kinematics.forward import forward
+from katana450.kinematics.reading import Reading
+from katana450.kinematics.statics import holding_torques
+from katana450.kinematics.velocity import limit_distances
+from katana450.robot.model import RobotModel
+from katana450.robot.weight import loads_of
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask, websocket
 from tests.gateway.lines import Lines, post, speaking

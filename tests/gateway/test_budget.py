@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.errors import InputError
-from app.gateway.budget import CROWD, DEBT, EACH, FIXED, Budget, Budgets, BusyError
+from katana450.errors import InputError
+from katana450.gateway.budget import CROWD, DEBT, EACH, FIXED, Budget, Budgets, BusyError
 
 
 class Clocks:

@@ -6,13 +6,13 @@ import asyncio
 import time
 from itertools import pairwise
 
-from app.control.lease import Role
-from app.gateway.budget import Budgets
-from app.gateway.conversation import FAREWELL, GoneError
-from app.gateway.door import Visitor
-from app.gateway.hub import Hub
-from app.gateway.liveness import Arrival
-from app.gateway.program import Program
+from katana450.control.lease import Role
+from katana450.gateway.budget import Budgets
+from katana450.gateway.conversation import FAREWELL, GoneError
+from katana450.gateway.door import Visitor
+from katana450.gateway.hub import Hub
+from katana450.gateway.liveness import Arrival
+from katana450.gateway.program import Program
 
 ASKED = 200
 

@@ -8,19 +8,19 @@ from unittest.mock import Mock
 
 import pytest
 
-from app.api import answers, requests
-from app.control.choices import Choice
-from app.control.lease import Role
-from app.control.state import State
-from app.errors import InputError
-from app.gateway import derived
-from app.gateway.arm import Arm
-from app.gateway.budget import Budgets
-from app.gateway.derived import once
-from app.gateway.desk import Desk
-from app.gateway.door import Visitor
-from app.gateway.hub import Hub
-from app.runtime.board import Snapshot
+from katana450.api import answers, requests
+from katana450.control.choices import Choice
+from katana450.control.lease import Role
+from katana450.control.state import State
+from katana450.errors import InputError
+from katana450.gateway import derived
+from katana450.gateway.arm import Arm
+from katana450.gateway.budget import Budgets
+from katana450.gateway.derived import once
+from katana450.gateway.desk import Desk
+from katana450.gateway.door import Visitor
+from katana450.gateway.hub import Hub
+from katana450.runtime.board import Snapshot
 
 
 def _snapshot() -> Snapshot:

@@ -20,11 +20,11 @@ import pytest
 from itsdangerous import URLSafeSerializer
 from websockets.exceptions import ConnectionClosed
 
-from app.cli.main import main
-from app.control.lease import Role
-from app.errors import ConfigurationError, InputError
-from app.gateway.access import SALT, AccessFile
-from app.gateway.door import Address, Door, public_origin
+from katana450.cli.main import main
+from katana450.control.lease import Role
+from katana450.errors import ConfigurationError, InputError
+from katana450.gateway.access import SALT, AccessFile
+from katana450.gateway.door import Address, Door, public_origin
 from tests.browser.server import APP, ROOT, AppServer, free_port
 from tests.gateway.client import ask, controlling, enter, opened
 
@@ -338,7 +338,7 @@ def test_the_commands_give_list_and_take_back(
 
 
 def test_open_to_others_it_wants_links_or_a_word() -> None:
-    command = [sys.executable, "-m", "app", "serve", "--host", "0.0.0.0"]
+    command = [sys.executable, "-m", "katana450", "serve", "--host", "0.0.0.0"]
     done = subprocess.run(
         [*command, "--port", str(free_port())],
         capture_output=True,

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from app.api import answers, requests
-from app.client import connect
+from katana450.api import answers, requests
+from katana450.client import connect
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer, free_port
 from tests.gateway.client import ask, controlling
 from tests.gateway.lines import speaking
@@ -32,8 +32,8 @@ REPORTED = 0.5
 # Ends the control thread as soon as the arm moves, as a fault that nobody foresaw would.
 FATAL = """
 import sys
-from app.cli.main import main
-from app.runtime.loop import ControlLoop
+from katana450.cli.main import main
+from katana450.runtime.loop import ControlLoop
 tick = ControlLoop.tick
 def fatal(loop):
     tick(loop)

@@ -20,9 +20,9 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from app.gateway.firewall import LARGEST
-from app.gateway.proxy import BROWSERS, BROWSERS_EACH
-from app.settings import Settings
+from katana450.gateway.firewall import LARGEST
+from katana450.gateway.proxy import BROWSERS, BROWSERS_EACH
+from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, BARE_APP, AppServer
 from tests.gateway.client import (
     QUIET,

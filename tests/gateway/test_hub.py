@@ -8,30 +8,30 @@ from typing import Any
 
 import pytest
 
-from app.api.fields import Rates
-from app.control import commands as cmd
-from app.control.choices import Choice
-from app.control.lease import LOST_AFTER, Lease, Role
-from app.control.ledger import Entry
-from app.control.margins import Margins
-from app.control.pouring import Pouring
-from app.control.session import Session
-from app.control.state import Finding, Halt, Reason, State
-from app.control.things import Surroundings
-from app.errors import LeaseError
-from app.exchange.machine import Machine
-from app.gateway import tell
-from app.gateway.door import Visitor
-from app.gateway.hub import TICK, Hub, Window, key_of
-from app.gateway.liveness import Heartbeat
-from app.gateway.nodes import Nodes
-from app.geometry.arrays import FloatArray
-from app.kinematics.velocity import JogFrame
-from app.programs.bench import Rig
-from app.robot.model import RobotModel
-from app.runtime.board import Snapshot
-from app.runtime.lateness import Lateness
-from app.settings import Settings
+from katana450.api.fields import Rates
+from katana450.control import commands as cmd
+from katana450.control.choices import Choice
+from katana450.control.lease import LOST_AFTER, Lease, Role
+from katana450.control.ledger import Entry
+from katana450.control.margins import Margins
+from katana450.control.pouring import Pouring
+from katana450.control.session import Session
+from katana450.control.state import Finding, Halt, Reason, State
+from katana450.control.things import Surroundings
+from katana450.errors import LeaseError
+from katana450.exchange.machine import Machine
+from katana450.gateway import tell
+from katana450.gateway.door import Visitor
+from katana450.gateway.hub import TICK, Hub, Window, key_of
+from katana450.gateway.liveness import Heartbeat
+from katana450.gateway.nodes import Nodes
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.velocity import JogFrame
+from katana450.programs.bench import Rig
+from katana450.robot.model import RobotModel
+from katana450.runtime.board import Snapshot
+from katana450.runtime.lateness import Lateness
+from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
 

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.control.session import Session
-from app.gateway import status
-from app.gateway.halting import Stopped
-from app.gateway.hub import TICK
-from app.gateway.liveness import Arrival, Heartbeat
-from app.settings import Settings
+from katana450.control.session import Session
+from katana450.gateway import status
+from katana450.gateway.halting import Stopped
+from katana450.gateway.hub import TICK
+from katana450.gateway.liveness import Arrival, Heartbeat
+from katana450.settings import Settings
 from tests.gateway.test_hub import PAGES, Table, moves
 
 LATE = 0.2

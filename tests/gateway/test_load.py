@@ -16,10 +16,10 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosedError
 
-from app.gateway.acceptor import SILENCE
-from app.gateway.admission import SOCKETS_EACH, TOO_MUCH
-from app.gateway.bodies import BODY_SECONDS
-from app.gateway.uploads import WAITING, WAITING_EACH
+from katana450.gateway.acceptor import SILENCE
+from katana450.gateway.admission import SOCKETS_EACH, TOO_MUCH
+from katana450.gateway.bodies import BODY_SECONDS
+from katana450.gateway.uploads import WAITING, WAITING_EACH
 from tests.browser.server import APP, ROOT, AppServer
 from tests.gateway.attack import FEW_DESCRIPTORS, answered, asking, closed, silent, stop_seconds
 from tests.gateway.client import ask, controlling, enter, websocket
@@ -41,7 +41,7 @@ def tokens(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
         role = "viewer" if name == "viewer" else "operator"
         command = ["access", "give", "--file", str(file), "--name", name, "--role", role]
         said = subprocess.run(
-            [sys.executable, "-m", "app", *command],
+            [sys.executable, "-m", "katana450", *command],
             cwd=ROOT, capture_output=True, text=True, check=True, timeout=60,
         ).stdout  # fmt: skip
         found[name] = said.partition("#")[2].strip()

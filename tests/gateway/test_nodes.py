@@ -13,25 +13,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.api import answers, requests
-from app.cli.assembly import described
-from app.client import Client, RefusedError, connect
-from app.control import commands as cmd
-from app.control.looks import Trait
-from app.control.session import Session
-from app.control.state import State
-from app.control.things import Form, Thing
-from app.errors import InputError
-from app.exchange.mechanism import Mechanism
-from app.exchange.urdf_mechanism import load_mechanism
-from app.exchange.vrml import world_of
-from app.exchange.vrml_node import FIELDS
-from app.gateway.nodes import Body, Nodes, body_of
-from app.geometry import so3
-from app.robot.bare import bare
-from app.robot.model import RobotModel
-from app.settings import Settings
-from robot_description import URDF_PATH
+from katana450.api import answers, requests
+from katana450.cli.assembly import described
+from katana450.client import Client, RefusedError, connect
+from katana450.control import commands as cmd
+from katana450.control.looks import Trait
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.control.things import Form, Thing
+from katana450.errors import InputError
+from katana450.exchange.mechanism import Mechanism
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.exchange.vrml import world_of
+from katana450.exchange.vrml_node import FIELDS
+from katana450.gateway.nodes import Body, Nodes, body_of
+from katana450.geometry import so3
+from katana450.resources import URDF_PATH
+from katana450.robot.bare import bare
+from katana450.robot.model import RobotModel
+from katana450.settings import Settings
 from tests.browser.server import AppServer
 from tests.exchange.conftest import GANTRY
 from tests.gateway.client import ask

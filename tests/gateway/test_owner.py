@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from app.api import answers, requests
-from app.api.fields import Order
-from app.client import Client, RefusedError, connect
+from katana450.api import answers, requests
+from katana450.api.fields import Order
+from katana450.client import Client, RefusedError, connect
 from tests.browser.server import AppServer
 from tests.gateway.client import opened
 from tests.gateway.lines import post, speaking

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.api.fields import Order
-from app.control import commands as cmd
-from app.control.lease import Role
-from app.control.session import Session
-from app.errors import LeaseError
-from app.gateway.hub import Window
-from app.programs.bench import Rig
-from app.programs.order import PATIENCE
+from katana450.api.fields import Order
+from katana450.control import commands as cmd
+from katana450.control.lease import Role
+from katana450.control.session import Session
+from katana450.errors import LeaseError
+from katana450.gateway.hub import Window
+from katana450.programs.bench import Rig
+from katana450.programs.order import PATIENCE
 from tests.gateway.test_hub import PAGES, Table
 
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"

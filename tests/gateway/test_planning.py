@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.api.fields import Order
-from app.control import commands as cmd
-from app.control.lease import Role
-from app.control.session import Session
-from app.control.things import Form, Thing
-from app.errors import LeaseError
-from app.gateway import planning, status
-from app.gateway.hub import Window
-from app.geometry import se3
-from app.planning.checkpoint import checkpoint
-from app.programs.layout import TIMING, PlanningStage
-from app.programs.program import compiled
+from katana450.api.fields import Order
+from katana450.control import commands as cmd
+from katana450.control.lease import Role
+from katana450.control.session import Session
+from katana450.control.things import Form, Thing
+from katana450.errors import LeaseError
+from katana450.gateway import planning, status
+from katana450.gateway.hub import Window
+from katana450.geometry import se3
+from katana450.planning.checkpoint import checkpoint
+from katana450.programs.layout import TIMING, PlanningStage
+from katana450.programs.program import compiled
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_performer import SCRIPT, Staged
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.settings import Settings
+from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
 from tests.gateway.client import ask, websocket
 from tests.gateway.lines import post
@@ -65,7 +65,7 @@ def reset(server: AppServer) -> None:
 def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path) -> None:
     script = tmp_path / "wave.yaml"
     script.write_text(SCRIPT)
-    command = [sys.executable, "-m", "app", "run", str(script), "--url", server.url]
+    command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
     with subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT
     ) as owner:

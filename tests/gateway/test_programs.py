@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.api import answers, requests
-from app.api.fields import Order
-from app.client import Client, RefusedError, connect
+from katana450.api import answers, requests
+from katana450.api.fields import Order
+from katana450.client import Client, RefusedError, connect
 from tests.browser.server import AppServer
 
 pytestmark = pytest.mark.long
@@ -170,7 +170,7 @@ def test_a_script_that_is_too_long_is_refused(arm: Client) -> None:
 def test_from_the_command_line(server: AppServer, tmp_path: Path, interrupted: bool) -> None:
     script = tmp_path / "script.yaml"
     script.write_text(THERE_AND_BACK)
-    command = [sys.executable, "-m", "app", "run", str(script), "--url", server.url]
+    command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
     ) as process:

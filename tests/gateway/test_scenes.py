@@ -14,21 +14,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.api import answers, requests
-from app.api.fields import Matrix4
-from app.cli.assembly import described
-from app.cli.furnishing import furnished
-from app.client import Client, RefusedError, connect
-from app.control.lease import Role
-from app.errors import InputError
-from app.exchange.scene_file import SCENE
-from app.exchange.shape_file import MOST_BYTES
-from app.gateway.access import AccessFile
-from app.gateway.uploads import AT_ONCE
-from app.kinematics.forward import forward
-from app.robot.model import RobotModel
-from app.settings import Settings
-from robot_description import URDF_PATH
+from katana450.api import answers, requests
+from katana450.api.fields import Matrix4
+from katana450.cli.assembly import described
+from katana450.cli.furnishing import furnished
+from katana450.client import Client, RefusedError, connect
+from katana450.control.lease import Role
+from katana450.errors import InputError
+from katana450.exchange.scene_file import SCENE
+from katana450.exchange.shape_file import MOST_BYTES
+from katana450.gateway.access import AccessFile
+from katana450.gateway.uploads import AT_ONCE
+from katana450.kinematics.forward import forward
+from katana450.resources import URDF_PATH
+from katana450.robot.model import RobotModel
+from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.gateway import client
 from tests.gateway.client import ask

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.geometry.arrays import finite_array, frozen
+from katana450.errors import InputError
+from katana450.geometry.arrays import finite_array, frozen
 
 
 def test_finite_array_copies_and_converts() -> None:

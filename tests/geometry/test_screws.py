@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from app.errors import InputError
-from app.geometry import screws, se3
-from app.geometry.arrays import FloatArray
+from katana450.errors import InputError
+from katana450.geometry import screws, se3
+from katana450.geometry.arrays import FloatArray
 from tests.geometry.strategies import angles, directions, points, repeatable, twists
 
 

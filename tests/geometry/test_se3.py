@@ -7,9 +7,9 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given
 
-from app.errors import InputError
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
+from katana450.errors import InputError
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
 from tests.geometry.strategies import points, repeatable, rotation_vectors, twists
 
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.errors import InputError
-from app.geometry import so3
-from app.geometry.arrays import FloatArray
+from katana450.errors import InputError
+from katana450.geometry import so3
+from katana450.geometry.arrays import FloatArray
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 
 ROUNDING = 4e-15

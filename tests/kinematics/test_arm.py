@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from app.errors import RobotDescriptionError
-from app.geometry import screws, se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.kinematics.inverse import inverse
+from katana450.errors import RobotDescriptionError
+from katana450.geometry import screws, se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import inverse
 from tests.kinematics.family import random_member
 
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.batch import CHUNK, forward_batch, inverse_batch
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.kinematics.inverse import inverse
+from katana450.errors import InputError
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.batch import CHUNK, forward_batch, inverse_batch
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import inverse
 from tests.kinematics.family import random_member
 
 

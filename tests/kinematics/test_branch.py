@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.kinematics.branch import BRANCHES, Branch, branch_of
-from app.kinematics.chain import Chain
-from app.kinematics.forward import joint_frames
+from katana450.errors import InputError
+from katana450.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import joint_frames
 
 
 def test_there_are_four_and_text_names_them() -> None:

@@ -9,14 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from app.geometry import screws, se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
-from app.kinematics.branch import BRANCHES, branch_of
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.kinematics.inverse import Solution, inverse
-from app.kinematics.solver import Solver
+from katana450.geometry import screws, se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.branch import BRANCHES, branch_of
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import Solution, inverse
+from katana450.kinematics.solver import Solver
 from tests.kinematics.by_subproblems import matched, same, solve
 from tests.kinematics.family import Offsets, member, random_member, random_offsets, random_pose
 

@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from app.errors import InputError
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.branch import BRANCHES, Branch, branch_of
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.kinematics.inverse import inverse
-from app.kinematics.orientation import PlaneOrientation
-from app.kinematics.projection import Projection, project
+from katana450.errors import InputError
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import inverse
+from katana450.kinematics.orientation import PlaneOrientation
+from katana450.kinematics.projection import Projection, project
 
 FRONT_UP = Branch("front", "up")
 REACH = 0.6318

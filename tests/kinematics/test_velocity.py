@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.geometry import screws, se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
-from app.kinematics.badge import Badge, branches
-from app.kinematics.branch import BRANCHES
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward, jacobian_body
-from app.kinematics.velocity import (
+from katana450.errors import InputError
+from katana450.geometry import screws, se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.badge import Badge, branches
+from katana450.kinematics.branch import BRANCHES
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward, jacobian_body
+from katana450.kinematics.velocity import (
     WELL_CONDITIONED,
     JogFrame,
     characteristic_length,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.geometry.arrays import FloatArray
-from app.motion.limiter import Limiter, Limits, Motion
+from katana450.errors import InputError
+from katana450.geometry.arrays import FloatArray
+from katana450.motion.limiter import Limiter, Limits, Motion
 
 DT = 0.01
 LIMITS = Limits(

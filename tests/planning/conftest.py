@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from app.control.arm import Arm
-from app.geometry.arrays import FloatArray
-from app.kinematics.branch import Branch, branch_of
-from app.kinematics.tool import ToolTarget
-from app.planning.curve import Linear, ToolArc, ToolLine, ToolLines
-from app.planning.joint_path import JointPath
-from app.planning.path import Path
-from app.planning.tool_path import ToolPath
-from app.settings import Settings
+from katana450.control.arm import Arm
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.branch import Branch, branch_of
+from katana450.kinematics.tool import ToolTarget
+from katana450.planning.curve import Linear, ToolArc, ToolLine, ToolLines
+from katana450.planning.joint_path import JointPath
+from katana450.planning.path import Path
+from katana450.planning.tool_path import ToolPath
+from katana450.settings import Settings
 
 FRONT_UP = Branch("front", "up")
 

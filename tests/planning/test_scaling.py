@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from app.control.arm import Arm
-from app.errors import InputError
-from app.planning.curve import ToolLines
-from app.planning.pacing import fastest
-from app.planning.path import Path, joint_derivatives, point_derivatives
-from app.planning.scaling import Bounds, Scaling, gone_after, rest_to_rest
-from app.planning.tool_path import ToolPath
+from katana450.control.arm import Arm
+from katana450.errors import InputError
+from katana450.planning.curve import ToolLines
+from katana450.planning.pacing import fastest
+from katana450.planning.path import Path, joint_derivatives, point_derivatives
+from katana450.planning.scaling import Bounds, Scaling, gone_after, rest_to_rest
+from katana450.planning.tool_path import ToolPath
 from tests.planning.time_optimal import least_time
 
 NAMES = ("circle", "line", "pour", "lines", "joints", "via")

@@ -11,21 +11,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.control.arm import Arm
-from app.errors import InputError
-from app.geometry import se3
-from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
-from app.kinematics.branch import BRANCHES, Branch, branch_of
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward
-from app.kinematics.projection import project
-from app.kinematics.tool import ToolTarget
-from app.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolLines, ToolScrew
-from app.planning.jet import Jet
-from app.planning.path import Path, joint_derivatives, point_derivatives
-from app.planning.pitch import roomiest
-from app.planning.tool_path import ToolPath
+from katana450.control.arm import Arm
+from katana450.errors import InputError
+from katana450.geometry import se3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.projection import project
+from katana450.kinematics.tool import ToolTarget
+from katana450.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolLines, ToolScrew
+from katana450.planning.jet import Jet
+from katana450.planning.path import Path, joint_derivatives, point_derivatives
+from katana450.planning.pitch import roomiest
+from katana450.planning.tool_path import ToolPath
 from tests.kinematics.family import random_member
 
 FRONT_UP = Branch("front", "up")

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.cli.assembly import described
-from app.control.state import State
-from app.geometry.arrays import FloatArray
-from app.programs import runner
-from app.programs.bench import Rig
-from app.programs.program import Program
-from app.programs.runner import Phase, Run
-from app.robot.model import RobotModel
-from app.settings import Settings
-from robot_description import URDF_PATH
+from katana450.cli.assembly import described
+from katana450.control.state import State
+from katana450.geometry.arrays import FloatArray
+from katana450.programs import runner
+from katana450.programs.bench import Rig
+from katana450.programs.program import Program
+from katana450.programs.runner import Phase, Run
+from katana450.resources import URDF_PATH
+from katana450.robot.model import RobotModel
+from katana450.settings import Settings
 
 TICK = 0.01
 

@@ -7,15 +7,15 @@ import time
 import numpy as np
 import pytest
 
-from app.errors import CancelledError, InputError
-from app.planning.checkpoint import checked_by
-from app.programs.bench import Bench, Draft
-from app.programs.layout import FINDING, TIMING, Layout, PlanningStage
-from app.programs.order import Putting
-from app.programs.pour import PourDemo
-from app.programs.program import compiled
-from app.programs.script import parse
-from app.programs.source import ScriptError
+from katana450.errors import CancelledError, InputError
+from katana450.planning.checkpoint import checked_by
+from katana450.programs.bench import Bench, Draft
+from katana450.programs.layout import FINDING, TIMING, Layout, PlanningStage
+from katana450.programs.order import Putting
+from katana450.programs.pour import PourDemo
+from katana450.programs.program import compiled
+from katana450.programs.script import parse
+from katana450.programs.source import ScriptError
 from tests.programs.conftest import Stage
 
 NEAR = (165.0, 286.0)

@@ -8,10 +8,10 @@ import random
 
 import pytest
 
-from app.programs.pour import PourDemo, Spot
-from app.programs.program import compiled
-from app.programs.script import parse
-from app.programs.source import ScriptError
+from katana450.programs.pour import PourDemo, Spot
+from katana450.programs.program import compiled
+from katana450.programs.script import parse
+from katana450.programs.source import ScriptError
 from tests.programs.conftest import Stage
 from tests.programs.test_pour import check_poured
 

@@ -9,22 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import app.programs
-from app.control import commands as cmd
-from app.control.state import State
-from app.control.things import Form, Thing
-from app.kinematics.forward import forward
-from app.kinematics.tool import ToolTarget
-from app.programs import runner
-from app.programs.order import PATIENCE, Go
-from app.programs.program import Program, compiled
-from app.programs.runner import Phase, Run
-from app.programs.script import parse
-from app.programs.source import ScriptError
-from app.programs.timeline import Timeline
+import katana450.programs
+from katana450.control import commands as cmd
+from katana450.control.state import State
+from katana450.control.things import Form, Thing
+from katana450.kinematics.forward import forward
+from katana450.kinematics.tool import ToolTarget
+from katana450.programs import runner
+from katana450.programs.order import PATIENCE, Go
+from katana450.programs.program import Program, compiled
+from katana450.programs.runner import Phase, Run
+from katana450.programs.script import parse
+from katana450.programs.source import ScriptError
+from katana450.programs.timeline import Timeline
 from tests.programs.conftest import Stage
 
-LIBRARY = sorted((Path(app.programs.__file__).parent / "library").glob("*.yaml"))
+LIBRARY = sorted((Path(katana450.programs.__file__).parent / "library").glob("*.yaml"))
 
 SHORT = """\
 tool: tcp

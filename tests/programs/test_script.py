@@ -10,12 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from app.errors import InputError
-from app.programs.moves import Move
-from app.programs.script import MOST_STEPS, parse
-from app.programs.source import DEEPEST, LARGEST, Problem, ScriptError
-from app.programs.steps import STEPS
-from app.programs.tool_moves import Circle, Line
+from katana450.errors import InputError
+from katana450.programs.moves import Move
+from katana450.programs.script import MOST_STEPS, parse
+from katana450.programs.source import DEEPEST, LARGEST, Problem, ScriptError
+from katana450.programs.steps import STEPS
+from katana450.programs.tool_moves import Circle, Line
 
 GOOD = """\
 name: Try

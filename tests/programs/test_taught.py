@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.errors import ConfigurationError, InputError
-from app.exchange.scripts import LIBRARY, Scripts
-from app.programs.order import Go
-from app.programs.program import compiled
-from app.programs.script import parse
-from app.programs.taught import taught
+from katana450.errors import ConfigurationError, InputError
+from katana450.exchange.scripts import LIBRARY, Scripts
+from katana450.programs.order import Go
+from katana450.programs.program import compiled
+from katana450.programs.script import parse
+from katana450.programs.taught import taught
 from tests.programs.conftest import Stage
 
 

@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 import pytest
 
-from app.cli.assembly import described
-from app.control import commands as cmd
-from app.control.session import Session
-from app.control.state import State
-from app.render.stage import Stage
-from app.robot.model import RobotModel
-from app.robot.props import load_props
-from app.settings import Settings
-from robot_description import URDF_PATH
+from katana450.cli.assembly import described
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.render.stage import Stage
+from katana450.resources import URDF_PATH
+from katana450.robot.model import RobotModel
+from katana450.robot.props import load_props
+from katana450.settings import Settings
 
 
 class Workshop(NamedTuple):

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.errors import InputError
-from app.render.camera import Camera
+from katana450.errors import InputError
+from katana450.render.camera import Camera
 
 spot = st.floats(-2.0, 2.0)
 

@@ -16,10 +16,10 @@ from hypothesis.extra.numpy import arrays
 from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 
-from app.errors import ConfigurationError, InputError
-from app.render import film, tracer
-from app.render.film import write_film
-from app.render.png import png
+from katana450.errors import ConfigurationError, InputError
+from katana450.render import film, tracer
+from katana450.render.film import write_film
+from katana450.render.png import png
 
 Pixels = npt.NDArray[np.uint8]
 

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.control.things import Form, Thing
-from app.exchange.mechanism import FIELD_OF_VIEW, Material, Mechanism, Shape, camera
-from app.exchange.mechanism import Camera as Viewpoint
-from app.exchange.urdf_mechanism import load_mechanism
-from app.geometry import se3
-from app.render.camera import Camera
-from app.render.line import tube
-from app.render.picture import Picture, picture
-from app.render.png import png
-from app.render.scene import Item, Scene
-from app.render.sight import FLOOR, NOWHERE, look
-from app.render.tracer import Tracer
-from app.render.water import CUP
-from app.view.room import DARK, LIGHT, THEMES
-from robot_description import URDF_PATH
+from katana450.control.things import Form, Thing
+from katana450.exchange.mechanism import FIELD_OF_VIEW, Material, Mechanism, Shape, camera
+from katana450.exchange.mechanism import Camera as Viewpoint
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.geometry import se3
+from katana450.render.camera import Camera
+from katana450.render.line import tube
+from katana450.render.picture import Picture, picture
+from katana450.render.png import png
+from katana450.render.scene import Item, Scene
+from katana450.render.sight import FLOOR, NOWHERE, look
+from katana450.render.tracer import Tracer
+from katana450.render.water import CUP
+from katana450.resources import URDF_PATH
+from katana450.view.room import DARK, LIGHT, THEMES
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
 from tests.render.conftest import Workshop

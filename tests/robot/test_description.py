@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import yourdfpy
 
-from app.cli.assembly import recognised
-from app.errors import RobotDescriptionError
-from app.robot.model import load
-from app.settings import Settings
+from katana450.cli.assembly import recognised
+from katana450.errors import RobotDescriptionError
+from katana450.robot.model import load
+from katana450.settings import Settings
 from tests.robot.public_arms import PX150, urdf, written
 
 

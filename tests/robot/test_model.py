@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from app.errors import RobotDescriptionError
-from app.geometry import so3
-from app.kinematics.forward import forward
-from app.robot.model import RobotModel, load
-from robot_description import URDF_PATH
+from katana450.errors import RobotDescriptionError
+from katana450.geometry import so3
+from katana450.kinematics.forward import forward
+from katana450.resources import URDF_PATH
+from katana450.robot.model import RobotModel, load
 
 
 def test_the_axes_are_the_papers(model: RobotModel) -> None:

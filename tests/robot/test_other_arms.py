@@ -14,19 +14,19 @@ import pytest
 import trimesh
 import yourdfpy
 
-from app.control import commands as cmd
-from app.control.session import Session
-from app.errors import RobotDescriptionError
-from app.exchange.urdf_mechanism import load_mechanism
-from app.geometry import se3, so3
-from app.kinematics.arm import arm_of
-from app.kinematics.branch import branch_of
-from app.kinematics.forward import forward
-from app.kinematics.freedoms import pitch_and_roll, pitched_frame
-from app.kinematics.inverse import inverse
-from app.kinematics.projection import project
-from app.robot.model import RobotModel, load
-from app.settings import Settings
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.errors import RobotDescriptionError
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.geometry import se3, so3
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.branch import branch_of
+from katana450.kinematics.forward import forward
+from katana450.kinematics.freedoms import pitch_and_roll, pitched_frame
+from katana450.kinematics.inverse import inverse
+from katana450.kinematics.projection import project
+from katana450.robot.model import RobotModel, load
+from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -154,7 +154,7 @@ def test_it_is_served(path: Path) -> None:
 def test_its_kinematics_are_answered_a_line(path: Path, other: RobotModel) -> None:
     def ask(command: str, request: object, *options: str) -> dict[str, object]:
         done = subprocess.run(
-            [sys.executable, "-m", "app", command, "--urdf", str(path), *options],
+            [sys.executable, "-m", "katana450", command, "--urdf", str(path), *options],
             input=json.dumps(request) + "\n",
             capture_output=True,
             text=True,

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.errors import RobotDescriptionError
-from app.robot.collision import standing_around, world_of
-from app.robot.model import RobotModel
-from app.robot.props import BASIN_AT, CUP_AT, load_props
-from app.settings import Settings
-from robot_description import PROPS_PATH
+from katana450.errors import RobotDescriptionError
+from katana450.resources import PROPS_PATH
+from katana450.robot.collision import standing_around, world_of
+from katana450.robot.model import RobotModel
+from katana450.robot.props import BASIN_AT, CUP_AT, load_props
+from katana450.settings import Settings
 
 
 def bounds(mesh: Path) -> Any:

@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from app.api import answers, requests
-from app.cli.assembly import Jointed, recognised
-from app.client.client import connect
-from app.control import commands as cmd
-from app.control.session import Session
-from app.control.state import Reason
-from app.drivers.simulated import SimulatedDriver
-from app.errors import RobotDescriptionError
-from app.kinematics.forward import forward
-from app.kinematics.inverse import inverse
-from app.kinematics.projection import project
-from app.robot.model import load
-from app.settings import Settings
+from katana450.api import answers, requests
+from katana450.cli.assembly import Jointed, recognised
+from katana450.client.client import connect
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.control.state import Reason
+from katana450.drivers.simulated import SimulatedDriver
+from katana450.errors import RobotDescriptionError
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import inverse
+from katana450.kinematics.projection import project
+from katana450.robot.model import load
+from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.robot.public_arms import (
     KATANAS,
@@ -241,7 +241,7 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
 
 def ask(command: str, path: Path, *options: str, given: str = "") -> str:
     done = subprocess.run(
-        [sys.executable, "-m", "app", command, "--urdf", str(path), *options],
+        [sys.executable, "-m", "katana450", command, "--urdf", str(path), *options],
         input=given,
         capture_output=True,
         text=True,

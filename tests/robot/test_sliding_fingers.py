@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from app.collision.world import World
-from app.control import commands as cmd
-from app.control.session import Session
-from app.control.state import State
-from app.control.things import Form, Thing
-from app.geometry import se3
-from app.kinematics.forward import forward
-from app.robot.collision import hand_of, world_of
-from app.robot.model import RobotModel, load
-from app.settings import Settings
+from katana450.collision.world import World
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.control.things import Form, Thing
+from katana450.geometry import se3
+from katana450.kinematics.forward import forward
+from katana450.robot.collision import hand_of, world_of
+from katana450.robot.model import RobotModel, load
+from katana450.settings import Settings
 from tests.robot.public_arms import PX150, urdf
 
 BOX = '<link name="{0}"><{1}><geometry><box size="{2}"/></geometry></{1}></link>'

@@ -14,7 +14,7 @@ import pytest
 import yourdfpy
 from manifold3d import Manifold
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from robot_description.cad.build import MESHES, PARTS, build
 from robot_description.cad.outline import circle, inset, rectangle, rounded
 from robot_description.cad.part import Part

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from robot_description.cad.build import CONDUITS, write_conduits
 from robot_description.cad.conduit import STRETCHES
 from robot_description.cad.lettering import lettering, width_of, wrapped

@@ -12,7 +12,7 @@ import yourdfpy
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from robot_description import PROPS_PATH, URDF_PATH
+from katana450.resources import PROPS_PATH, URDF_PATH
 from robot_description.cad.build import parts
 from robot_description.cad.fingers import CROWN_TEETH, pocket
 from robot_description.cad.gripper import PINION_TEETH, PINION_TIP, PIVOT_X

@@ -14,7 +14,7 @@ import yourdfpy
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from robot_description.cad import conduit
 from robot_description.cad.build import PARTS
 from robot_description.cad.hulls import (

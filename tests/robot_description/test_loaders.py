@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 
 LINKS_WITH_SHAPE = 10
 

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from robot_description.cad.build import parts
 from robot_description.cad.mass import (
     DENSITY,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from trimesh.visual.material import PBRMaterial
 from trimesh.visual.texture import TextureVisuals
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 
 MESHES = URDF_PATH.parent / "meshes"
 TRIANGLE_BUDGET = 60_000

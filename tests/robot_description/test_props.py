@@ -15,7 +15,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from robot_description import PROPS_PATH, URDF_PATH
+from katana450.resources import PROPS_PATH, URDF_PATH
 from robot_description.cad.props import PARTS, basin, build_props, cup
 from robot_description.cad.solid import rod
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from robot_description.cad.build import parts
 from robot_description.cad.stl import build_stl, solid_of
 

@@ -9,7 +9,7 @@ import pytest
 import yourdfpy
 from manifold3d import Manifold
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 from tests.robot_description.solids import solid
 
 AXES = ("axis_1", "axis_2", "axis_3", "axis_4", "axis_5")

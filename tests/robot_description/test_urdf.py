@@ -9,7 +9,7 @@ import pytest
 import yourdfpy
 from numpy.typing import NDArray
 
-from robot_description import URDF_PATH
+from katana450.resources import URDF_PATH
 
 AXES = ("axis_1", "axis_2", "axis_3", "axis_4", "axis_5")
 ARM_MASS = 4.80  # kg, without the control box

@@ -9,16 +9,16 @@ import time
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.control.arm import Arm
-from app.control.session import Session
-from app.control.state import Status
-from app.drivers.driver import Sent
-from app.drivers.simulated import SimulatedDriver
-from app.geometry.arrays import FloatArray
-from app.runtime.clock import MonotonicClock
-from app.runtime.loop import ControlLoop
-from app.runtime.mailbox import Mailbox
+from katana450.control import commands as cmd
+from katana450.control.arm import Arm
+from katana450.control.session import Session
+from katana450.control.state import Status
+from katana450.drivers.driver import Sent
+from katana450.drivers.simulated import SimulatedDriver
+from katana450.geometry.arrays import FloatArray
+from katana450.runtime.clock import MonotonicClock
+from katana450.runtime.loop import ControlLoop
+from katana450.runtime.mailbox import Mailbox
 
 RATE = 100.0
 

@@ -7,10 +7,10 @@ import threading
 import numpy as np
 import pytest
 
-from app.control import commands as cmd
-from app.control.session import Session
-from app.errors import InputError
-from app.runtime.mailbox import CAPACITY, Mailbox
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.errors import InputError
+from katana450.runtime.mailbox import CAPACITY, Mailbox
 
 
 @pytest.fixture

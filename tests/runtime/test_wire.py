@@ -7,13 +7,13 @@ import pickle
 import numpy as np
 import pytest
 
-from app.control.arm import Arm
-from app.control.following import Following
-from app.control.plans import plan_to
-from app.control.session import Session
-from app.control.solid import Solid
-from app.planning.plan import Plan
-from app.runtime.wire import KEPT_HERE, Names, Plans
+from katana450.control.arm import Arm
+from katana450.control.following import Following
+from katana450.control.plans import plan_to
+from katana450.control.session import Session
+from katana450.control.solid import Solid
+from katana450.planning.plan import Plan
+from katana450.runtime.wire import KEPT_HERE, Names, Plans
 
 
 @pytest.fixture(scope="module")

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 import viser
 
-from app.control.joint_session import JointSession
-from app.control.looks import Looks, Trait
-from app.control.state import State
-from app.exchange.machine import Machine, load_machine
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.view.looks import PERSONAL
-from app.view.machine_nodes import MachineNodes
-from app.view.machine_panel import MachinePanel, page
-from app.view.paint import PaintNodes
-from app.view.programs import STEERING
+from katana450.control.joint_session import JointSession
+from katana450.control.looks import Looks, Trait
+from katana450.control.state import State
+from katana450.exchange.machine import Machine, load_machine
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.view.looks import PERSONAL
+from katana450.view.machine_nodes import MachineNodes
+from katana450.view.machine_panel import MachinePanel, page
+from katana450.view.paint import PaintNodes
+from katana450.view.programs import STEERING
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import viser
 
-from app.control.choices import Choice
-from app.control.commands import Command, SetJoints
-from app.control.session import Session
-from app.control.state import State
-from app.geometry import so3
-from app.robot.conduit import Stretch
-from app.robot.model import RobotModel
-from app.view.branches import INTERVAL, BranchList
-from app.view.conduit import poses
-from app.view.controls import Clickable
-from app.view.scene import FrameTree
+from katana450.control.choices import Choice
+from katana450.control.commands import Command, SetJoints
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.geometry import so3
+from katana450.robot.conduit import Stretch
+from katana450.robot.model import RobotModel
+from katana450.view.branches import INTERVAL, BranchList
+from katana450.view.conduit import poses
+from katana450.view.controls import Clickable
+from katana450.view.scene import FrameTree
 
 
 def test_every_link_is_turned_as_its_joint_is(model: RobotModel, server: viser.ViserServer) -> None:

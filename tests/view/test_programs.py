@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import viser
 
-from app.api.answers import Progress as Told
-from app.api.fields import Order
-from app.control.session import Session
-from app.exchange.scripts import Scripts
-from app.kinematics.forward import forward
-from app.programs.bench import Rig
-from app.programs.program import Program, compiled
-from app.programs.script import parse
-from app.programs.timeline import Timeline
-from app.robot.model import RobotModel
-from app.view.preview import GHOSTS, _poses
-from app.view.programs import ProgramsPanel, _page
+from katana450.api.answers import Progress as Told
+from katana450.api.fields import Order
+from katana450.control.session import Session
+from katana450.exchange.scripts import Scripts
+from katana450.kinematics.forward import forward
+from katana450.programs.bench import Rig
+from katana450.programs.program import Program, compiled
+from katana450.programs.script import parse
+from katana450.programs.timeline import Timeline
+from katana450.robot.model import RobotModel
+from katana450.view.preview import GHOSTS, _poses
+from katana450.view.programs import ProgramsPanel, _page
 from tests.browser.server import free_port
 
 

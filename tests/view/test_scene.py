@@ -7,8 +7,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.robot.model import RobotModel
-from app.view.scene import COAT, DETAIL, coarse, surface
+from katana450.robot.model import RobotModel
+from katana450.view.scene import COAT, DETAIL, coarse, surface
 
 
 @settings(deadline=None, max_examples=30)

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.collision.contact import Contact
-from app.control.choices import Choice
-from app.control.session import Session
-from app.control.state import Finding, Reason, State, Status
-from app.kinematics.badge import Badge
-from app.kinematics.branch import BRANCHES
-from app.kinematics.reading import Reading
-from app.view.texts import (
+from katana450.collision.contact import Contact
+from katana450.control.choices import Choice
+from katana450.control.session import Session
+from katana450.control.state import Finding, Reason, State, Status
+from katana450.kinematics.badge import Badge
+from katana450.kinematics.branch import BRANCHES
+from katana450.kinematics.reading import Reading
+from katana450.view.texts import (
     AXIS_NAMES,
     BRANCH_HEADINGS,
     READING_HINTS,
@@ -32,7 +32,7 @@ from app.view.texts import (
     sentence,
     title,
 )
-from app.view.view import GHOST_COLOURS
+from katana450.view.view import GHOST_COLOURS
 
 
 @pytest.fixture

@@ -12,18 +12,18 @@ import pytest
 import trimesh
 import viser
 
-from app.control import commands as cmd
-from app.control.session import Session
-from app.control.solid import Look
-from app.control.state import Finding, Reason, State
-from app.control.things import Form, Surroundings, Thing
-from app.exchange.creases import drawn, glb
-from app.exchange.meshes import Mesh, Meshes, read_mesh
-from app.robot.props import load_props
-from app.view.objects import NOTHING, ObjectsPanel
-from app.view.things import ThingNodes
-from app.view.tint import Tint
-from app.water.around import Table
+from katana450.control import commands as cmd
+from katana450.control.session import Session
+from katana450.control.solid import Look
+from katana450.control.state import Finding, Reason, State
+from katana450.control.things import Form, Surroundings, Thing
+from katana450.exchange.creases import drawn, glb
+from katana450.exchange.meshes import Mesh, Meshes, read_mesh
+from katana450.robot.props import load_props
+from katana450.view.objects import NOTHING, ObjectsPanel
+from katana450.view.things import ThingNodes
+from katana450.view.tint import Tint
+from katana450.water.around import Table
 
 PATH = "/things/1"
 

@@ -8,13 +8,13 @@ from typing import Any, cast
 import pytest
 import viser
 
-from app.control.session import Session
-from app.control.state import Finding, Reason, State
-from app.robot.collision import standing_around
-from app.robot.model import RobotModel
-from app.robot.props import load_props
-from app.view.tint import Tint
-from app.view.workcell import Workcell
+from katana450.control.session import Session
+from katana450.control.state import Finding, Reason, State
+from katana450.robot.collision import standing_around
+from katana450.robot.model import RobotModel
+from katana450.robot.props import load_props
+from katana450.view.tint import Tint
+from katana450.view.workcell import Workcell
 
 
 @dataclass

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from app.robot.props import load_props
-from app.robot.water import around_of
-from app.water.around import Around
-from app.water.flow import Flow
+from katana450.robot.props import load_props
+from katana450.robot.water import around_of
+from katana450.water.around import Around
+from katana450.water.flow import Flow
 
 
 @pytest.fixture(scope="session")

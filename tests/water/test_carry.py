@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from app.control.commands import Command, SetJoint, Stop
-from app.control.session import Session
-from app.geometry import se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.forward import forward
-from app.robot.model import RobotModel
-from app.water.flow import Flow, Water
+from katana450.control.commands import Command, SetJoint, Stop
+from katana450.control.session import Session
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.forward import forward
+from katana450.robot.model import RobotModel
+from katana450.water.flow import Flow, Water
 
 DT = 0.01
 LEVEL = np.deg2rad((-50.0, -70.0, 100.0, -30.0, 0.0))

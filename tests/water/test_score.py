@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from app.water.flow import Flow
-from app.water.score import Course, score
+from katana450.water.flow import Flow
+from katana450.water.score import Course, score
 from tests.water.motions import UPRIGHT, over_basin, poured, turned_to
 
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.geometry.arrays import FloatArray
-from app.water.cylinder import Cylinder
-from app.water.slosh import DAMPING, FIRST_MODE, STILL, Slosh, frequency, steady_acceleration
-from app.water.units import GRAVITY
+from katana450.geometry.arrays import FloatArray
+from katana450.water.cylinder import Cylinder
+from katana450.water.slosh import DAMPING, FIRST_MODE, STILL, Slosh, frequency, steady_acceleration
+from katana450.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
 
 CUP = Cylinder(0.03, 0.087)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.errors import InputError
-from app.kinematics.forward import forward
-from app.robot.model import RobotModel
-from app.workspace import map as map_module
-from app.workspace.colors import share_colors
-from app.workspace.map import Survey
-from app.workspace.reachability import Reachability
+from katana450.errors import InputError
+from katana450.kinematics.forward import forward
+from katana450.robot.model import RobotModel
+from katana450.workspace import map as map_module
+from katana450.workspace.colors import share_colors
+from katana450.workspace.map import Survey
+from katana450.workspace.reachability import Reachability
 
 
 @pytest.fixture(scope="module")

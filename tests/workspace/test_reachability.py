@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.errors import InputError, RobotDescriptionError
-from app.geometry import screws, se3, so3
-from app.geometry.arrays import FloatArray
-from app.kinematics.arm import arm_of
-from app.kinematics.chain import Chain
-from app.kinematics.forward import forward, joint_frames
-from app.kinematics.projection import project
-from app.robot.model import RobotModel, load
-from app.workspace.reachability import MOST_STEPS, Reachability
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.geometry import screws, se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.arm import arm_of
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward, joint_frames
+from katana450.kinematics.projection import project
+from katana450.robot.model import RobotModel, load
+from katana450.workspace.reachability import MOST_STEPS, Reachability
 from tests.kinematics.family import member, random_offsets
 
 ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"

@@ -1,0 +1,61 @@
+"""The options of ``katana450 access``, apart from its work: reading them must load nothing."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+from katana450.control.lease import Role
+
+DEFAULT_FILE = Path("access.json")
+DEFAULT_DURATION = "12h"
+SECONDS = {"m": 60, "h": 3600, "d": 86400}
+LONGEST_DAYS = 366
+
+
+def add_access_options(parser: argparse.ArgumentParser) -> None:
+    """The three things that can be done with links."""
+    acts = parser.add_subparsers(dest="act", required=True, metavar="give | list | revoke")
+    give = acts.add_parser("give", help="print a link for one person")
+    give.add_argument("--name", required=True, help="what the others see them called")
+    give.add_argument(
+        "--role",
+        choices=[role.value for role in Role],
+        default=Role.OPERATOR.value,
+        help="viewer: watch and stop; operator: drive when nobody else does; admin: also take the "
+        "arm from others (default: %(default)s)",
+    )
+    give.add_argument(
+        "--for",
+        dest="duration",
+        type=_duration,
+        default=DEFAULT_DURATION,
+        metavar="TIME",
+        help="how long it is good, such as 30m, 12h or 7d (default: %(default)s)",
+    )
+    give.add_argument(
+        "--url",
+        default="http://127.0.0.1:8080",
+        help="where people find the server (default: %(default)s)",
+    )
+    acts.add_parser("list", help="say who was given one")
+    revoke = acts.add_parser("revoke", help="take one back; who came in by it is sent out")
+    revoke.add_argument("number", help="as `list` shows it")
+    for act in acts.choices.values():
+        act.add_argument(
+            "--file",
+            type=Path,
+            default=DEFAULT_FILE,
+            help="where links are kept; secret, never in version control (default: %(default)s)",
+        )
+
+
+def _duration(text: str) -> float:
+    found = re.fullmatch(r"(\d{1,4})([mhd])", text)
+    seconds = int(found[1]) * SECONDS[found[2]] if found else 0
+    if not 0 < seconds <= LONGEST_DAYS * SECONDS["d"]:
+        raise argparse.ArgumentTypeError(
+            f"a time is a number and m, h or d, at most {LONGEST_DAYS}d, not {text!r}"
+        )
+    return float(seconds)

@@ -1,0 +1,96 @@
+"""``katana450 export``: the arm, or any other mechanism, as files for other programs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from katana450.errors import InputError
+from katana450.exchange.atomic import write_files, writer_of
+from katana450.exchange.c_source import c_files
+from katana450.exchange.glb import glb_files
+from katana450.exchange.mechanism import Mechanism
+from katana450.exchange.trajectory_file import Motion, load_motion
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.exchange.urdf_package import (
+    UNSTATED_LICENSE,
+    UNSTATED_MAINTAINER,
+    Maintainer,
+    package_files,
+)
+from katana450.exchange.vrml import vrml_files
+from katana450.resources import URDF_PATH
+
+MOVES = ("vrml", "glb")
+"""Formats a motion survives in."""
+
+OWN_LICENSE = "MIT"
+"""Licence of the Katana450's description, as of this project."""
+
+POSED = ("vrml", "c", "glb")
+"""Formats that stand in a pose."""
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write the files of one format; tell their names and sizes."""
+    kind: str = options.format
+    if options.trajectory is not None and kind not in MOVES:
+        raise InputError(f"A file of {kind} holds no motion; {' and '.join(MOVES)} do.")
+    if options.run is not None:
+        raise InputError(f"A file of {kind} holds no run; html does.")
+    if options.pose and kind not in POSED:
+        raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED)} do.")
+    mechanism, notes = load_mechanism(options.urdf)
+    for note in notes:
+        print(f"katana450: {note}", file=sys.stderr)
+    values = mechanism.values(options.pose)
+    motion = None if options.trajectory is None else load_motion(options.trajectory, mechanism)
+    made = _package(options) if kind == "urdf" else _made(kind, mechanism, values, motion)
+    folder: Path = options.out
+    try:
+        for path in {(folder / name).parent for name in made}:
+            path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made: {error.strerror or error}.") from error
+    write_files({folder / name: writer_of(content) for name, content in made.items()})
+    for name, content in made.items():
+        print(f"{folder / name}: {len(content)} bytes")
+    return 0
+
+
+def _made(
+    kind: str,
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    motion: Motion | None,
+) -> Mapping[str, bytes]:
+    match kind:
+        case "vrml":
+            return vrml_files(mechanism, values, motion)
+        case "c":
+            return c_files(mechanism, values)
+    return glb_files(mechanism, values, motion)
+
+
+def _package(options: argparse.Namespace) -> Mapping[str, bytes]:
+    """Return the ROS package; report what its `package.xml` leaves for the user to state."""
+    own = options.urdf.resolve() == URDF_PATH.resolve()
+    license_name = options.license or (OWN_LICENSE if own else UNSTATED_LICENSE)
+    maintainer = Maintainer(*options.maintainer) if options.maintainer else UNSTATED_MAINTAINER
+    unstated = [
+        word
+        for word, missing in (
+            ("--license", license_name == UNSTATED_LICENSE),
+            ("--maintainer", maintainer == UNSTATED_MAINTAINER),
+        )
+        if missing
+    ]
+    if unstated:
+        print(
+            f"katana450: package.xml has a TODO for {' and '.join(unstated)}; give "
+            f"{'it' if len(unstated) == 1 else 'them'} before you publish the package.",
+            file=sys.stderr,
+        )
+    return package_files(options.urdf, license_name, maintainer)

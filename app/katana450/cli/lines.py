@@ -1,0 +1,192 @@
+"""``katana450 fk`` and ``katana450 ik``: a JSON object a line in, one a line out."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from katana450.control.choices import met
+from katana450.errors import InputError
+from katana450.geometry import se3, so3
+from katana450.geometry.arrays import FloatArray
+from katana450.kinematics.badge import Badge
+from katana450.kinematics.chain import Chain
+from katana450.kinematics.forward import forward
+from katana450.kinematics.inverse import inverse
+from katana450.kinematics.projection import project
+from katana450.robot.collision import standing_around, world_of
+from katana450.robot.model import load
+from katana450.robot.props import load_props
+
+LONGEST_SHOWN = 40
+"""Characters of a wrong value that an error repeats."""
+
+Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
+
+
+class Kinematics:
+    """Forward and inverse kinematics of the arm in the URDF, on plain JSON values."""
+
+    def __init__(
+        self, urdf: Path, tool: str | None, *, in_base_frame: bool, badges: bool = False
+    ) -> None:
+        """``in_base_frame``: poses are in the base frame on the table, else in {S}.
+
+        ``urdf``, ``tool``: the arm, and the link that is its default tool; see ``load``.
+        ``badges``: solutions carry what they cost to take from the request's ``q``.
+        """
+        self._badges = badges
+        model = load(urdf, tool)
+        self._arm = model.arm
+        self._world = None
+        if badges:
+            world, _ = world_of(model)
+            self._world = world and world.with_obstacles(standing_around(load_props()))
+        self._T_frame_shoulder = model.T_base_shoulder if in_base_frame else np.eye(4)
+
+    def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """``{"q": [n rad], "tool"}`` to ``{"T": 4x4}`` [m]."""
+        chain = self._chain(request, {"q", "tool"})
+        q = chain.check_q(_numbers(request, "q", 1))
+        return {"T": (self._T_frame_shoulder @ forward(chain, q)).tolist()}
+
+    def ik(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        """``{"T": 4x4, "tool"}`` to every solution for the nearest pose five axes can do.
+
+        A T that was printed with four decimals or more is taken for the nearest rotation;
+        ``rotation_misfit`` is how far its columns were off orthonormal.
+
+        The residuals say how far that pose is from ``T``, limits of the joints left aside:
+        ``within_limits`` tells of each solution whether the arm can go there. With badges there are
+        also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
+        value, and the two parts in contact there, if any are, with the finger joint at 0 or the
+        limit next to it.
+        """
+        chain = self._chain(request, {"T", "tool", "q"} if self._badges else {"T", "tool"})
+        start = chain.check_q(_numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
+        given = _numbers(request, "T", 2)
+        T = se3.printed(given, "T")
+        T_shoulder = se3.inverse(self._T_frame_shoulder) @ T
+        nearest = project(chain, T_shoulder, within_limits=False).T
+        # With axes that do not cross, not every branch reaches every pose.
+        solutions = [solution for solution in inverse(chain, nearest) if solution.exact]
+        reached = [forward(chain, solution.q) for solution in solutions]
+        return {
+            "solutions": [
+                {
+                    "q": solution.q.tolist(),
+                    "within_limits": solution.within_limits,
+                    "branch": str(solution.branch),
+                }
+                | (self._badge(Badge.of(chain, solution, start)) if self._badges else {})
+                for solution in solutions
+            ],
+            "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
+            "residual_rad": max(so3.angle(T_shoulder[:3, :3], T_q[:3, :3]) for T_q in reached),
+            "rotation_misfit": so3.misfit(np.array(given)[:3, :3]),
+        }
+
+    def _badge(self, badge: Badge) -> dict[str, Any]:
+        contact = met(self._world, badge.q, self._arm.gripper.clamp(0.0))
+        return {
+            "distance_rad": badge.distance,
+            "time_s": badge.time,
+            "smallest_singular_value": badge.smallest_singular_value,
+            "contact": None if contact is None else contact.parts,
+        }
+
+    def _chain(self, request: Mapping[str, Any], keys: set[str]) -> Chain:
+        unknown = set(request) - keys
+        if unknown:
+            raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
+        tool = request.get("tool", self._arm.default_tool)
+        if not isinstance(tool, str):
+            raise InputError(f"'tool' is {_shown(tool)}; there is no tool of that name.")
+        return self._arm.chain_to(tool)
+
+
+def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> int:
+    """Answer each line as it comes and return the exit status.
+
+    A bad line gets ``{"error": ...}`` with its number, counted from 1, and the rest continue. The
+    status is 1 when there were requests and none could be answered, else 0.
+    """
+    if source is None and isinstance(sys.stdin, io.TextIOWrapper):
+        # Bytes that are not UTF-8 spoil their own line, not the run.
+        sys.stdin.reconfigure(encoding="utf-8", errors="replace")
+    source, sink = source or sys.stdin, sink or sys.stdout
+    asked = answered = 0
+    for number, line in enumerate(source, start=1):
+        if not line.strip():
+            continue
+        asked += 1
+        try:
+            reply = answer(_request(line))
+            answered += 1
+        except InputError as error:
+            reply = {"error": f"line {number}: {error}"}
+        print(json.dumps(reply, allow_nan=False), file=sink, flush=True)
+    return int(asked > answered == 0)
+
+
+def _request(line: str) -> Mapping[str, Any]:
+    if line.startswith("\ufeff"):
+        raise InputError(
+            "This is not JSON: it begins with a byte order mark (BOM). Save the file as UTF-8 "
+            "without one."
+        )
+    try:
+        request = json.loads(line.strip())
+    except json.JSONDecodeError as error:
+        raise InputError(f"This is not JSON: {error.msg} at column {error.colno}.") from error
+    except ValueError as error:
+        raise InputError("This is not JSON: a number in it has too many digits.") from error
+    except RecursionError as error:
+        raise InputError("This is not JSON: it is nested too deeply.") from error
+    if not isinstance(request, dict):
+        raise InputError(f"This is {_shown(request)}; a request is a JSON object.")
+    return request
+
+
+def _numbers(request: Mapping[str, Any], key: str, depth: int) -> Any:
+    """Return the value of ``key``: lists of JSON numbers, nested ``depth`` deep.
+
+    Raises InputError with the place of what is none; shapes are left to the caller.
+    """
+    if key not in request:
+        raise InputError(f"The key {key!r} is missing.")
+    _check_numbers(request[key], key, depth)
+    return request[key]
+
+
+def _check_numbers(value: Any, place: str, depth: int) -> None:
+    if depth:
+        if not isinstance(value, list):
+            what = "numbers" if depth == 1 else "rows"
+            raise InputError(f"{place} is {_shown(value)}; it must be a list of {what}.")
+        for k, each in enumerate(value):
+            _check_numbers(each, f"{place}[{k}]", depth - 1)
+        if depth == 2 and len({len(row) for row in value}) > 1:
+            raise InputError(f"The rows of {place} have different lengths; its shape must be 4x4.")
+    elif isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{place} is {_shown(value)}; give plain finite numbers.")
+    elif isinstance(value, int) and abs(value) > sys.float_info.max:
+        raise InputError(f"{place} is too large; give plain finite numbers.")
+
+
+def _shown(value: Any) -> str:
+    """Return how JSON calls ``value``, shortened."""
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else "a list"
+    text = json.dumps(value)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
+def _distance(a: FloatArray, b: FloatArray) -> float:
+    return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))

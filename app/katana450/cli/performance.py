@@ -1,0 +1,156 @@
+"""A run on a clock of its own: a script's, or that of a table of joint values."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.cli.assembly import described
+from katana450.cli.progress import progress
+from katana450.control.session import Session
+from katana450.control.state import State
+from katana450.drivers.simulated import SimulatedDriver
+from katana450.errors import InputError, KatanaError
+from katana450.exchange.mechanism import Mechanism
+from katana450.exchange.scripts import text_of
+from katana450.exchange.trajectory_file import load_motion
+from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.programs.bench import Rig
+from katana450.programs.circle import CircleDemo
+from katana450.programs.pour import PourDemo
+from katana450.programs.program import Program, compiled
+from katana450.programs.runner import Phase
+from katana450.programs.script import Script, parse
+from katana450.programs.source import ScriptError
+from katana450.report.trace import Rehearsal
+from katana450.robot.model import RobotModel
+from katana450.settings import Settings
+
+DEMOS = {"circle": CircleDemo, "pour": PourDemo}
+"""Scripts that go by a name."""
+
+
+class Planned(NamedTuple):
+    """A script with everything planned, and the arm it is for."""
+
+    script: Script
+    program: Program
+    model: RobotModel
+    session: Session
+
+
+class Performance(NamedTuple):
+    """An arm, and its states so many times a second; one where it only stands."""
+
+    model: RobotModel
+    session: Session
+    states: Sequence[State]
+    rate: float
+    bare: bool = False
+
+    def at(self, t: float) -> State:
+        """The state nearest to ``t`` [s]; that at the end if it is later."""
+        return self.states[min(round(t * self.rate), len(self.states) - 1)]
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return (len(self.states) - 1) / self.rate
+
+
+def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
+    """``seed``: of the ways round what is in between. ``speed``: share of the script's own."""
+    settings = replace(Settings(), bare=script.bare)
+    model, session, _ = described(settings, urdf, None)
+    rig = Rig(session, model.T_base_shoulder, seed)
+    program = compiled(script, rig, _at_rest(session), speed)
+    return Planned(script, program, model, session)
+
+
+def played(plan: Planned) -> Rehearsal:
+    """Run to its end, with a bar. Raises KatanaError where it does not get there."""
+    session = plan.session
+    driver = SimulatedDriver(plan.model.arm, session.ready, gripper=0.0)
+    rehearsal = Rehearsal(plan.program, session, driver, Settings().rate)
+    done, total = 0, 1000
+    ticks = progress(range(total), total, plan.script.name)
+    for share in rehearsal.ticks():
+        while done < int(share * total):
+            done += 1
+            next(ticks, None)
+    for _ in ticks:
+        pass
+    if rehearsal.run.phase is not Phase.DONE:
+        raise KatanaError(rehearsal.run.why)
+    return rehearsal
+
+
+def chosen(
+    run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path
+) -> Performance:
+    """What a person chose: a script or a demo by its name, a table, or else a pose."""
+    if run is not None:
+        return of_script(run, urdf)
+    if trajectory is not None:
+        return of_trajectory(trajectory, urdf)
+    return of_pose(pose, urdf)
+
+
+def of_script(name: str, urdf: Path) -> Performance:
+    """Of a demo or of a script in a file, with a bar. Raises InputError with what is wrong."""
+    text = DEMOS[name]().text if name in DEMOS else text_of(Path(name))
+    try:
+        plan = planned(parse(text), urdf)
+    except ScriptError as error:
+        found = error.problems[0]
+        raise InputError(f"{name}:{found.line}:{found.column}: {found.said}") from error
+    states = played(plan).states
+    return Performance(plan.model, plan.session, states, Settings().rate, plan.script.bare)
+
+
+def of_pose(pose: Sequence[float], urdf: Path) -> Performance:
+    """Standing at ``pose``: values of the driven joints [rad]; at home where there are none."""
+    model, session, _ = _described(urdf)
+    if not pose:
+        return Performance(model, session, [_at_rest(session)], 1.0)
+    mechanism = load_mechanism(urdf)[0]
+    return Performance(model, session, [_standing(model, session, mechanism.values(pose))], 1.0)
+
+
+def of_trajectory(path: Path, urdf: Path) -> Performance:
+    """As a table of joint values has it. Raises InputError for a file that is none."""
+    model, session, _ = _described(urdf)
+    mechanism: Mechanism = load_mechanism(urdf)[0]
+    motion, rate = load_motion(path, mechanism), Settings().rate
+    t = np.arange(int(motion.t[-1] * rate) + 1) / rate
+    rows = {name: np.interp(t, motion.t, values) for name, values in motion.values.items()}
+    states = [
+        _standing(model, session, {name: float(row[k]) for name, row in rows.items()}, time)
+        for k, time in enumerate(t.tolist())
+    ]
+    return Performance(model, session, states, rate)
+
+
+def _described(urdf: Path) -> tuple[RobotModel, Session, tuple[str, ...]]:
+    model, session, notes = described(Settings(), urdf, None)
+    for note in notes:
+        print(f"katana450: {note}", file=sys.stderr)
+    return model, session, notes
+
+
+def _at_rest(session: Session) -> State:
+    """Where an arm is that nobody has moved."""
+    return session.begin(session.ready, session.arm.gripper.clamp(0.0), 0.0)
+
+
+def _standing(
+    model: RobotModel, session: Session, values: dict[str, float], t: float = 0.0
+) -> State:
+    q = np.array([values[name] for name in model.arm.chain.names])
+    driven = [name for name, follows in model.fingers.items() if follows == (1.0, 0.0)]
+    return session.begin(q, values[driven[0]] if driven else 0.0, t)

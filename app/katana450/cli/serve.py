@@ -1,0 +1,146 @@
+"""``katana450 serve``: open the port, run the arm, and see to it that people can reach it."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from katana450.cli.front import OPEN, READY, Front, Outfit
+from katana450.cli.log_lines import start_log
+from katana450.gateway.listen import HERE, listen
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+if TYPE_CHECKING:
+    from katana450.cli.assembly import Described
+    from katana450.exchange.scene_file import StoredScene
+
+AWAKE = 0.2
+"""[s] How soon a signal is heeded, and a front that ended."""
+
+AGAIN = (0.0, 1.0, 5.0, 15.0)
+"""[s] Until it is started again, the longer the more often it ended at once."""
+
+SETTLED = 30.0
+"""[s] A front that ran for so long did not end at once."""
+
+HUNG = 10.0
+"""[s] A front that says nothing for so long has hung."""
+
+log = logging.getLogger(__name__)
+
+
+def serve(
+    settings: Settings,
+    urdf: Path = URDF_PATH,
+    tool: str | None = None,
+    workspace: Path | None = None,
+    scene: Path | None = None,
+    objects: Sequence[str] = (),
+) -> int:
+    """Run the app until SIGINT or SIGTERM; returns the exit status, 1 if the control loop ended.
+
+    ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
+    ``workspace``: file of a reachability map that can be shown. ``scene``, ``objects``: see
+    ``furnished``.
+    """
+    start_log()
+    # Read before anything runs: the front shows what it is given here, each time it is started.
+    robot, stored = _furnished(settings, (urdf, tool), scene, objects)
+    stopping = threading.Event()
+
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        stopping.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    # Held here, so that nobody else takes it while the front is started again.
+    listening = listen(settings.host, settings.port)
+    lines = None if settings.lines is None else listen(HERE, settings.lines)
+    url = settings.public_url or _address(settings, listening.getsockname()[1])
+
+    meshes = () if stored is None else stored.meshes
+    outfit = Outfit(settings, urdf, tool, listening, lines, workspace, meshes)
+    current, arm = Front(outfit), None
+    try:
+        # The libraries that read the robot take most of a second; so does the front meanwhile.
+        from katana450.cli.assembly import RunningArm, recognised
+
+        found = recognised(settings, urdf, tool) if robot is None else robot
+        arm = RunningArm(settings, found, None if stored is None else stored.scene)
+        for note in arm.notes:
+            print(f"katana450: {note}", file=sys.stderr)
+        current.wait_for(OPEN)
+        print(f"Open {url} in a browser.", flush=True)
+        arm.start()
+        arm.attach(current.pipe)
+        current.wait_for(READY)
+        if lines is not None:
+            print(f"Programs: JSON lines on {HERE}:{lines.getsockname()[1]}.", flush=True)
+        print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
+        ended, began = 0, time.monotonic()
+        # A signal that another thread is given does not wake this one from its wait.
+        while arm.running and not stopping.wait(AWAKE):
+            if current.running:
+                if time.monotonic() - began > SETTLED and arm.unheard > HUNG:
+                    log.error("The page's server has not been heard of for %g s.", HUNG)
+                    current.kill()
+                continue
+            log.error(
+                "The page's server ended with status %s; the arm holds. It is started again.",
+                current.exit_code,
+            )
+            ended = 0 if time.monotonic() - began > SETTLED else ended + 1
+            stopping.wait(AGAIN[min(ended, len(AGAIN) - 1)])
+            current.stop()
+            current, began = Front(outfit), time.monotonic()
+            arm.attach(current.pipe)
+        if not stopping.is_set():
+            log.critical("The control loop has ended, so the server ends too: start it again.")
+    finally:
+        # The arm first: a front whose arm hangs up ends in peace.
+        if arm is not None:
+            arm.stop()
+        current.stop()
+        if arm is not None:
+            arm.join()
+        listening.close()
+    return 0 if stopping.is_set() else 1
+
+
+def _furnished(
+    settings: Settings,
+    urdf_and_tool: tuple[Path, str | None],
+    scene: Path | None,
+    objects: Sequence[str],
+) -> tuple[Described | None, StoredScene | None]:
+    """The robot and what stands around it, where somebody says what."""
+    if scene is None and not objects:
+        return None, None
+    from katana450.cli.assembly import described
+    from katana450.cli.furnishing import furnished
+
+    robot = described(settings, *urdf_and_tool)
+    stored, said = furnished(robot, scene, objects)
+    for sentence in said:
+        print(f"katana450: {sentence}", flush=True)
+    return robot, stored
+
+
+def _address(settings: Settings, port: int) -> str:
+    scheme = "https" if settings.tls_cert is not None else "http"
+    return f"{scheme}://{_shown(settings.host)}:{port}"
+
+
+def _shown(host: str) -> str:
+    """The address a person on this machine can open."""
+    if host in ("0.0.0.0", "::", ""):
+        return "127.0.0.1"
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,126 @@
+"""The options of ``katana450 serve``, apart from its work: reading them must load nothing."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from katana450.settings import Settings
+
+SHORTEST_SILENCE, LONGEST_SILENCE, LONGEST_OWNER_SILENCE = 0.2, 2.0, 10.0
+"""[s] Signs of life are 0.1 s apart, and after 3 s the arm is anybody's."""
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """Put them into `parser`."""
+    parser.add_argument(
+        "--host",
+        default=Settings.host,
+        help="address to listen on; one that other machines can reach asks for --access "
+        "(default: %(default)s)",
+    )
+    parser.add_argument(
+        "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workspace",
+        type=Path,
+        metavar="FILE.npz",
+        help="a map written by `katana450 workspace --out`, to be shown in the scene",
+    )
+    parser.add_argument(
+        "--scene",
+        type=Path,
+        metavar="FILE",
+        help="what stands around: a scene.yaml with its meshes beside it, or a .zip of both",
+    )
+    parser.add_argument(
+        "--object",
+        dest="objects",
+        action="append",
+        default=[],
+        metavar="FILE[@x,y,z]",
+        help="an object besides, of a .wrl, .stl, .obj, .ply, .glb or .gltf file; where it stands "
+        "in mm, else in front of the arm; as often as there are",
+    )
+    parser.add_argument(
+        "--silence",
+        type=_silence,
+        default=Settings.silence,
+        metavar="SECONDS",
+        help="without a sign of life of whoever drives until a moving arm is stopped; the page "
+        f"gives ten a second ({SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
+    )
+    parser.add_argument(
+        "--owner-silence",
+        type=_owner_silence,
+        default=Settings.owner_silence,
+        metavar="SECONDS",
+        help="heartbeat timeout of a program's owner, after which the program ends "
+        f"({SHORTEST_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
+    )
+    parser.add_argument(
+        "--access",
+        type=Path,
+        metavar="FILE",
+        help="let in only people with a link that `katana450 access give` wrote into this file",
+    )
+    parser.add_argument(
+        "--insecure",
+        action="store_true",
+        help="let other machines in without a link: everybody there can drive the arm",
+    )
+    parser.add_argument("--tls-cert", type=Path, metavar="FILE", help="certificate, for https")
+    parser.add_argument("--tls-key", type=Path, metavar="FILE", help="its private key")
+    parser.add_argument(
+        "--public-url",
+        metavar="URL",
+        help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
+    )
+    parser.add_argument(
+        "--programs",
+        type=Path,
+        metavar="DIR",
+        help="a folder of scripts for the panel, where taught ones are saved too",
+    )
+    parser.add_argument(
+        "--bare",
+        action="store_true",
+        help="the arm without its gripper, as in the paper's circle",
+    )
+    parser.add_argument(
+        "--lines",
+        type=_port,
+        metavar="PORT",
+        help="a TCP port of this machine for programs that speak a line of JSON at a time",
+    )
+
+
+def _silence(text: str) -> float:
+    return _seconds(text, LONGEST_SILENCE)
+
+
+def _owner_silence(text: str) -> float:
+    return _seconds(text, LONGEST_OWNER_SILENCE)
+
+
+def _seconds(text: str, longest: float) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not SHORTEST_SILENCE <= seconds <= longest:
+        raise argparse.ArgumentTypeError(
+            f"a number of seconds from {SHORTEST_SILENCE:g} to {longest:g}, not {text!r}"
+        )
+    return seconds
+
+
+def _port(text: str) -> int:
+    try:
+        port = int(text)
+    except ValueError:
+        port = -1
+    if not 0 <= port <= 65535:
+        raise argparse.ArgumentTypeError(f"a port is a number from 0 to 65535, not {text!r}")
+    return port

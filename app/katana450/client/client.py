@@ -1,0 +1,110 @@
+"""A program's hand on the arm, for programs that know no asyncio: the same, one call at a time."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncGenerator, Coroutine, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy.typing as npt
+
+from katana450.api import answers, requests
+from katana450.client.asynchronous import FOLLOWED, AsyncClient, aconnect
+
+T = TypeVar("T")
+A = TypeVar("A", bound=answers.Answer)
+
+
+class Client:
+    """One connection; made by ``connect``. It gives its signs of life in a thread of its own."""
+
+    def __init__(self, client: AsyncClient, loop: asyncio.AbstractEventLoop) -> None:
+        self._client = client
+        self._loop = loop
+
+    @property
+    def welcome(self) -> answers.Welcome:
+        """Who we are there."""
+        return self._client.welcome
+
+    def ask(self, request: requests.Request) -> answers.Answer:
+        """See ``AsyncClient.ask``."""
+        return self._wait(self._client.ask(request))
+
+    def tell(self, request: requests.Request) -> None:
+        """See ``AsyncClient.tell``."""
+        self._wait(self._client.tell(request))
+
+    def look(self, kind: type[A]) -> A:
+        """See ``AsyncClient.look``."""
+        return self._wait(self._client.look(kind))
+
+    def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
+        """See ``AsyncClient.go``."""
+        return self._wait(self._client.go(request, seconds))
+
+    def joints(self, q: npt.ArrayLike) -> answers.State:
+        """See ``AsyncClient.joints``."""
+        return self._wait(self._client.joints(q))
+
+    def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
+        """See ``AsyncClient.upload``."""
+        return self._wait(self._client.upload(file, unit))
+
+    def save_scene(self) -> bytes:
+        """See ``AsyncClient.save_scene``."""
+        return self._wait(self._client.save_scene())
+
+    def load_scene(self, data: bytes) -> answers.Scene:
+        """See ``AsyncClient.load_scene``."""
+        return self._wait(self._client.load_scene(data))
+
+    def states(self, hz: float = FOLLOWED) -> Iterator[answers.State]:
+        """See ``AsyncClient.states``."""
+        states = self._client.states(hz)
+        try:
+            while True:
+                yield self._wait(_next(states))
+        finally:
+            self._wait(states.aclose())
+
+    def _wait(self, work: Coroutine[Any, Any, T]) -> T:
+        future = asyncio.run_coroutine_threadsafe(work, self._loop)
+        try:
+            return future.result()
+        except BaseException:
+            # Ctrl-C: nobody waits for it any more.
+            future.cancel()
+            raise
+
+
+async def _next(states: AsyncGenerator[answers.State, None]) -> answers.State:
+    return await anext(states)
+
+
+@contextmanager
+def connect(
+    url: str = "http://127.0.0.1:8080", name: str = "Program", token: str = ""
+) -> Iterator[Client]:
+    """A connection to the server at ``url``, for as long as the context lasts; see ``aconnect``."""
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever, name="katana450 client", daemon=True)
+    thread.start()
+    context = aconnect(url, name, token)
+
+    def wait(work: Coroutine[Any, Any, T]) -> T:
+        return asyncio.run_coroutine_threadsafe(work, loop).result()
+
+    try:
+        client = Client(wait(context.__aenter__()), loop)
+        try:
+            yield client
+        finally:
+            wait(context.__aexit__(None, None, None))
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()

@@ -1,0 +1,71 @@
+"""Files to and from the server, over HTTP: they are too large for a message."""
+
+from __future__ import annotations
+
+import urllib.error
+import urllib.request
+from dataclasses import dataclass
+from urllib.parse import urlencode
+
+import msgspec
+
+from katana450.api import answers
+from katana450.api.fields import ROOT
+from katana450.errors import KatanaError
+
+PATIENCE = 60.0
+"""[s]"""
+
+
+class RefusedError(KatanaError):
+    """The server did not do what was asked; the message says why, and what to do."""
+
+
+class LostError(KatanaError):
+    """The line to the server is gone. A moving arm is stopped then."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where the server is, and the token of a link where it asks for one."""
+
+    url: str
+    token: str = ""
+
+    def mesh(self, data: bytes, name: str, unit: str | None) -> answers.Mesh:
+        """See ``AsyncClient.upload``."""
+        query = {"name": name} | ({} if unit is None else {"unit": unit})
+        answer = answers.decoded(self._ask(f"{ROOT}/mesh?{urlencode(query)}", data))
+        assert isinstance(answer, answers.Mesh)
+        return answer
+
+    def scene(self, data: bytes) -> answers.Scene:
+        """See ``AsyncClient.load_scene``."""
+        answer = answers.decoded(self._ask(f"{ROOT}/scene", data))
+        assert isinstance(answer, answers.Scene)
+        return answer
+
+    def saved(self) -> bytes:
+        """See ``AsyncClient.save_scene``."""
+        return self._ask(f"{ROOT}/scene", None)
+
+    def _ask(self, path: str, data: bytes | None) -> bytes:
+        headers = {"Authorization": f"Bearer {self.token}"} if self.token else {}
+        asked = urllib.request.Request(self.url.rstrip("/") + path, data=data, headers=headers)
+        try:
+            with urllib.request.urlopen(asked, timeout=PATIENCE) as answer:
+                content: bytes = answer.read()
+                return content
+        except urllib.error.HTTPError as error:
+            with error:
+                raise RefusedError(_why(error.read())) from error
+        except OSError as error:
+            raise LostError(f"There is no katana450 server at {self.url}: {error}.") from error
+
+
+def _why(content: bytes) -> str:
+    try:
+        refused = answers.decoded(content)
+    except msgspec.MsgspecError:
+        return content.decode("utf-8", "replace")
+    return refused.why if isinstance(refused, answers.Refused) else str(refused)

@@ -1,0 +1,60 @@
+"""Files that are there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import BinaryIO
+
+from katana450.errors import InputError
+
+Writer = Callable[[BinaryIO], object]
+
+
+def writer_of(content: bytes) -> Writer:
+    """What writes just that."""
+    return lambda file: file.write(content)
+
+
+def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
+    """Write every file, and only then put them in place, over what was there.
+
+    ``mode``: who may read and write them, less what the umask takes away. Whatever stops the
+    writing leaves the old files as they were. Raises InputError when a file cannot be written.
+    """
+    with ExitStack() as stack:
+        written: list[tuple[Path, Path]] = []
+        for path, writer in writers.items():
+            try:
+                temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+                stack.callback(temporary.unlink, missing_ok=True)
+                opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+                with os.fdopen(opened, "wb") as file:
+                    writer(file)
+                    file.flush()
+                    os.fsync(file.fileno())
+            except OSError as error:
+                raise _refusal(path, error) from error
+            written.append((temporary, path))
+        for temporary, path in written:
+            try:
+                temporary.replace(path)
+            except OSError as error:
+                raise _refusal(path, error) from error
+
+
+def check_writable(path: Path) -> None:
+    """InputError when no file can be made at `path`, told before a long computation."""
+    if path.is_dir():
+        raise InputError(f"{path} is a directory; name a file.")
+    if not path.parent.is_dir():
+        raise InputError(f"There is no directory {path.parent}; make it, or name another file.")
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(f"The directory {path.parent} may not be written to.")
+
+
+def _refusal(path: Path, error: OSError) -> InputError:
+    return InputError(f"{path} cannot be written: {error.strerror or error}.")

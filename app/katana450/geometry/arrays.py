@@ -1,0 +1,46 @@
+"""Checked conversion of what callers hand in to float arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.errors import InputError
+
+_HINT = "give plain finite numbers"
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+def real_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
+    """A float64 copy of `value`, NaN and infinity included.
+
+    `name` says in the error what the value is. Raises InputError when it is not made of real
+    numbers or has another shape.
+    """
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise InputError(f"{name} is not a regular array: {error}.") from error
+    if array.dtype.kind not in "iuf":
+        raise InputError(f"{name} holds {array.dtype} values; {_HINT}.")
+    if array.shape != shape:
+        raise InputError(f"{name} has shape {array.shape}; it must be {shape}.")
+    return np.array(array, dtype=np.float64)
+
+
+def finite_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
+    """A float64 copy of `value`; InputError as `real_array`, and for a NaN or an infinity."""
+    result = real_array(value, shape, name)
+    if not np.isfinite(result).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        raise InputError(f"{name} has {result[where]} at {list(where)}; {_HINT}.")
+    return result
+
+
+def frozen(values: npt.ArrayLike) -> FloatArray:
+    """A float64 copy of `values` that cannot be written to."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array

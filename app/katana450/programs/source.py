@@ -1,0 +1,150 @@
+"""A script's text as values that know their line: YAML, of which only plain data is understood.
+
+The text is composed into nodes and never constructed: no tag makes an object, nothing is executed.
+Anchors are not understood either, so that a small text stays small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from katana450.errors import InputError
+
+LARGEST = 64 * 1024
+"""[bytes] Of a script."""
+
+DEEPEST = 12
+"""Values within values."""
+
+MOST_VALUES = 10_000
+
+NULL, TEXT = "tag:yaml.org,2002:null", "tag:yaml.org,2002:str"
+WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong at one place. line, column: from 1."""
+
+    line: int
+    column: int
+    said: str
+
+    def __str__(self) -> str:
+        return f"line {self.line}, column {self.column}: {self.said}"
+
+
+class ScriptError(InputError):
+    """A script that cannot be run; all that is wrong with it, in the order of its lines."""
+
+    def __init__(self, problems: tuple[Problem, ...]) -> None:
+        self.problems = tuple(sorted(problems, key=lambda each: (each.line, each.column)))
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+@dataclass(frozen=True)
+class Value:
+    """One of the text. held: a text, a list, or names with values; None for nothing.
+
+    number: what a text that is a number says; None of any other.
+    """
+
+    line: int
+    column: int
+    held: str | tuple[Value, ...] | tuple[tuple[Value, Value], ...] | None
+    kind: str
+    number: float | None = None
+
+    @property
+    def items(self) -> tuple[Value, ...]:
+        """Of a list."""
+        assert self.kind == "list"
+        return self.held  # type: ignore[return-value]
+
+    @property
+    def fields(self) -> tuple[tuple[Value, Value], ...]:
+        """Of names with values."""
+        assert self.kind == "mapping"
+        return self.held  # type: ignore[return-value]
+
+    def wrong(self, said: str) -> ScriptError:
+        """The error that says so of this place."""
+        return ScriptError((Problem(self.line, self.column, said),))
+
+    def __str__(self) -> str:
+        return {"nothing": "nothing", "list": "a list", "mapping": "names with values"}.get(
+            self.kind, repr(self.held)
+        )
+
+
+def read(text: str, what: str = "script") -> Value:
+    """The one value that `text` is. Raises ScriptError with its place for what it cannot be.
+
+    ``what``: how a person calls it.
+    """
+    if len(text.encode("utf-8", "replace")) > LARGEST:
+        raise ScriptError((Problem(1, 1, f"A {what} has at most {LARGEST // 1024} KB."),))
+    try:
+        # Read event by event first: composing recurses, and takes anchors for values.
+        _check_bounds(text, what)
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
+        said = error.problem or error.context or "this is not YAML"
+        raise ScriptError((Problem(line, column, f"This cannot be read: {said}."),)) from error
+    except yaml.YAMLError as error:
+        # A character that no text holds.
+        said = str(error).partition("\n")[0]
+        line = text[: getattr(error, "position", 0) or 0].count("\n") + 1
+        raise ScriptError((Problem(line, 1, f"This cannot be read: {said}."),)) from error
+    if node is None:
+        raise ScriptError((Problem(1, 1, f"The {what} is empty."),))
+    return _value(node)
+
+
+def _check_bounds(text: str, what: str) -> None:
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, Loader=yaml.SafeLoader)):
+        said = ""
+        if isinstance(event, yaml.MappingStartEvent | yaml.SequenceStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
+            depth -= 1
+        if getattr(event, "anchor", None) is not None:
+            said = "Anchors and aliases (& and *) are not understood; say it in full."
+        elif getattr(event, "tag", None) is not None:
+            said = f"Tags (!) are not understood: a {what} is plain data."
+        elif depth > DEEPEST:
+            said = f"This is more than {DEEPEST} levels deep."
+        elif count > MOST_VALUES:
+            said = f"A {what} holds at most {MOST_VALUES} values."
+        if said:
+            raise ScriptError((Problem(*_place(event.start_mark), said),))
+
+
+def _place(mark: Any) -> tuple[int, int]:
+    return mark.line + 1, mark.column + 1
+
+
+def _value(node: yaml.Node) -> Value:
+    line, column = _place(node.start_mark)
+    if isinstance(node, yaml.MappingNode):
+        fields = tuple((_value(key), _value(value)) for key, value in node.value)
+        return Value(line, column, fields, "mapping")
+    if isinstance(node, yaml.SequenceNode):
+        return Value(line, column, tuple(_value(each) for each in node.value), "list")
+    if node.tag == NULL:
+        return Value(line, column, None, "nothing")
+    kind = {TEXT: "text", WHOLE: "whole", REAL: "number"}.get(node.tag, "other")
+    return Value(line, column, str(node.value), kind, _number(str(node.value)))
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,266 @@
+"""Checks of a URDF file before its robot is read, so that every fault is named with its line."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from katana450.errors import RobotDescriptionError
+
+XACRO = re.compile(r"^https?://(www\.)?ros\.org/(wiki/)?xacro")
+"""The namespaces of xacro, the macro language that most URDF files are written in."""
+
+UNEXPANDED = re.compile(r"\$[({]")
+"""What begins an expression of xacro."""
+
+COUNTS: Mapping[tuple[str, str], tuple[int, ...]] = {
+    ("origin", "xyz"): (3,),
+    ("origin", "rpy"): (3,),
+    ("axis", "xyz"): (3,),
+    ("box", "size"): (3,),
+    ("mesh", "scale"): (1, 3),
+    ("color", "rgba"): (3, 4),
+    **{("cylinder", name): (1,) for name in ("radius", "length")},
+    **{("sphere", "radius"): (1,), ("mass", "value"): (1,)},
+    **{("limit", name): (1,) for name in ("lower", "upper", "velocity", "effort")},
+    **{("mimic", name): (1,) for name in ("multiplier", "offset")},
+    **{("inertia", name): (1,) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
+}
+"""How many numbers an attribute of an element may have."""
+
+BOUNDS = ("limit", "mass", "inertia")
+"""Elements whose numbers may be infinite."""
+
+COMMAS = ("box", "mesh")
+"""Elements whose numbers may stand between commas."""
+
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "link": ("name",),
+    "joint": ("name", "type"),
+    "parent": ("link",),
+    "child": ("link",),
+    "mimic": ("joint",),
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "mesh": ("filename",),
+}
+"""Attributes that an element must have."""
+
+PARTS = ("link", "joint", "material")
+"""Elements of a robot that are read."""
+
+SHAPES = ("box", "cylinder", "sphere", "mesh")
+
+JOINTS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Check the file at `path`, and turn every failure of what reads it into a sentence.
+
+    Raises RobotDescriptionError that names the file, the line where one is known, and what to do.
+    """
+    _Checks(path).run()
+    try:
+        yield
+    except RobotDescriptionError:
+        raise
+    except Exception as error:
+        raise RobotDescriptionError(
+            f"{path} cannot be read as a robot description, and the reader does not say where it "
+            f"fails ({type(error).__name__}). Test the file with check_urdf, or export it anew."
+        ) from error
+
+
+class _Checks:
+    """The checks of one file; links and joints as they are found, with their lines."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._line: dict[Element, int] = {}
+
+    def run(self) -> None:
+        """Raise RobotDescriptionError for the first fault found."""
+        root = self._parsed()
+        wrong = f"{self._path} is not a robot description:"
+        if root.tag != "robot":
+            raise RobotDescriptionError(
+                f"{wrong} its outermost element is <{root.tag}>, not <robot>."
+            )
+        trace = self._xacro(root)
+        try:
+            self._check_robot(root)
+        except RobotDescriptionError as error:
+            if trace is None:
+                raise
+            # Whatever is wrong, what has not been expanded comes first.
+            raise self._refuse(
+                trace,
+                "this is xacro, a template that has not been expanded. Expand it first, "
+                f"for instance with: xacro {self._path.name} > robot.urdf",
+            ) from error
+
+    def _check_robot(self, root: Element) -> None:
+        if not root.get("name"):
+            raise RobotDescriptionError(
+                f"{self._path} is not a robot description: its <robot> has no name."
+            )
+        for part in root:
+            if part.tag in PARTS:
+                self._check_elements(part)
+        links = self._named(root, "link")
+        joints = self._named(root, "joint")
+        for joint in joints.values():
+            self._check_joint(joint, links)
+        self._refuse_loops(links, joints)
+
+    def _parsed(self) -> Element:
+        if not self._path.is_file():
+            raise RobotDescriptionError(f"There is no robot description at {self._path}.")
+        wrong = f"{self._path} is not a robot description:"
+        builder = TreeBuilder()
+        parser = expat.ParserCreate(namespace_separator="}")
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            self._line[builder.start(tag, attributes)] = parser.CurrentLineNumber
+
+        parser.StartElementHandler = start
+        parser.EndElementHandler = builder.end
+        try:
+            parser.Parse(self._path.read_bytes(), True)
+            return builder.close()
+        except OSError as error:
+            raise RobotDescriptionError(
+                f"{self._path} cannot be opened: {error.strerror}."
+            ) from error
+        except (expat.ExpatError, ValueError, LookupError) as error:
+            raise RobotDescriptionError(f"{wrong} its XML is broken, {error}.") from error
+
+    def _refuse(self, element: Element, what: str) -> RobotDescriptionError:
+        return RobotDescriptionError(f"{self._path}, line {self._line[element]}: {what}")
+
+    def _xacro(self, root: Element) -> Element | None:
+        """The first element that xacro should have replaced, if any is left."""
+        for element in root.iter():
+            values = element.attrib.values()
+            if XACRO.match(element.tag) or any(UNEXPANDED.search(value) for value in values):
+                return element
+        return None
+
+    def _check_elements(self, part: Element) -> None:
+        where = f"<{part.tag}> {part.get('name', 'without a name')!r}"
+        for element in part.iter():
+            tag = element.tag
+            inner = "" if element is part else f"<{tag}> of "
+            for name in NEEDED.get(tag, ()):
+                if not element.get(name):
+                    raise self._refuse(element, f"the {inner}{where} has no {name!r}.")
+            for name, value in element.attrib.items():
+                if UNEXPANDED.search(value):
+                    raise self._refuse(element, f"{name}={value!r} is an expression.")
+                counts = COUNTS.get((tag, name))
+                if counts is not None and not _numbers(tag, value, counts):
+                    wanted = " or ".join(
+                        "a finite number" if n == 1 else f"{n} finite numbers" for n in counts
+                    )
+                    raise self._refuse(
+                        element, f"{name}={value!r} of the {inner}{where} must be {wanted}."
+                    )
+            if tag in ("visual", "collision"):
+                self._check_shape(element, f"the {inner}{where}")
+
+    def _check_shape(self, element: Element, what: str) -> None:
+        geometry = element.find("geometry")
+        if geometry is None or len(geometry) == 0:
+            raise self._refuse(element, f"{what} has no shape in a <geometry>.")
+        if geometry[0].tag not in SHAPES:
+            raise self._refuse(
+                geometry[0],
+                f"the shape of {what} is <{geometry[0].tag}>; known are {', '.join(SHAPES)}.",
+            )
+
+    def _named(self, root: Element, tag: str) -> dict[str, Element]:
+        found: dict[str, Element] = {}
+        for element in root.findall(tag):
+            name = element.attrib["name"]
+            if name in found:
+                raise self._refuse(
+                    element,
+                    f"there is a {tag} {name!r} in line {self._line[found[name]]} already; "
+                    "give each a name of its own.",
+                )
+            found[name] = element
+        return found
+
+    def _check_joint(self, joint: Element, links: Mapping[str, Element]) -> None:
+        name = joint.attrib["name"]
+        if joint.attrib["type"] not in JOINTS:
+            raise self._refuse(
+                joint,
+                f"joint {name!r} is of the type {joint.attrib['type']!r}; "
+                f"known are {', '.join(JOINTS)}.",
+            )
+        for end in ("parent", "child"):
+            element = joint.find(end)
+            if element is None:
+                raise self._refuse(joint, f"joint {name!r} has no <{end}>.")
+            link = element.attrib["link"]
+            if link not in links:
+                raise self._refuse(
+                    element,
+                    f"the {end} of joint {name!r} is {link!r}, and there is no such link. "
+                    f'Add <link name="{link}"/>, or mend the name.',
+                )
+
+    def _refuse_loops(self, links: Mapping[str, Element], joints: Mapping[str, Element]) -> None:
+        above: dict[str, list[Element]] = {name: [] for name in links}
+        parent: dict[str, str] = {}
+        for joint in joints.values():
+            upper, lower = (joint.find(end) for end in ("parent", "child"))
+            if upper is not None and lower is not None:
+                above[lower.attrib["link"]].append(joint)
+                parent[lower.attrib["link"]] = upper.attrib["link"]
+        tree = "Closed loops of joints cannot be solved: cut it, so that every link has one parent."
+        for link, held in above.items():
+            if len(held) > 1:
+                names = ", ".join(joint.attrib["name"] for joint in held)
+                raise self._refuse(
+                    held[1], f"link {link!r} is the child of {len(held)} joints ({names}). {tree}"
+                )
+        for link in links:
+            passed = {link}
+            name: str | None = parent.get(link)
+            while name is not None and name not in passed:
+                passed.add(name)
+                name = parent.get(name)
+            if name is not None:
+                joint = above[name][0]
+                raise self._refuse(
+                    joint, f"link {name!r} hangs on itself, by joint {joint.get('name')!r}. {tree}"
+                )
+        if not links:
+            raise RobotDescriptionError(f"{self._path} describes no link.")
+        roots = [name for name in links if name not in parent]
+        if len(roots) != 1:
+            raise RobotDescriptionError(
+                f"{self._path} must have one link that hangs on no other, not {len(roots)} "
+                f"({', '.join(roots)}): every other link must be the child of a joint."
+            )
+
+
+def _numbers(tag: str, text: str, counts: tuple[int, ...]) -> bool:
+    """Whether an attribute of an element `tag` is as many numbers as it may be."""
+    if tag in COMMAS:
+        text = text.replace(",", " ")
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError:
+        return False
+    usable = (lambda x: not math.isnan(x)) if tag in BOUNDS else math.isfinite
+    return len(numbers) in counts and all(map(usable, numbers))

@@ -1,0 +1,104 @@
+"""Cup, basin and table: the things of the paper's second experiment, as their file tells them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from katana450.errors import RobotDescriptionError
+from katana450.resources import PROPS_PATH
+
+Point = tuple[float, float, float]
+
+CUP_AT: Point = (0.34, -0.26, 0.0)
+BASIN_AT: Point = (0.22, 0.36, 0.0)
+"""[m] On the table in the base frame: in reach, and out of the way until wanted."""
+
+
+@dataclass(frozen=True)
+class Vessel:
+    """Something to hold water, about its own axis z, on z = 0; all [m] and [kg].
+
+    mesh: its GLB file. outer_radius: of its widest part. inner_radius: at the rim. floor: its
+    thickness. floor_radius: of the inside over the floor.
+    """
+
+    mesh: Path
+    mass: float
+    inner_radius: float
+    outer_radius: float
+    height: float
+    floor: float
+    floor_radius: float
+
+
+@dataclass(frozen=True)
+class Table:
+    """A board whose upper face is z = 0 of the base frame; x, y: its ends [m]."""
+
+    mesh: Path
+    x: tuple[float, float]
+    y: tuple[float, float]
+    thickness: float
+
+
+@dataclass(frozen=True)
+class Props:
+    """All of them."""
+
+    cup: Vessel
+    basin: Vessel
+    table: Table
+
+
+def load_props(path: Path = PROPS_PATH) -> Props:
+    """Read them; RobotDescriptionError when the file is missing or broken, and how."""
+    try:
+        described = json.loads(path.read_text(encoding="utf-8"))
+        table = described["table"]
+        return Props(
+            cup=_vessel(path, described["cup"]),
+            basin=_vessel(path, described["basin"]),
+            table=Table(
+                _mesh(path, table),
+                _span(table["x"]),
+                _span(table["y"]),
+                _length(table, "thickness"),
+            ),
+        )
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise RobotDescriptionError(f"{path} does not describe the props: {error!r}.") from error
+
+
+def _vessel(path: Path, described: Any) -> Vessel:
+    # A vessel that names none has a straight inside.
+    floor_radius = "floor_radius" if "floor_radius" in described else "inner_radius"
+    lengths = ("mass", "inner_radius", "outer_radius", "height", "floor", floor_radius)
+    vessel = Vessel(_mesh(path, described), *(_length(described, key) for key in lengths))
+    if not (vessel.inner_radius < vessel.outer_radius and vessel.floor < vessel.height):
+        raise ValueError(f"the walls of {vessel.mesh.name} have no thickness")
+    return vessel
+
+
+def _mesh(path: Path, described: Any) -> Path:
+    mesh = path.parent / str(described["mesh"])
+    if not mesh.is_file():
+        raise ValueError(f"there is no mesh {mesh}")
+    return mesh
+
+
+def _length(described: Any, key: str) -> float:
+    value = float(described[key])
+    if not 0.0 < value < math.inf:
+        raise ValueError(f"{key!r} is {value}")
+    return value
+
+
+def _span(ends: Any) -> tuple[float, float]:
+    low, high = (float(end) for end in ends)
+    if not -math.inf < low < high < math.inf:
+        raise ValueError(f"{ends} is no span")
+    return low, high

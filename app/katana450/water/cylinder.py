@@ -1,0 +1,187 @@
+"""How much a tilted cylinder holds below a plane, in closed form, for every tilt.
+
+The cylinder stands on z = 0 of its own frame, open at the top. A plane is given by its ``tilt``
+[rad], from 0 (level) to pi (upside down), between the cylinder's axis and the plane's normal, which
+points out of the water; and by its ``level`` [m], its height along the normal over the middle of
+the floor. Volumes in m^3.
+
+A slice across the axis is a disc that the plane cuts along a chord. The water's part of it has the
+area r^2 (phi - sin phi cos phi), phi being half the angle of its arc; the volume is the mean of
+that over the depth. The mean is worked out from the half angles at floor and rim alone, so one
+formula serves every way the plane can pass: through the wall only, the floor, the rim, or both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from katana450.errors import InputError
+from katana450.tolerances import ROUNDING
+
+ROUNDS = 100
+"""More halvings than a float has bits."""
+
+
+class Arcs(NamedTuple):
+    """Half the angle [rad] of wall that is wet, at the floor and at the rim."""
+
+    floor: float
+    rim: float
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Its inside: radius and depth [m]. Raises InputError unless both are positive numbers."""
+
+    radius: float
+    depth: float
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "depth"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InputError(f"The cylinder's {name} is {value}; give metres above 0.")
+
+    @property
+    def capacity(self) -> float:
+        """What it holds upright [m^3]."""
+        return math.pi * self.radius**2 * self.depth
+
+    def span(self, tilt: float) -> tuple[float, float]:
+        """The levels [m] at which it is empty, and full."""
+        across = self.radius * math.sin(tilt)
+        up = self.depth * math.cos(tilt)
+        return min(up, 0.0) - across, max(up, 0.0) + across
+
+    def lip(self, tilt: float) -> float:
+        """The level [m] of the lowest point of the rim, where water leaves first."""
+        return self.depth * math.cos(tilt) - self.radius * math.sin(tilt)
+
+    def arcs(self, tilt: float, level: float) -> Arcs:
+        """How much of the wall is wet at floor and rim."""
+        across = self.radius * math.sin(tilt)
+        up = self.depth * math.cos(tilt)
+        return Arcs(_half_angle(level, across), _half_angle(level - up, across))
+
+    def volume(self, tilt: float, level: float) -> float:
+        """The volume [m^3] below the plane."""
+        across = self.radius * math.sin(tilt)
+        floor, rim = level, level - self.depth * math.cos(tilt)
+        low, high = min(floor, rim), max(floor, rim)
+        if low >= across:
+            return self.capacity
+        if high <= -across:
+            return 0.0
+        base, top = max(low, -across), min(high, across)
+        cut = _mean_segment(_half_angle(base, across), _half_angle(top, across))
+        if high == low:
+            return self.radius**2 * self.depth * cut
+        # Slices that are wet all over, and those that the plane cuts.
+        share = (math.pi * (high - top) + cut * (top - base)) / (high - low)
+        return self.radius**2 * self.depth * share
+
+    def level(self, tilt: float, volume: float) -> float:
+        """The level [m] below which there is ``volume`` [m^3]: to rounding, by Newton's rule.
+
+        The volume grows with the level at the rate of the surface's area. Steps out of what is
+        known to hold the answer halve that instead.
+        """
+        low, high = self.span(tilt)
+        if volume <= 0.0:
+            return low
+        if volume >= self.capacity:
+            return high
+        level = low + (high - low) * volume / self.capacity
+        for _ in range(ROUNDS):
+            beyond = self.volume(tilt, level) - volume
+            if abs(beyond) <= ROUNDING * self.capacity:
+                break
+            if beyond > 0.0:
+                high = level
+            else:
+                low = level
+            area = self.surface(tilt, level)
+            ahead = level - beyond / area if area > 0.0 else low
+            if not low < ahead < high:
+                ahead = 0.5 * (low + high)
+            if ahead in (level, low, high):
+                break
+            level = ahead
+        return level
+
+    def surface(self, tilt: float, level: float) -> float:
+        """The area [m^2] of the plane inside."""
+        floor, rim = self.arcs(tilt, level)
+        cosine = math.cos(tilt)
+        if abs(cosine) < STEEP:
+            return 2.0 * self.radius * math.sin(floor) * self.depth
+        return self.radius**2 * (_segment(floor) - _segment(rim)) / cosine
+
+    def holds(self, tilt: float) -> float:
+        """The most [m^3] it can hold at ``tilt``: what is below its lip."""
+        return self.volume(tilt, self.lip(tilt)) if math.cos(tilt) > 0.0 else 0.0
+
+    def spills_at(self, volume: float) -> float:
+        """The tilt [rad] from which it no longer holds ``volume`` [m^3].
+
+        Down to half of its content the floor stays covered and the answer is an arc tangent.
+        """
+        rise = self.depth - volume / (math.pi * self.radius**2)
+        if rise <= 0.5 * self.depth:
+            return math.atan2(max(rise, 0.0), self.radius)
+        low, high = math.atan2(0.5 * self.depth, self.radius), 0.5 * math.pi
+        for _ in range(ROUNDS):
+            middle = 0.5 * (low + high)
+            if middle in (low, high):
+                break
+            if self.holds(middle) > volume:
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def margin(self, tilt: float, level: float) -> float:
+        """How far [m] below its lip the plane is, square to the plane; negative above it."""
+        return self.lip(tilt) - level
+
+
+STEEP = 1e-9
+"""Cosine of a tilt at which the plane runs along the axis, but for rounding."""
+
+
+def _half_angle(height: float, across: float) -> float:
+    """Half the wet arc [rad] of the slice whose middle is ``height`` below the plane."""
+    if height >= across:
+        return math.pi
+    if height <= -across:
+        return 0.0
+    return math.acos(-height / across)
+
+
+def _segment(phi: float) -> float:
+    """Area of a segment of the unit disc with half angle ``phi``."""
+    return phi - math.sin(phi) * math.cos(phi)
+
+
+def _mean_segment(a: float, b: float) -> float:
+    """Mean of the segment's area while its height goes evenly from half angle ``a`` to ``b``.
+
+    The integral of phi - sin phi cos phi over the height -cos phi, divided by the way: written by
+    half sum m and half difference d, so that it loses no digits where the ends meet.
+    """
+    m, d = 0.5 * (a + b), 0.5 * abs(b - a)
+    sine, cosine = math.sin(m), math.cos(m)
+    if sine <= 0.0 or d == 0.0:
+        return _segment(m)
+    spread = _one_less_cotangent(d) + math.sin(d) ** 2 * (1.0 - 4.0 / 3.0 * cosine**2)
+    return _segment(m) + cosine / sine * spread
+
+
+def _one_less_cotangent(d: float) -> float:
+    """1 - d cot d, by its series where it is small."""
+    if d > 0.05:
+        return 1.0 - d / math.tan(d)
+    x = d * d
+    return x * (1.0 / 3.0 + x * (1.0 / 45.0 + x * (2.0 / 945.0 + x / 4725.0)))

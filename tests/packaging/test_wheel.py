@@ -1,0 +1,121 @@
+"""The built wheel, installed in a virtual environment of its own, beside files of other people."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser.server import AppServer
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(sysconfig.get_path("purelib"))
+LINE = '{"q": [0, 0, 0, 0, 0]}\n'
+BROKEN = "raise SystemExit('a file of the user was run')\n"
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("wheel")
+    done = subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(out)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    (built,) = out.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the interpreter of a fresh environment with the wheel in it.
+
+    Its dependencies are those of the environment that runs the tests.
+    """
+    home = tmp_path_factory.mktemp("fresh")
+    venv.create(home, with_pip=False)
+    python = home / "bin" / "python"
+    subprocess.run(
+        [sys.executable, "-m", "uv", "pip", "install", "--quiet", "--offline", "--no-deps"]
+        + ["--python", str(python), str(wheel)],
+        check=True,
+        timeout=120,
+    )
+    others = [path for path in HERE.glob("*.pth") if "katana450" not in path.name]
+    lines = [str(HERE), *(path.read_text(encoding="utf-8") for path in others)]
+    (site,) = home.glob("lib/python*/site-packages")
+    (site / "dependencies.pth").write_text("\n".join(lines), encoding="utf-8")
+    # Another distribution that ships a package of this name.
+    (site / "app").mkdir()
+    (site / "app" / "__init__.py").write_text(BROKEN, encoding="utf-8")
+    return python
+
+
+@pytest.fixture(params=["app.py", "app/__init__.py"])
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
+    """Return the folder of a user who has files with our old names, and works there."""
+    for name in (request.param, "static/__init__.py", "robot_description/__init__.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(BROKEN, encoding="utf-8")
+    return tmp_path
+
+
+def run(folder: Path, *command: str | Path, text: str = "") -> str:
+    done = subprocess.run(
+        [str(part) for part in command],
+        cwd=folder,
+        input=text,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": "."},
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_wheel_holds_one_package_with_its_data(wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == {"katana450"}
+    for wanted in ("py.typed", "static/page.js", "robot_description/katana450.urdf"):
+        assert f"katana450/{wanted}" in names
+    for unwanted in ("/cad/", "__pycache__"):
+        assert not [name for name in names if unwanted in name]
+
+
+def test_package_is_imported_from_the_wheel(python: Path, folder: Path) -> None:
+    words = "import katana450; print(katana450.__file__)"
+    imported = Path(run(folder, python, "-c", words).strip())
+    assert imported.is_relative_to(python.parents[1])
+
+
+def test_commands_run_beside_files_of_the_user(python: Path, folder: Path) -> None:
+    for command in ([python.parent / "katana450"], [python, "-m", "katana450"]):
+        assert '"T": [[1.0, ' in run(folder, *command, "fk", text=LINE)
+
+
+def test_server_runs_beside_files_of_the_user(
+    python: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", ".")
+    command = [str(python), "-m", "katana450", "serve", "--port", "{port}"]
+    with AppServer(command, folder=folder) as server:
+        assert server.running
+
+
+@pytest.mark.long
+def test_demo_runs_beside_files_of_the_user(python: Path, folder: Path) -> None:
+    said = run(folder, python.parent / "katana450", "demo", "circle", "--headless")
+    assert "circle" in said.lower()
