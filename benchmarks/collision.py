@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
-from katana450.collision.clearance import advance
-from katana450.collision.shape import half_space
-from katana450.collision.world import World, obstacle
-from katana450.control.state import Status
-from katana450.geometry.arrays import FloatArray
-from katana450.robot.collision import world_of
-from katana450.robot.model import RobotModel, load
+from katana450.arm.control.state import Status
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.model import RobotModel, load
+from katana450.maths.collision.clearance import advance
+from katana450.maths.collision.shape import half_space
+from katana450.maths.collision.world import World, obstacle
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.settings import READY_POSTURE_DEG
 
 TICK = 0.01

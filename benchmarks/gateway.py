@@ -29,15 +29,15 @@ import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
 from benchmarks.start_and_idle import cpu_seconds
-from katana450.gateway.acceptor import Acceptor
-from katana450.gateway.application import application
-from katana450.gateway.budget import Budgets
-from katana450.gateway.door import LOOPBACK_NAMES, Address, Door
-from katana450.gateway.hub import Hub
-from katana450.gateway.listen import listen
-from katana450.gateway.proxy import SUBPROTOCOL, Proxy
-from katana450.view.guard import Guard
-from katana450.view.server import KEY_HEADER, open_server
+from katana450.server.service.budget import Budgets
+from katana450.server.service.hub import Hub
+from katana450.server.viser_bridge.guard import Guard
+from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy
+from katana450.server.viser_bridge.viser_server import KEY_HEADER, open_server
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Door
+from katana450.server.web.listen import listen
+from katana450.server.web.routes import application
 from tests.gateway.client import enter, page_name, websocket
 
 KEY = "known to both halves of this benchmark"

@@ -29,10 +29,10 @@ from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Machine, Row, Tables
 from benchmarks.kinematics_task import FloatArray, Task
-from katana450.geometry import screws
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.robot.model import load
+from katana450.arm.robot.model import load
+from katana450.maths.geometry import screws
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs" / "benchmarks.md"

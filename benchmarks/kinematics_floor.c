@@ -1,4 +1,4 @@
-/* The closed form of app/katana450/kinematics in plain C, as the floor of what the arithmetic costs.
+/* The closed form of app/katana450/maths/kinematics in plain C, as the floor of what the arithmetic costs.
  *
  * theta1 from the tool point, theta3 from the wrist's distance, theta2 from its direction, theta4
  * and theta5 from the tool's orientation; every angle an atan2, both shoulders and both elbows,

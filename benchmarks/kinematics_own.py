@@ -14,12 +14,12 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray, Task
 from katana450 import tolerances
-from katana450.geometry import screws
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.batch import inverse_batch
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.solver import Solver
+from katana450.maths.geometry import screws
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import inverse_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import Solver
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
 FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")

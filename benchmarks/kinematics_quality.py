@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.kinematics_task import SOLVED_POSITION, SOLVED_ROTATION, FloatArray
-from katana450.geometry import so3
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
+from katana450.maths.geometry import so3
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
 
 _SAME_ANGLES = 1e-6  # rad; answers nearer than this in every joint are one branch
 

@@ -27,11 +27,11 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 
-from katana450.api import answers, requests
+from katana450.arm.runtime.lateness import LOOKED_AT
 from katana450.client import AsyncClient, aconnect
 from katana450.errors import KatanaError
-from katana450.gateway.budget import DEBT, EACH
-from katana450.runtime.lateness import LOOKED_AT
+from katana450.server.api import answers, requests
+from katana450.server.service.budget import DEBT, EACH
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
 

@@ -24,11 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from katana450.geometry.arrays import FloatArray
-from katana450.motion.limiter import Limiter, Limits, Motion
-from katana450.motion.pursuit import stream_step
-from katana450.motion.stream import Stream
-from katana450.robot.model import load
+from katana450.arm.robot.model import load
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.motion.pursuit import stream_step
+from katana450.maths.motion.stream import Stream
 
 TICK = 0.01
 

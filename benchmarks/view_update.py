@@ -19,21 +19,21 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from katana450.control import commands as cmd
-from katana450.control.commands import Command
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.drivers.simulated import SimulatedDriver
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.robot.collision import standing_around, world_of
-from katana450.robot.model import RobotModel, load
-from katana450.robot.props import load_props
-from katana450.runtime.clock import Clock
-from katana450.runtime.loop import ControlLoop
-from katana450.runtime.mailbox import Mailbox
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import Command
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.collision import standing_around, world_of
+from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.props import load_props
+from katana450.arm.runtime.clock import Clock
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.server.view.view import View
 from katana450.settings import Settings
-from katana450.view.view import View
 
 TICKS = 600
 EVERY = 3

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from katana450.api import answers, requests, schema
+from katana450.server.api import answers, requests, schema
 
 PAGE = Path(__file__).with_name("api.md")
 
@@ -52,7 +52,8 @@ what else the state says is old, and `GET /health` answers with status 503.
 ## From Python
 
 ```python
-from katana450.api import answers, requests
+from katana450.server.api import answers
+from katana450.server.api import requests
 from katana450.client import connect
 
 with connect("http://127.0.0.1:8080", name="My script") as arm:

@@ -12,11 +12,11 @@ import imageio.v3 as imageio
 import numpy as np
 from numpy.typing import NDArray
 
-from katana450.api import answers, requests
 from katana450.client import Client, connect
-from katana450.programs.circle import CircleDemo
-from katana450.programs.pour import PourDemo
-from katana450.view.cameras import FOV, LOOKS, Preset
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.pour import PourDemo
+from katana450.server.api import answers, requests
+from katana450.server.view.cameras import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
 from tests.browser.server import AppServer

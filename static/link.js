@@ -1,6 +1,6 @@
 // The page's line to the gateway, in a worker, where a busy page and a hidden tab do not slow it.
 "use strict";
-const BEAT = 100; // ms; app/katana450/control/lease.py counts on it
+const BEAT = 100; // ms; app/katana450/arm/control/lease.py counts on it
 const AGAIN = 400; // ms
 const GIVE_UP = 3000; // ms for a connection to open, or of silence on one that is open
 const AHEAD = 3; // states asked for and not yet come: a slow line is asked less often

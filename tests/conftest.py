@@ -8,9 +8,9 @@ import signal
 import numpy as np
 import pytest
 
-from katana450.control.arm import Arm
-from katana450.control.session import Session
-from katana450.robot.model import RobotModel, load
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.session import Session
+from katana450.arm.robot.model import RobotModel, load
 from katana450.settings import Settings
 
 LONG = "KATANA450_LONG" in os.environ

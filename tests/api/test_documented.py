@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from docs.api import PAGE, page
-from katana450.api import answers, requests, schema
+from katana450.server.api import answers, requests, schema
 
 
 def test_the_page_is_what_the_shapes_say() -> None:

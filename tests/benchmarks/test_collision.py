@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.collision import DRIVES, RawMeshes, main, tick_rows, world_on_table
-from katana450.robot.model import RobotModel
+from katana450.arm.robot.model import RobotModel
 
 
 def test_it_prints_both_tables(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,8 +18,8 @@ from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Tables
 from benchmarks.kinematics_task import SOLVED_POSITION, Task
 from benchmarks.kinematics_worker import SOLVERS
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import inverse
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
 
 POSES = 12
 HERE = Path(sys.executable)

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.control.state import Status
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.robot.model import RobotModel
+from katana450.arm.control.state import Status
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.server.view.view import GHOST_COLOURS
 from katana450.settings import Settings
-from katana450.view.view import GHOST_COLOURS
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from katana450.arm.robot.model import RobotModel
 from katana450.cli.main import main
-from katana450.exchange.reachability_file import load_map
-from katana450.kinematics.forward import forward
-from katana450.kinematics.velocity import limit_distances, singular_values
-from katana450.robot.model import RobotModel
+from katana450.extensions.export.reachability_file import load_map
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.velocity import limit_distances, singular_values
+from katana450.server.view.reachability import Cut
+from katana450.server.view.texts import READINGS, room
 from katana450.settings import Settings
-from katana450.view.reachability import Cut
-from katana450.view.texts import READINGS, room
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer, ServerError

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.api import answers
+from katana450.arm.robot.model import RobotModel
 from katana450.client import Client, connect
-from katana450.geometry.arrays import FloatArray
-from katana450.robot.model import RobotModel
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.api import answers
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page
 
-from katana450.control.lease import Role
-from katana450.gateway.access import AccessFile
+from katana450.arm.control.lease import Role
+from katana450.arm.robot.model import RobotModel
 from katana450.resources import STATIC
-from katana450.robot.model import RobotModel
+from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage

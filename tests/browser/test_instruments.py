@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from katana450.api import answers, requests
 from katana450.client import connect
+from katana450.server.api import answers, requests
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.robot.model import RobotModel
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.server.view.cameras import AHEAD, LOOKS, Preset
+from katana450.server.view.room import DARK, LIGHT
 from katana450.settings import Settings
-from katana450.view.cameras import AHEAD, LOOKS, Preset
-from katana450.view.room import DARK, LIGHT
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from katana450.api import answers
 from katana450.client import Client, connect
-from katana450.programs.script import parse
+from katana450.extensions.programs.script import parse
+from katana450.server.api import answers
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.control.state import Status
-from katana450.geometry.arrays import FloatArray
-from katana450.view.room import DARK
+from katana450.arm.control.state import Status
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.view.room import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

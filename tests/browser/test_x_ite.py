@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Route
 
-from katana450.exchange.mechanism import Mechanism, camera
-from katana450.exchange.urdf_mechanism import load_mechanism
-from katana450.exchange.vrml import vrml_files
+from katana450.arm.robot.mechanism import Mechanism, camera
+from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.extensions.export.vrml import vrml_files
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -15,13 +15,13 @@ import distributed
 import numpy as np
 import pytest
 
+from katana450.arm.robot.model import RobotModel
 from katana450.cli import cluster
 from katana450.cli.main import main
 from katana450.errors import ConfigurationError
-from katana450.robot.model import RobotModel
-from katana450.workspace import map as map_module
-from katana450.workspace.map import Survey
-from katana450.workspace.reachability import Reachability
+from katana450.extensions.reachability import map as map_module
+from katana450.extensions.reachability.map import Survey
+from katana450.extensions.reachability.reachability import Reachability
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKERS = 2

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from katana450.kinematics.forward import forward
-from katana450.programs.circle import CircleDemo
-from katana450.programs.script import parse
-from katana450.robot.model import load
+from katana450.arm.robot.model import load
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.script import parse
+from katana450.maths.kinematics.forward import forward
 
 pytestmark = pytest.mark.long
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from katana450.arm.robot.model import RobotModel
 from katana450.cli.main import main
-from katana450.geometry import so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.robot.model import RobotModel
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = json.loads((ROOT / "tests" / "golden" / "fk_reference.json").read_text(encoding="utf-8"))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.collision.shape import half_space
-from katana450.collision.world import World, obstacle
-from katana450.geometry.arrays import FloatArray
-from katana450.robot.collision import world_of
-from katana450.robot.model import RobotModel
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.collision.shape import half_space
+from katana450.maths.collision.world import World, obstacle
+from katana450.maths.geometry.arrays import FloatArray
 
 
 @pytest.fixture(scope="session")

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from katana450.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
-from katana450.collision.linkage import Linkage, Mover
-from katana450.collision.shape import box, cylinder
-from katana450.collision.world import Part, World, obstacle
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
-from katana450.robot.model import RobotModel
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
+from katana450.maths.collision.linkage import Linkage, Mover
+from katana450.maths.collision.shape import box, cylinder
+from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks together

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import yourdfpy
 
-from katana450.collision.linkage import GROUND
-from katana450.collision.world import World
-from katana450.geometry.arrays import FloatArray
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.collision.linkage import GROUND
+from katana450.maths.collision.world import World
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from katana450.robot.model import RobotModel
 
 
 def test_every_part_is_where_the_description_has_it(

@@ -8,11 +8,11 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.collision.outer import MOST, THINNEST, Outer, outer
-from katana450.collision.shape import hull
 from katana450.errors import InputError
-from katana450.geometry import so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.collision.outer import MOST, THINNEST, Outer, outer
+from katana450.maths.collision.shape import hull
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 
 
 def check_holds(found: Outer, points: FloatArray) -> None:

@@ -6,13 +6,13 @@ from itertools import combinations, product
 
 import numpy as np
 
-from katana450.collision.clearance import STOP
-from katana450.collision.linkage import Linkage, Mover
-from katana450.collision.pairs import pairs_that_meet
-from katana450.collision.shape import box
-from katana450.collision.world import Part, World, obstacle
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.linkage import Linkage, Mover
+from katana450.maths.collision.pairs import pairs_that_meet
+from katana450.maths.collision.shape import box
+from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -7,12 +7,12 @@ from itertools import product
 import numpy as np
 import pytest
 
-from katana450.collision.linkage import Linkage, Mover
-from katana450.collision.shape import Shape, box, cylinder, half_space, hull
-from katana450.collision.world import Part, World, obstacle
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.collision.linkage import Linkage, Mover
+from katana450.maths.collision.shape import Shape, box, cylinder, half_space, hull
+from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
 
 CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 

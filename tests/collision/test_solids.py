@@ -7,8 +7,8 @@ import functools
 import numpy as np
 from manifold3d import Manifold
 
-from katana450.collision.world import World
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.collision.world import World
+from katana450.maths.geometry.arrays import FloatArray
 from robot_description.cad.build import PARTS
 from robot_description.cad.hulls import whole
 

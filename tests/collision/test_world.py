@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.collision.world import World
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.collision.world import World
+from katana450.maths.geometry.arrays import FloatArray
 
 
 def test_the_nearest_pair_is_the_nearest_of_all(world: World, postures: FloatArray) -> None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.collision.shape import cylinder, half_space
-from katana450.collision.world import World, obstacle
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.geometry import se3
-from katana450.robot.collision import world_of
-from katana450.robot.model import RobotModel
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.collision.shape import cylinder, half_space
+from katana450.maths.collision.world import World, obstacle
+from katana450.maths.geometry import se3
 
 
 @pytest.fixture

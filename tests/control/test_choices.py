@@ -7,17 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.choices import choices
-from katana450.control.session import Session
-from katana450.control.state import JointTarget, PoseTarget, Reason, State, Status, ToolTarget
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import BRANCHES, Branch, branch_of
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.reading import Reading
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.choices import choices
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import JointTarget, PoseTarget, Reason, State, Status, ToolTarget
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.reading import Reading
 
 TICK = 0.01
 SPLIT = np.array([0.4353, 0.0, 0.0323])

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
+from katana450.arm.control import commands as cmd
 from katana450.errors import InputError
 
 NAN = math.nan

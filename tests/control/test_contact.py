@@ -7,12 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from katana450.collision.clearance import STOP
-from katana450.collision.world import World
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.state import JointTarget, Reason, State, Status
-from katana450.geometry.arrays import FloatArray
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import JointTarget, Reason, State, Status
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.world import World
+from katana450.maths.geometry.arrays import FloatArray
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m

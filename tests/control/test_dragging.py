@@ -12,20 +12,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import NO_GRIPPER, Arm
-from katana450.control.choices import wish
-from katana450.control.session import Session
-from katana450.control.state import Reason, State, Status, ToolTarget
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.branch import Branch
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.projection import POSITION_WORTH_TELLING
-from katana450.kinematics.reading import Reading
-from katana450.robot.model import load
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import NO_GRIPPER, Arm
+from katana450.arm.control.choices import wish
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State, Status, ToolTarget
+from katana450.arm.robot.model import load
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
+from katana450.maths.kinematics.reading import Reading
 from tests.kinematics.family import random_member, random_pose
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

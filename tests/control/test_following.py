@@ -10,24 +10,24 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from katana450.collision.clearance import STOP
-from katana450.collision.world import World
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.plans import path_to, plan_along, plan_to
-from katana450.control.session import TOOL_SPEED, Session
-from katana450.control.state import JointTarget, Reason, State, Status
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.plans import path_to, plan_along, plan_to
+from katana450.arm.control.session import TOOL_SPEED, Session
+from katana450.arm.control.state import JointTarget, Reason, State, Status
 from katana450.errors import BlockedError, InputError
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import branch_of
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.tool import ToolTarget
-from katana450.planning.curve import Linear, ToolArc, ToolLine
-from katana450.planning.jet import Jet
-from katana450.planning.path import joint_derivatives
-from katana450.planning.plan import Plan
-from katana450.planning.tool_path import ToolPath
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.world import World
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Linear, ToolArc, ToolLine
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.path import joint_derivatives
+from katana450.maths.planning.plan import Plan
+from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 
 TICK = 0.01

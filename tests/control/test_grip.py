@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.grip import touching
-from katana450.control.plans import plan_along, plan_to
-from katana450.control.session import Session
-from katana450.control.state import Reason, State
-from katana450.control.things import MOST, Form, Thing
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.grip import touching
+from katana450.arm.control.plans import plan_along, plan_to
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, State
+from katana450.arm.control.things import MOST, Form, Thing
+from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.tool import ToolTarget
-from katana450.planning.curve import ToolLine
-from katana450.planning.tool_path import ToolPath
-from katana450.robot.collision import hand_of, table, things_of, world_of
-from katana450.robot.model import RobotModel
-from katana450.robot.props import load_props
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import ToolLine
+from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 
 OPEN = 0.3

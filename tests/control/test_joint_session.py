@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.control import commands as cmd
-from katana450.control.joint_session import JointSession
-from katana450.control.joints import Joints
-from katana450.control.looks import Choice, Trait
-from katana450.control.session import LONGEST_STEP
-from katana450.control.state import Reason, State, Status
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.joint_session import JointSession
+from katana450.arm.control.joints import Joints
+from katana450.arm.control.looks import Choice, Trait
+from katana450.arm.control.session import LONGEST_STEP
+from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import InputError
 
 DT = 0.01

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.control.lease import LOST_AFTER, Lease, Person, Role
+from katana450.arm.control.lease import LOST_AFTER, Lease, Person, Role
 from katana450.errors import LeaseError
 
 ANNA = Person("a", "Anna", Role.OPERATOR)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.ledger import Entry, news
-from katana450.control.session import Session
-from katana450.control.state import Finding, Reason, State, Status
-from katana450.view.texts import REASONS, STATUS, sentence
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.ledger import Entry, news
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.server.view.texts import REASONS, STATUS, sentence
 
 TICK = 0.01
 

@@ -12,14 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.control import commands as cmd
-from katana450.control import solid
-from katana450.control.arrangement import PAINT, look_of
-from katana450.control.looks import AS_MADE, MOST, Choice, Look, Looks, Trait
-from katana450.control.session import Session
-from katana450.control.things import Form, Thing
+from katana450.arm.control import commands as cmd
+from katana450.arm.control import solid
+from katana450.arm.control.arrangement import PAINT, look_of
+from katana450.arm.control.looks import AS_MADE, MOST, Choice, Look, Looks, Trait
+from katana450.arm.control.session import Session
+from katana450.arm.control.things import Form, Thing
 from katana450.errors import InputError
-from katana450.geometry import so3
+from katana450.maths.geometry import so3
 
 shares = st.floats(0.0, 1.0)
 changes = st.one_of(

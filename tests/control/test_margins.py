@@ -7,13 +7,13 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from katana450.control.margins import margins
-from katana450.control.session import Session
-from katana450.kinematics.forward import jacobian_body
-from katana450.kinematics.velocity import characteristic_length
-from katana450.robot.collision import hand_of, table, things_of, world_of
-from katana450.robot.model import RobotModel
-from katana450.robot.props import load_props
+from katana450.arm.control.margins import margins
+from katana450.arm.control.session import Session
+from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
+from katana450.maths.kinematics.forward import jacobian_body
+from katana450.maths.kinematics.velocity import characteristic_length
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.state import Dragging, Jogging, State, ToolTarget
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.motion.stream import Stream
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Dragging, Jogging, State, ToolTarget
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.motion.stream import Stream
 
 TICK = 0.01
 

@@ -8,16 +8,16 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.session import TOOL_SPEED, Session
-from katana450.control.state import JointTarget, Reason, State, Status
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import TOOL_SPEED, Session
+from katana450.arm.control.state import JointTarget, Reason, State, Status
 from katana450.errors import InputError
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward, jacobian_body
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.velocity import JogFrame
-from katana450.motion.limiter import Limiter, Motion
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, jacobian_body
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.limiter import Limiter, Motion
 
 TICK = 0.01
 FAR = np.array([2.0, -0.4, 0.6, 0.8, -1.5])

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.control.things import Thing
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Thing
+from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.water import around_of
 from katana450.errors import InputError
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
-from katana450.robot.collision import hand_of, table, things_of, world_of
-from katana450.robot.model import RobotModel
-from katana450.robot.props import load_props
-from katana450.robot.water import around_of
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import ML, counted
 from katana450.settings import Settings
-from katana450.water.units import ML, counted
 
 FULL = counted(200.0 * ML)
 

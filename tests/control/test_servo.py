@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.commands import JOG_TIME
-from katana450.control.session import Session
-from katana450.control.state import State
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.commands import JOG_TIME
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray
 
 DT = 0.01
 

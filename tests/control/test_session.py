@@ -8,16 +8,16 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.session import LONGEST_STEP, Session
-from katana450.control.state import JointTarget, PoseTarget, Reason, State, Status
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.session import LONGEST_STEP, Session
+from katana450.arm.control.state import JointTarget, PoseTarget, Reason, State, Status
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import branch_of
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
 
 TICK = 0.01
 

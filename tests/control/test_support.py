@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.cli.assembly import described
-from katana450.control import commands as cmd
-from katana450.control.support import check_carried, check_mounted, is_loose
-from katana450.control.things import Form, Mount, Surroundings, Thing
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.support import check_carried, check_mounted, is_loose
+from katana450.arm.control.things import Form, Mount, Surroundings, Thing
+from katana450.assembly.robot_session import described
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.around import Table
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from katana450.water.around import Table
 
 TABLE = Table((-0.25, 0.75), (-0.7, 0.7), -0.025)
 

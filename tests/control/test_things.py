@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.cli.assembly import described
-from katana450.collision.clearance import STOP
-from katana450.collision.outer import outer
-from katana450.control import commands as cmd
-from katana450.control.room import free_place, girth
-from katana450.control.session import Session
-from katana450.control.solid import Look, Solid
-from katana450.control.state import Reason, State
-from katana450.control.things import MOST, Form, Mount, Thing, same
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.room import free_place, girth
+from katana450.arm.control.session import Session
+from katana450.arm.control.solid import Look, Solid
+from katana450.arm.control.state import Reason, State
+from katana450.arm.control.things import MOST, Form, Mount, Thing, same
+from katana450.assembly.robot_session import described
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.outer import outer
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import MILLILITRE
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from katana450.water.units import MILLILITRE
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.plans import plan_to
-from katana450.control.session import TOOL_SPEED, Session
-from katana450.control.state import State
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import jacobian_body
-from katana450.kinematics.velocity import tool_speed, tool_speed_bound
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.session import TOOL_SPEED, Session
+from katana450.arm.control.state import State
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import jacobian_body
+from katana450.maths.kinematics.velocity import tool_speed, tool_speed_bound
 
 TICK = 0.01
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.control.arm import Arm
-from katana450.drivers.simulated import SimulatedDriver
+from katana450.arm.control.arm import Arm
+from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.errors import InputError
 
 START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"

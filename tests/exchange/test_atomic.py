@@ -7,8 +7,8 @@ from typing import BinaryIO
 
 import pytest
 
+from katana450.atomic import check_writable, write_files
 from katana450.errors import InputError
-from katana450.exchange.atomic import check_writable, write_files
 
 
 def good(file: BinaryIO) -> None:

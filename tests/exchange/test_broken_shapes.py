@@ -22,8 +22,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.exchange.reading import bind
-from katana450.exchange.shape_file import (
+from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.importers.reading import bind
+from katana450.extensions.importers.shape_file import (
     LARGEST,
     MEMORY,
     SECONDS,
@@ -33,8 +34,7 @@ from katana450.exchange.shape_file import (
     read_shape,
     read_shape_guarded,
 )
-from katana450.exchange.surface import MOST_TRIANGLES
-from katana450.exchange.vrml_text import HEADER
+from katana450.extensions.importers.surface import MOST_TRIANGLES
 
 FOREIGN = Path(__file__).parent / "foreign"
 
@@ -442,8 +442,8 @@ def test_hostile_files_end_in_words_in_time(make: Callable[[], bytes], format: F
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems count no address space")
 def test_a_reading_that_wants_more_memory_than_it_may_ends() -> None:
-    assert bind.__module__ == "katana450.exchange.reading"
-    words = "from katana450.exchange.reading import bind; bind(); bytearray({} << 20)"
+    assert bind.__module__ == "katana450.extensions.importers.reading"
+    words = "from katana450.extensions.importers.reading import bind; bind(); bytearray({} << 20)"
     for mebibytes, ends in ((2048, 1), (64, 0)):
         done = subprocess.run(
             [sys.executable, "-c", words.format(mebibytes)],

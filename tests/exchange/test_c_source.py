@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.exchange.c_source import c_files
-from katana450.exchange.mechanism import Mechanism, camera
-from katana450.geometry import so3
+from katana450.arm.robot.mechanism import Mechanism, camera
+from katana450.extensions.export.c_source import c_files
+from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from katana450.exchange.c_source import c_files
-from katana450.exchange.mechanism import Mechanism
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.extensions.export.c_source import c_files
 from tests.exchange.conftest import GANTRY_POSE
 from tests.exchange.tools import needs, run
 

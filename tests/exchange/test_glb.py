@@ -14,10 +14,10 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.exchange.glb import glb_files
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.trajectory_file import load_motion
-from katana450.geometry import so3
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.trajectory_file import load_motion
+from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.tools import needs, run

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.cli.assembly import Described, Jointed, recognised
-from katana450.control import commands as cmd
+from katana450.arm.control import commands as cmd
+from katana450.arm.robot.machine import load_machine
+from katana450.assembly.robot_session import Described, Jointed, recognised
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.exchange.c_source import c_files
-from katana450.exchange.glb import glb_files
-from katana450.exchange.machine import load_machine
-from katana450.exchange.urdf_package import package_files
-from katana450.exchange.vrml import vrml_files
-from katana450.exchange.vrml_text import read_world
+from katana450.extensions.export.c_source import c_files
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.urdf_package import package_files
+from katana450.extensions.export.vrml import vrml_files
+from katana450.extensions.export.vrml_text import read_world
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree

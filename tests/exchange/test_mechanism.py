@@ -10,10 +10,10 @@ import pytest
 import trimesh
 import yourdfpy
 
+from katana450.arm.robot.mechanism import FIELD_OF_VIEW, Mechanism, camera
+from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.exchange.mechanism import FIELD_OF_VIEW, Mechanism, camera
-from katana450.exchange.names import distinct
-from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.extensions.export.names import distinct
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, POSES
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.exchange.polygons import cut
-from katana450.geometry import so3
-from katana450.geometry.arrays import FloatArray
+from katana450.extensions.importers.polygons import cut
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 
 
 def areas(points: FloatArray, normal: FloatArray) -> FloatArray:

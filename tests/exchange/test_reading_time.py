@@ -10,11 +10,11 @@ import resource
 import numpy as np
 import pytest
 
-from katana450.exchange import shape_file
-from katana450.exchange.meshes import read_mesh
-from katana450.exchange.shape_file import SECONDS
-from katana450.exchange.surface import MOST_TRIANGLES
-from katana450.geometry.arrays import FloatArray
+from katana450.extensions.importers import shape_file
+from katana450.extensions.importers.meshes import read_mesh
+from katana450.extensions.importers.shape_file import SECONDS
+from katana450.extensions.importers.surface import MOST_TRIANGLES
+from katana450.maths.geometry.arrays import FloatArray
 
 OURS = 1.0
 """[s] That may be left to the process that people talk to."""

@@ -14,22 +14,22 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.control.solid import Look, Solid
-from katana450.control.things import Form, Thing
+from katana450.arm.control.solid import Look, Solid
+from katana450.arm.control.things import Form, Thing
 from katana450.errors import InputError
-from katana450.exchange import scene_file
-from katana450.exchange.meshes import Mesh, Meshes, read_mesh
-from katana450.exchange.scene_file import (
+from katana450.extensions.importers import scene_file
+from katana450.extensions.importers.meshes import Mesh, Meshes, read_mesh
+from katana450.extensions.importers.scene_file import (
     StoredScene,
     read_scene_folder,
     read_scene_zip,
     scene_zip,
 )
-from katana450.exchange.shape_file import Format, Up
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray, frozen
-from katana450.scene.scene import MeshFile, Scene
-from katana450.scene.text import parsed, written
+from katana450.extensions.importers.shape_file import Format, Up
+from katana450.extensions.scene.scene import MeshFile, Scene
+from katana450.extensions.scene.text import parsed, written
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
 
 T_PALM_TOOL = frozen(se3.from_rotation_translation(so3.exp((0.1, 0.2, 0.3)), (0.01, -0.02, 0.15)))
 NAMES = st.text(

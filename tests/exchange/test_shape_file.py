@@ -14,15 +14,16 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 from trimesh.exchange.gltf import export_gltf
 
-from katana450.collision.outer import outer
-from katana450.control import things
-from katana450.control.things import Form, Thing
+from katana450.arm.control import things
+from katana450.arm.control.things import Form, Thing
+from katana450.arm.robot.mechanism import Mechanism
 from katana450.errors import InputError
-from katana450.exchange import shape_file
-from katana450.exchange.glb import glb_files
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.meshes import read_mesh
-from katana450.exchange.shape_file import (
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.vrml import world_of
+from katana450.extensions.export.vrml_text import world_text
+from katana450.extensions.importers import shape_file
+from katana450.extensions.importers.meshes import read_mesh
+from katana450.extensions.importers.shape_file import (
     LARGEST,
     LONGEST_NAME,
     SMALLEST,
@@ -33,9 +34,8 @@ from katana450.exchange.shape_file import (
     read_shape_guarded,
     thing_name,
 )
-from katana450.exchange.vrml import world_of
-from katana450.exchange.vrml_text import world_text
-from katana450.geometry import se3, so3
+from katana450.maths.collision.outer import outer
+from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.solids import Numbers, is_closed, sides, triangles, volume

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from katana450.arm.robot.mechanism import Mechanism
 from katana450.errors import InputError
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.trajectory_file import WIDEST_TURN, load_motion
+from katana450.extensions.export.trajectory_file import WIDEST_TURN, load_motion
 
 TABLE = {
     "t": [1.0, 2.0, 2.5],

@@ -20,10 +20,10 @@ import pytest
 import trimesh
 import yourdfpy
 
+from katana450.arm.robot.mechanism import Mechanism
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.urdf_package import Maintainer, package_files
+from katana450.extensions.export.urdf_package import Maintainer, package_files
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, POSES
 from tests.exchange.tools import needs_pybullet, pybullet, run

@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 
+from katana450.arm.robot.mechanism import Mechanism, camera
 from katana450.errors import InputError
-from katana450.exchange.mechanism import Mechanism, camera
-from katana450.exchange.trajectory_file import load_motion
-from katana450.exchange.vrml import DIGITS, part_world, vrml_files, world_of
-from katana450.exchange.vrml_node import (
+from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.vrml import DIGITS, part_world, vrml_files, world_of
+from katana450.extensions.export.vrml_node import (
     FIELDS,
     KEYWORDS,
     LISTS,
@@ -27,8 +27,8 @@ from katana450.exchange.vrml_node import (
     Value,
     World,
 )
-from katana450.exchange.vrml_text import HEADER, read_world, world_text
-from katana450.geometry import se3, so3
+from katana450.extensions.export.vrml_text import HEADER, read_world, world_text
+from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.exchange.shape_file import Format, ShapeFile, Up, read_shape
-from katana450.exchange.vrml_text import HEADER
-from katana450.geometry import so3
+from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.importers.shape_file import Format, ShapeFile, Up, read_shape
+from katana450.maths.geometry import so3
 from tests.exchange.solids import is_closed, sides, volume
 
 PRISM = 16.0 * np.sin(np.pi / 16.0)

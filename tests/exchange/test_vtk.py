@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.exchange.glb import glb_files
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.trajectory_file import Motion, load_motion
-from katana450.exchange.vrml import vrml_files, world_of
-from katana450.exchange.vrml_names import Names
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.trajectory_file import Motion, load_motion
+from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.export.vrml_names import Names
 from tests.exchange.conftest import GANTRY_POSE
 from tests.exchange.tools import VTK, run, vtk_folder
 

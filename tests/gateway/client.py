@@ -19,7 +19,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from katana450.control.lease import BEAT
+from katana450.arm.control.lease import BEAT
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from katana450.api import requests
 from katana450.client import Client, connect
+from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
 
 

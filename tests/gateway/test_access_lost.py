@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from katana450.control.lease import Role
-from katana450.gateway.access import AccessFile
+from katana450.arm.control.lease import Role
+from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import ask, enter
 

@@ -15,17 +15,17 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from katana450.api import answers, requests, schema
-from katana450.api.fields import Matrix4
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.weight import loads_of
 from katana450.cli.main import main
 from katana450.client import AsyncClient, Client, RefusedError, aconnect, connect
 from katana450.client.files import LostError
-from katana450.kinematics.forward import forward
-from katana450.kinematics.reading import Reading
-from katana450.kinematics.statics import holding_torques
-from katana450.kinematics.velocity import limit_distances
-from katana450.robot.model import RobotModel
-from katana450.robot.weight import loads_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.statics import holding_torques
+from katana450.maths.kinematics.velocity import limit_distances
+from katana450.server.api import answers, requests, schema
+from katana450.server.api.fields import Matrix4
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask, websocket
 from tests.gateway.lines import Lines, post, speaking

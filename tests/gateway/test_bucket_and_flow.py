@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.gateway.bucket import Bucket
-from katana450.gateway.flow import LONGEST, MOST, OVERDUE, Flow
+from katana450.server.viser_bridge.flow import LONGEST, MOST, OVERDUE, Flow
+from katana450.server.web.token_bucket import Bucket
 
 
 def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from katana450.errors import InputError
-from katana450.gateway.budget import CROWD, DEBT, EACH, FIXED, Budget, Budgets, BusyError
+from katana450.server.service.budget import CROWD, DEBT, EACH, FIXED, Budget, Budgets, BusyError
 
 
 class Clocks:

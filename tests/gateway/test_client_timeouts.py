@@ -9,9 +9,9 @@ import msgspec
 import pytest
 from websockets.asyncio.server import ServerConnection, serve
 
-from katana450.api import answers, requests
 from katana450.client import AsyncClient, aconnect, asynchronous
 from katana450.client.files import LostError
+from katana450.server.api import answers, requests
 
 BOUND = 5.0
 """[s] Far longer than the timeouts that are set here."""

@@ -6,13 +6,13 @@ import asyncio
 import time
 from itertools import pairwise
 
-from katana450.control.lease import Role
-from katana450.gateway.budget import Budgets
-from katana450.gateway.conversation import FAREWELL, GoneError
-from katana450.gateway.door import Visitor
-from katana450.gateway.hub import Hub
-from katana450.gateway.liveness import Arrival
-from katana450.gateway.program import Program
+from katana450.arm.control.lease import Role
+from katana450.server.service.budget import Budgets
+from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.hub import Hub
+from katana450.server.web.authenticator import Visitor
+from katana450.server.web.channel import FAREWELL, GoneError
+from katana450.server.web.program_socket import Program
 
 ASKED = 200
 

@@ -8,19 +8,19 @@ from unittest.mock import Mock
 
 import pytest
 
-from katana450.api import answers, requests
-from katana450.control.choices import Choice
-from katana450.control.lease import Role
-from katana450.control.state import State
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.lease import Role
+from katana450.arm.control.state import State
+from katana450.arm.runtime.board import Snapshot
 from katana450.errors import InputError
-from katana450.gateway import derived
-from katana450.gateway.arm import Arm
-from katana450.gateway.budget import Budgets
-from katana450.gateway.derived import once
-from katana450.gateway.desk import Desk
-from katana450.gateway.door import Visitor
-from katana450.gateway.hub import Hub
-from katana450.runtime.board import Snapshot
+from katana450.server.api import answers, requests
+from katana450.server.service import derived
+from katana450.server.service.budget import Budgets
+from katana450.server.service.derived import once
+from katana450.server.service.dispatcher import Desk
+from katana450.server.service.hub import Hub
+from katana450.server.service.interfaces import Arm
+from katana450.server.web.authenticator import Visitor
 
 
 def _snapshot() -> Snapshot:

@@ -20,11 +20,11 @@ import pytest
 from itsdangerous import URLSafeSerializer
 from websockets.exceptions import ConnectionClosed
 
+from katana450.arm.control.lease import Role
 from katana450.cli.main import main
-from katana450.control.lease import Role
 from katana450.errors import ConfigurationError, InputError
-from katana450.gateway.access import SALT, AccessFile
-from katana450.gateway.door import Address, Door, public_origin
+from katana450.server.web.access_links import SALT, AccessFile
+from katana450.server.web.authenticator import Address, Door, public_origin
 from tests.browser.server import APP, ROOT, AppServer, free_port
 from tests.gateway.client import ask, controlling, enter, opened
 

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from katana450.api import answers, requests
 from katana450.client import connect
+from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer, free_port
 from tests.gateway.client import ask, controlling
 from tests.gateway.lines import speaking
@@ -33,7 +33,7 @@ REPORTED = 0.5
 FATAL = """
 import sys
 from katana450.cli.main import main
-from katana450.runtime.loop import ControlLoop
+from katana450.arm.runtime.loop import ControlLoop
 tick = ControlLoop.tick
 def fatal(loop):
     tick(loop)

@@ -15,8 +15,8 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from katana450.api import answers, requests
 from katana450.client import connect as connect_program
+from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.gateway.client import (
     SUBPROTOCOL,

@@ -20,8 +20,8 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from katana450.gateway.firewall import LARGEST
-from katana450.gateway.proxy import BROWSERS, BROWSERS_EACH
+from katana450.server.viser_bridge.message_filter import LARGEST
+from katana450.server.viser_bridge.proxy import BROWSERS, BROWSERS_EACH
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, BARE_APP, AppServer
 from tests.gateway.client import (

@@ -8,29 +8,29 @@ from typing import Any
 
 import pytest
 
-from katana450.api.fields import Rates
-from katana450.control import commands as cmd
-from katana450.control.choices import Choice
-from katana450.control.lease import LOST_AFTER, Lease, Role
-from katana450.control.ledger import Entry
-from katana450.control.margins import Margins
-from katana450.control.pouring import Pouring
-from katana450.control.session import Session
-from katana450.control.state import Finding, Halt, Reason, State
-from katana450.control.things import Surroundings
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.lease import LOST_AFTER, Lease, Role
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.margins import Margins
+from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Halt, Reason, State
+from katana450.arm.control.things import Surroundings
+from katana450.arm.robot.machine import Machine
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.lateness import Lateness
 from katana450.errors import LeaseError
-from katana450.exchange.machine import Machine
-from katana450.gateway import tell
-from katana450.gateway.door import Visitor
-from katana450.gateway.hub import TICK, Hub, Window, key_of
-from katana450.gateway.liveness import Heartbeat
-from katana450.gateway.nodes import Nodes
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.velocity import JogFrame
-from katana450.programs.bench import Rig
-from katana450.robot.model import RobotModel
-from katana450.runtime.board import Snapshot
-from katana450.runtime.lateness import Lateness
+from katana450.extensions.programs.bench import Rig
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.server.api.fields import Rates
+from katana450.server.service import serialize as tell
+from katana450.server.service.heartbeats import Heartbeat
+from katana450.server.service.hub import TICK, Hub, Window, key_of
+from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.web.authenticator import Visitor
 from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.api import answers, requests
 from katana450.client import Client, connect
 from katana450.client.files import LostError
 from katana450.errors import KatanaError
+from katana450.server.api import answers, requests
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
 
 pytestmark = pytest.mark.skipif(

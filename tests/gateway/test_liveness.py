@@ -9,11 +9,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from katana450.control.session import Session
-from katana450.gateway import status
-from katana450.gateway.halting import Stopped
-from katana450.gateway.hub import TICK
-from katana450.gateway.liveness import Arrival, Heartbeat
+from katana450.arm.control.session import Session
+from katana450.server.service import status
+from katana450.server.service.heartbeats import Arrival, Heartbeat
+from katana450.server.service.hub import TICK
+from katana450.server.service.stop_state import Stopped
 from katana450.settings import Settings
 from tests.gateway.test_hub import PAGES, Table, moves
 

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from katana450.cli.log_lines import LineFormatter, printable
+from katana450.assembly.log_lines import LineFormatter, printable
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import ask, websocket
 from tests.gateway.lines import Lines

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.api import answers, requests
+from katana450.arm.robot.machine import Machine, load_machine
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
-from katana450.exchange.machine import Machine, load_machine
+from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer
 from tests.exchange.trees import tree
 from tests.gateway.client import ask, opened

@@ -13,24 +13,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.api import answers, requests
-from katana450.cli.assembly import described
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.looks import Trait
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Form, Thing
+from katana450.arm.robot.bare import bare
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.assembly.robot_session import described
 from katana450.client import Client, RefusedError, connect
-from katana450.control import commands as cmd
-from katana450.control.looks import Trait
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.control.things import Form, Thing
 from katana450.errors import InputError
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.urdf_mechanism import load_mechanism
-from katana450.exchange.vrml import world_of
-from katana450.exchange.vrml_node import FIELDS
-from katana450.gateway.nodes import Body, Nodes, body_of
-from katana450.geometry import so3
+from katana450.extensions.export.vrml import world_of
+from katana450.extensions.export.vrml_node import FIELDS
+from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
-from katana450.robot.bare import bare
-from katana450.robot.model import RobotModel
+from katana450.server.api import answers, requests
+from katana450.server.service.vrml_nodes import Body, Nodes, body_of
 from katana450.settings import Settings
 from tests.browser.server import AppServer
 from tests.exchange.conftest import GANTRY

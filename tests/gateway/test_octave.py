@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.tool import ToolTarget
-from katana450.robot.model import RobotModel
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer
 from tests.gateway import octave
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from katana450.api import answers, requests
-from katana450.api.fields import Order
 from katana450.client import Client, RefusedError, connect
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Order
 from tests.browser.server import AppServer
 from tests.gateway.client import opened
 from tests.gateway.lines import post, speaking

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.api.fields import Order
-from katana450.control import commands as cmd
-from katana450.control.lease import Role
-from katana450.control.session import Session
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
+from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
-from katana450.gateway.hub import Window
-from katana450.programs.bench import Rig
-from katana450.programs.order import PATIENCE
+from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.order import PATIENCE
+from katana450.server.api.fields import Order
+from katana450.server.service.hub import Window
 from tests.gateway.test_hub import PAGES, Table
 
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"

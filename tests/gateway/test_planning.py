@@ -11,18 +11,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.api.fields import Order
-from katana450.control import commands as cmd
-from katana450.control.lease import Role
-from katana450.control.session import Session
-from katana450.control.things import Form, Thing
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
+from katana450.arm.control.session import Session
+from katana450.arm.control.things import Form, Thing
 from katana450.errors import LeaseError
-from katana450.gateway import planning, status
-from katana450.gateway.hub import Window
-from katana450.geometry import se3
-from katana450.planning.checkpoint import checkpoint
-from katana450.programs.layout import TIMING, PlanningStage
-from katana450.programs.program import compiled
+from katana450.extensions.programs.layout import TIMING, PlanningStage
+from katana450.extensions.programs.program import compiled
+from katana450.maths.geometry import se3
+from katana450.maths.planning.checkpoint import checkpoint
+from katana450.server.api.fields import Order
+from katana450.server.service import program_planning as planning
+from katana450.server.service import status
+from katana450.server.service.hub import Window
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_performer import SCRIPT, Staged
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.api import answers, requests
-from katana450.api.fields import Order
 from katana450.client import Client, RefusedError, connect
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Order
 from tests.browser.server import AppServer
 
 pytestmark = pytest.mark.long

@@ -14,20 +14,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.api import answers, requests
-from katana450.api.fields import Matrix4
-from katana450.cli.assembly import described
-from katana450.cli.furnishing import furnished
+from katana450.arm.control.lease import Role
+from katana450.arm.robot.model import RobotModel
+from katana450.assembly.initial_scene import furnished
+from katana450.assembly.robot_session import described
 from katana450.client import Client, RefusedError, connect
-from katana450.control.lease import Role
 from katana450.errors import InputError
-from katana450.exchange.scene_file import SCENE
-from katana450.exchange.shape_file import MOST_BYTES
-from katana450.gateway.access import AccessFile
-from katana450.gateway.uploads import AT_ONCE
-from katana450.kinematics.forward import forward
+from katana450.extensions.importers.scene_file import SCENE
+from katana450.extensions.importers.shape_file import MOST_BYTES
+from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
-from katana450.robot.model import RobotModel
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Matrix4
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.uploads import AT_ONCE
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.gateway import client

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray
 
 repeatable = settings(max_examples=80, derandomize=True, deadline=None, database=None)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.geometry.arrays import finite_array, frozen
+from katana450.maths.geometry.arrays import finite_array, frozen
 
 
 def test_finite_array_copies_and_converts() -> None:

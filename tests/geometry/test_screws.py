@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 
 from katana450.errors import InputError
-from katana450.geometry import screws, se3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry import screws, se3
+from katana450.maths.geometry.arrays import FloatArray
 from tests.geometry.strategies import angles, directions, points, repeatable, twists
 
 

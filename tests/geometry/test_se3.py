@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
 from tests.geometry.strategies import points, repeatable, rotation_vectors, twists
 
 

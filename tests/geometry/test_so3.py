@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.geometry import so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 
 ROUNDING = 4e-15

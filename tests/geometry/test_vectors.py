@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 
-from katana450.geometry import so3, vectors
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry import so3, vectors
+from katana450.maths.geometry.arrays import FloatArray
 from tests.geometry.strategies import angles, directions, points, repeatable
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import Branch
-from katana450.kinematics.chain import Chain
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
 
 Mask = npt.NDArray[np.bool_]
 

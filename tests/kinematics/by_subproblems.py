@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.geometry import screws, se3
-from katana450.geometry.arrays import FloatArray
-from katana450.geometry.vectors import Vector, add, dot, norm, rotate, scale, sub, vector
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.subproblems import subproblem1, subproblem3, subproblem4
+from katana450.maths.geometry import screws, se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.vectors import Vector, add, dot, norm, rotate, scale, sub, vector
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.subproblems import subproblem1, subproblem3, subproblem4
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 Line = tuple[Vector, Vector]

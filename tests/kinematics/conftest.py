@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.geometry import screws
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.chain import Chain
+from katana450.maths.geometry import screws
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
 
 L1, L2 = 0.190, 0.139
 TOOL_LENGTHS = {"tcp": 0.3028, "flange": 0.1883}

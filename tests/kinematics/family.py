@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.geometry import screws, se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.chain import Chain
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
 
 
 @dataclass(frozen=True)

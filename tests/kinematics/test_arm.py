@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from katana450.errors import RobotDescriptionError
-from katana450.geometry import screws, se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import inverse
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
 from tests.kinematics.family import random_member
 
 

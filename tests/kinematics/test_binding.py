@@ -9,15 +9,15 @@ import os
 import numpy as np
 import pytest
 
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.branch import Branch
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.projection import Projection, project
-from katana450.kinematics.reading import Reading
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.reading import Reading
 from tests.kinematics.conftest import katana
 from tests.kinematics.family import Offsets, member, random_member
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.kinematics.branch import BRANCHES, Branch, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import joint_frames
+from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import joint_frames
 
 
 def test_there_are_four_and_text_names_them() -> None:

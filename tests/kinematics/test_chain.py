@@ -8,8 +8,8 @@ import numpy.typing as npt
 import pytest
 
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.chain import Chain
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
 
 
 def test_arrays_are_copies_that_cannot_be_written(chain: Chain) -> None:

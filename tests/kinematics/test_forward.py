@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward, jacobian_body, jacobian_space, joint_frames
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space, joint_frames
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "fk_reference.json"
 

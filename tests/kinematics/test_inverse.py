@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.batch import inverse_batch
-from katana450.kinematics.branch import BRANCHES, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import Solution, inverse
-from katana450.kinematics.orientation import PlaneOrientation
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import inverse_batch
+from katana450.maths.kinematics.branch import BRANCHES, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import Solution, inverse
+from katana450.maths.kinematics.orientation import PlaneOrientation
 
 POSES = 2000
 # [m] and [rad]: double precision over half a metre leaves about 1e-16.

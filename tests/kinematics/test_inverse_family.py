@@ -9,14 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from katana450.geometry import screws, se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.branch import BRANCHES, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import Solution, inverse
-from katana450.kinematics.solver import Solver
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import BRANCHES, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import Solution, inverse
+from katana450.maths.kinematics.solver import Solver
 from tests.kinematics.by_subproblems import matched, same, solve
 from tests.kinematics.family import Offsets, member, random_member, random_offsets, random_pose
 

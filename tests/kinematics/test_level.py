@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.level import nearest_at_pitch
-from katana450.kinematics.planar import Interval, PlanarArm, Posture
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.level import nearest_at_pitch
+from katana450.maths.kinematics.planar import Interval, PlanarArm, Posture
 from tests.kinematics.conftest import L1, L2, TOOL_LENGTHS
 
 L3 = TOOL_LENGTHS["tcp"]

@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.batch import forward_batch
-from katana450.kinematics.branch import BRANCHES, Branch
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.projection import Projection, project
-from katana450.kinematics.reading import Reading
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.reading import Reading
 from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member
 

@@ -9,14 +9,14 @@ import numpy.typing as npt
 import pytest
 
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import BRANCHES, Branch, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.orientation import PlaneOrientation
-from katana450.kinematics.projection import Projection, project
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.orientation import PlaneOrientation
+from katana450.maths.kinematics.projection import Projection, project
 
 FRONT_UP = Branch("front", "up")
 REACH = 0.6318

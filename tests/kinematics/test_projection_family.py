@@ -8,15 +8,15 @@ import math
 import numpy as np
 import pytest
 
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.batch import forward_batch, inverse_batch
-from katana450.kinematics.branch import BRANCHES, Branch, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.projection import project
-from katana450.kinematics.tool import ToolTarget
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import forward_batch, inverse_batch
+from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.kinematics.family import Offsets, member, random_member, random_pose
 
 

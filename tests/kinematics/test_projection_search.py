@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import BRANCHES, Branch
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.projection import project
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.projection import project
 from tests.kinematics.brute_force import NearestPoint, least_rotation
 from tests.kinematics.test_projection import FRONT_UP, assert_on_branch, targets
 

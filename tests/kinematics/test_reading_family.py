@@ -7,17 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.batch import forward_batch, inverse_batch
-from katana450.kinematics.branch import BRANCHES, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.projection import Projection, project
-from katana450.kinematics.reading import Reading
-from katana450.kinematics.tool import ToolTarget
-from katana450.kinematics.tracker import leap
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import forward_batch, inverse_batch
+from katana450.maths.kinematics.branch import BRANCHES, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tracker import leap
 from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member, nearest_point, random_targets
 

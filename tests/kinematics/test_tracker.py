@@ -10,16 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics import tracker
-from katana450.kinematics.branch import Branch, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll
-from katana450.kinematics.reading import Reading
-from katana450.kinematics.stance import Stance, nearest_stance
-from katana450.kinematics.tool import ToolTarget
-from katana450.kinematics.tracker import EFFORT, HOP, Tracked, Tracking, leap, track
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics import tracker
+from katana450.maths.kinematics.branch import Branch, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.stance import Stance, nearest_stance
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tracker import EFFORT, HOP, Tracked, Tracking, leap, track
 from tests.kinematics.family import random_member, random_pose
 
 READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.geometry import screws, se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.badge import Badge, branches
-from katana450.kinematics.branch import BRANCHES
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward, jacobian_body
-from katana450.kinematics.velocity import (
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.badge import Badge, branches
+from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, jacobian_body
+from katana450.maths.kinematics.velocity import (
     WELL_CONDITIONED,
     JogFrame,
     characteristic_length,

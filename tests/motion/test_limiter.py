@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.geometry.arrays import FloatArray
-from katana450.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.motion.limiter import Limiter, Limits, Motion
 
 DT = 0.01
 LIMITS = Limits(

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from katana450.motion.limiter import Limiter, Limits, Motion
-from katana450.motion.pursuit import braked, pursued
-from katana450.motion.stream import Stream
+from katana450.maths.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.motion.pursuit import braked, pursued
+from katana450.maths.motion.stream import Stream
 
 TICK = 0.01
 

@@ -47,8 +47,10 @@ def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     venv.create(home, with_pip=False)
     python = home / "bin" / "python"
     subprocess.run(
-        [sys.executable, "-m", "uv", "pip", "install", "--quiet", "--offline", "--no-deps"]
-        + ["--python", str(python), str(wheel)],
+        [
+            *(sys.executable, "-m", "uv", "pip", "install", "--quiet", "--offline", "--no-deps"),
+            *("--python", str(python), str(wheel)),
+        ],
         check=True,
         timeout=120,
     )

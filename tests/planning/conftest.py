@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from katana450.control.arm import Arm
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.branch import Branch, branch_of
-from katana450.kinematics.tool import ToolTarget
-from katana450.planning.curve import Linear, ToolArc, ToolLine, ToolLines
-from katana450.planning.joint_path import JointPath
-from katana450.planning.path import Path
-from katana450.planning.tool_path import ToolPath
+from katana450.arm.control.arm import Arm
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch, branch_of
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Linear, ToolArc, ToolLine, ToolLines
+from katana450.maths.planning.joint_path import JointPath
+from katana450.maths.planning.path import Path
+from katana450.maths.planning.tool_path import ToolPath
 from katana450.settings import Settings
 
 FRONT_UP = Branch("front", "up")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.planning.jet import Jet, atan2, direction, sin_cos, sqrt
+from katana450.maths.planning.jet import Jet, atan2, direction, sin_cos, sqrt
 
 numbers = st.floats(-2.0, 2.0)
 jets = st.builds(Jet, numbers, numbers, numbers, numbers)

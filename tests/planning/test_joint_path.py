@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.control.arm import Arm
+from katana450.arm.control.arm import Arm
 from katana450.errors import InputError
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.planning.jet import Jet
-from katana450.planning.joint_path import JointPath
-from katana450.planning.path import joint_derivatives, point_derivatives
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.joint_path import JointPath
+from katana450.maths.planning.path import joint_derivatives, point_derivatives
 
 
 def random_vias(arm: Arm, seed: int) -> tuple[FloatArray, FloatArray]:

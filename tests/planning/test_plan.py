@@ -7,23 +7,23 @@ import re
 import numpy as np
 import pytest
 
-from katana450.collision.clearance import STOP
-from katana450.collision.shape import box, half_space
-from katana450.collision.world import World, obstacle
-from katana450.control.arm import Arm
+from katana450.arm.control.arm import Arm
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.model import RobotModel
 from katana450.errors import BlockedError, InputError
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.planning.clearance import Room
-from katana450.planning.joint_path import JointPath
-from katana450.planning.path import Path
-from katana450.planning.plan import MARGIN, check_clear, plan
-from katana450.planning.sampling import way_round
-from katana450.planning.scaling import Bounds
-from katana450.planning.sweep import Sweep
-from katana450.robot.collision import world_of
-from katana450.robot.model import RobotModel
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.shape import box, half_space
+from katana450.maths.collision.world import World, obstacle
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.planning.clearance import Room
+from katana450.maths.planning.joint_path import JointPath
+from katana450.maths.planning.path import Path
+from katana450.maths.planning.plan import MARGIN, check_clear, plan
+from katana450.maths.planning.sampling import way_round
+from katana450.maths.planning.scaling import Bounds
+from katana450.maths.planning.sweep import Sweep
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_a_search_that_finds_nothing_ends(
     """Past a wall without end the arm would have to reach over itself."""
     wall_at = se3.from_rotation_translation(np.eye(3), (1.15, 0.0, 0.0))
     endless = bare.with_obstacles([obstacle("wall", wall_at, box((2.0, 0.01, 6.0)))])
-    monkeypatch.setattr("katana450.planning.sampling.EFFORT", 5)
+    monkeypatch.setattr("katana450.maths.planning.sampling.EFFORT", 5)
     path = across(arm, 0.0)
     with pytest.raises(BlockedError, match=r"found in 5 tries from seed 0\. The straight .*wall"):
         way_round(arm.chain, path.start, path.end, endless, 0.0, 0)

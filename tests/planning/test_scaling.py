@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from katana450.control.arm import Arm
+from katana450.arm.control.arm import Arm
 from katana450.errors import InputError
-from katana450.planning.curve import ToolLines
-from katana450.planning.pacing import fastest
-from katana450.planning.path import Path, joint_derivatives, point_derivatives
-from katana450.planning.scaling import Bounds, Scaling, gone_after, rest_to_rest
-from katana450.planning.tool_path import ToolPath
+from katana450.maths.planning.curve import ToolLines
+from katana450.maths.planning.pacing import fastest
+from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
+from katana450.maths.planning.scaling import Bounds, Scaling, gone_after, rest_to_rest
+from katana450.maths.planning.tool_path import ToolPath
 from tests.planning.time_optimal import least_time
 
 NAMES = ("circle", "line", "pour", "lines", "joints", "via")

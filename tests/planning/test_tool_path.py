@@ -11,21 +11,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.control.arm import Arm
+from katana450.arm.control.arm import Arm
 from katana450.errors import InputError
-from katana450.geometry import se3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.branch import BRANCHES, Branch, branch_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.projection import project
-from katana450.kinematics.tool import ToolTarget
-from katana450.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolLines, ToolScrew
-from katana450.planning.jet import Jet
-from katana450.planning.path import Path, joint_derivatives, point_derivatives
-from katana450.planning.pitch import roomiest
-from katana450.planning.tool_path import ToolPath
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Linear, Swing, ToolArc, ToolLine, ToolLines, ToolScrew
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
+from katana450.maths.planning.pitch import roomiest
+from katana450.maths.planning.tool_path import ToolPath
 from tests.kinematics.family import random_member
 
 FRONT_UP = Branch("front", "up")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.geometry.arrays import FloatArray
-from katana450.planning.path import Path, joint_derivatives, point_derivatives
-from katana450.planning.scaling import Bounds
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
+from katana450.maths.planning.scaling import Bounds
 
 
 def least_time(path: Path, bounds: Bounds, places: int = 400) -> float:

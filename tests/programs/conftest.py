@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.cli.assembly import described
-from katana450.control.state import State
-from katana450.geometry.arrays import FloatArray
-from katana450.programs import runner
-from katana450.programs.bench import Rig
-from katana450.programs.program import Program
-from katana450.programs.runner import Phase, Run
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.assembly.robot_session import described
+from katana450.extensions.programs import runner
+from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from katana450.robot.model import RobotModel
 from katana450.settings import Settings
 
 TICK = 0.01

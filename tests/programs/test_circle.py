@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.kinematics.forward import forward
-from katana450.programs.circle import CircleDemo
-from katana450.programs.program import compiled
-from katana450.programs.runner import Phase
-from katana450.programs.script import parse
-from katana450.robot.model import RobotModel
+from katana450.arm.robot.model import RobotModel
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.script import parse
+from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import Stage
 
 

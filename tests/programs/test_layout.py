@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from katana450.errors import CancelledError, InputError
-from katana450.planning.checkpoint import checked_by
-from katana450.programs.bench import Bench, Draft
-from katana450.programs.layout import FINDING, TIMING, Layout, PlanningStage
-from katana450.programs.order import Putting
-from katana450.programs.pour import PourDemo
-from katana450.programs.program import compiled
-from katana450.programs.script import parse
-from katana450.programs.source import ScriptError
+from katana450.extensions.programs.bench import Bench, Draft
+from katana450.extensions.programs.layout import FINDING, TIMING, Layout, PlanningStage
+from katana450.extensions.programs.order import Putting
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.planning.checkpoint import checked_by
 from tests.programs.conftest import Stage
 
 NEAR = (165.0, 286.0)

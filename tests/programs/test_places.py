@@ -8,10 +8,10 @@ import random
 
 import pytest
 
-from katana450.programs.pour import PourDemo, Spot
-from katana450.programs.program import compiled
-from katana450.programs.script import parse
-from katana450.programs.source import ScriptError
+from katana450.extensions.programs.pour import PourDemo, Spot
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
 from tests.programs.conftest import Stage
 from tests.programs.test_pour import check_poured
 

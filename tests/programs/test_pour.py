@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import katana450.programs
-from katana450.programs.order import Go
-from katana450.programs.pour import PourDemo, Spot
-from katana450.programs.pouring import POURING
-from katana450.programs.program import Program, compiled
-from katana450.programs.runner import Phase
-from katana450.programs.script import parse
-from katana450.programs.source import ScriptError
-from katana450.water.score import score
+import katana450.extensions.programs
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.pour import PourDemo, Spot
+from katana450.extensions.programs.pouring import POURING
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.water.score import score
 from tests.programs.conftest import Stage
 
 
@@ -55,7 +55,7 @@ def test_all_of_it_gets_into_the_basin_and_none_on_the_table(stage: Stage) -> No
 
 
 def test_the_script_that_comes_along_is_the_demo() -> None:
-    path = Path(katana450.programs.__file__).parent / "library" / "pour.yaml"
+    path = Path(katana450.extensions.programs.__file__).parent / "library" / "pour.yaml"
     stored, demo = parse(path.read_text(encoding="utf-8")), parse(PourDemo().text)
     assert stored.expected == demo.expected
     assert [repr(a.step) for a in stored.steps] == [repr(b.step) for b in demo.steps]

@@ -9,22 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import katana450.programs
-from katana450.control import commands as cmd
-from katana450.control.state import State
-from katana450.control.things import Form, Thing
-from katana450.kinematics.forward import forward
-from katana450.kinematics.tool import ToolTarget
-from katana450.programs import runner
-from katana450.programs.order import PATIENCE, Go
-from katana450.programs.program import Program, compiled
-from katana450.programs.runner import Phase, Run
-from katana450.programs.script import parse
-from katana450.programs.source import ScriptError
-from katana450.programs.timeline import Timeline
+import katana450.extensions.programs
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Form, Thing
+from katana450.extensions.programs import runner
+from katana450.extensions.programs.order import PATIENCE, Go
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.timeline import Timeline
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.programs.conftest import Stage
 
-LIBRARY = sorted((Path(katana450.programs.__file__).parent / "library").glob("*.yaml"))
+LIBRARY = sorted((Path(katana450.extensions.programs.__file__).parent / "library").glob("*.yaml"))
 
 SHORT = """\
 tool: tcp

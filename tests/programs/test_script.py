@@ -11,11 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.programs.moves import Move
-from katana450.programs.script import MOST_STEPS, parse
-from katana450.programs.source import DEEPEST, LARGEST, Problem, ScriptError
-from katana450.programs.steps import STEPS
-from katana450.programs.tool_moves import Circle, Line
+from katana450.extensions.programs.moves import Move
+from katana450.extensions.programs.script import MOST_STEPS, parse
+from katana450.extensions.programs.source import DEEPEST, LARGEST, Problem, ScriptError
+from katana450.extensions.programs.steps import STEPS
+from katana450.extensions.programs.tool_moves import Circle, Line
 
 GOOD = """\
 name: Try

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from katana450.errors import ConfigurationError, InputError
-from katana450.exchange.scripts import LIBRARY, Scripts
-from katana450.programs.order import Go
-from katana450.programs.program import compiled
-from katana450.programs.script import parse
-from katana450.programs.taught import taught
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import LIBRARY, Scripts
+from katana450.extensions.programs.taught import taught
 from tests.programs.conftest import Stage
 
 

@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import pytest
 
-from katana450.cli.assembly import described
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.render.stage import Stage
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
+from katana450.assembly.robot_session import described
+from katana450.extensions.render.stage import Stage
 from katana450.resources import URDF_PATH
-from katana450.robot.model import RobotModel
-from katana450.robot.props import load_props
 from katana450.settings import Settings
 
 

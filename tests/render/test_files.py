@@ -17,9 +17,9 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 
 from katana450.errors import ConfigurationError, InputError
-from katana450.render import film, tracer
-from katana450.render.film import write_film
-from katana450.render.png import png
+from katana450.extensions.render import film, tracer
+from katana450.extensions.render.film import write_film
+from katana450.extensions.render.png import png
 
 Pixels = npt.NDArray[np.uint8]
 

@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.control.things import Form, Thing
-from katana450.exchange.mechanism import FIELD_OF_VIEW, Material, Mechanism, Shape, camera
-from katana450.exchange.mechanism import Camera as Viewpoint
-from katana450.exchange.urdf_mechanism import load_mechanism
-from katana450.geometry import se3
-from katana450.render.camera import Camera
-from katana450.render.line import tube
-from katana450.render.picture import Picture, picture
-from katana450.render.png import png
-from katana450.render.scene import Item, Scene
-from katana450.render.sight import FLOOR, NOWHERE, look
-from katana450.render.tracer import Tracer
-from katana450.render.water import CUP
+from katana450.arm.control.things import Form, Thing
+from katana450.arm.robot.mechanism import FIELD_OF_VIEW, Material, Mechanism, Shape, camera
+from katana450.arm.robot.mechanism import Camera as Viewpoint
+from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.extensions.render.camera import Camera
+from katana450.extensions.render.line import tube
+from katana450.extensions.render.picture import Picture, picture
+from katana450.extensions.render.png import png
+from katana450.extensions.render.scene import Item, Scene
+from katana450.extensions.render.sight import FLOOR, NOWHERE, look
+from katana450.extensions.render.tracer import Tracer
+from katana450.extensions.render.water import CUP
+from katana450.maths.geometry import se3
 from katana450.resources import URDF_PATH
-from katana450.view.room import DARK, LIGHT, THEMES
+from katana450.server.view.room import DARK, LIGHT, THEMES
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
 from tests.render.conftest import Workshop

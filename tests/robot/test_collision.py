@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.robot.collision import world_of
-from katana450.robot.model import RobotModel, load
+from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.model import RobotModel, load
 
 ARMS = Path(__file__).resolve().parent / "arms"
 PINCHER = ARMS / "pincherx_150.urdf"

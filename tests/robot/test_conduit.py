@@ -10,13 +10,13 @@ import pytest
 import trimesh
 import yourdfpy
 
+from katana450.arm.robot.conduit import GIVE
+from katana450.arm.robot.model import CONDUITS, RobotModel, load
 from katana450.errors import RobotDescriptionError
-from katana450.geometry import so3
-from katana450.geometry.arrays import FloatArray
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from katana450.robot.conduit import GIVE
-from katana450.robot.model import CONDUITS, RobotModel, load
-from katana450.view.conduit import PROFILE, SIDES, ring
+from katana450.server.view.conduit import PROFILE, SIDES, ring
 
 DENSE = 400
 SPARSE = 40

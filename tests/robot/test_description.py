@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import yourdfpy
 
-from katana450.cli.assembly import recognised
+from katana450.arm.robot.model import load
+from katana450.assembly.robot_session import recognised
 from katana450.errors import RobotDescriptionError
-from katana450.robot.model import load
 from katana450.settings import Settings
 from tests.robot.public_arms import PX150, urdf, written
 

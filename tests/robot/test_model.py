@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from katana450.arm.robot.model import RobotModel, load
 from katana450.errors import RobotDescriptionError
-from katana450.geometry import so3
-from katana450.kinematics.forward import forward
+from katana450.maths.geometry import so3
+from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
-from katana450.robot.model import RobotModel, load
 
 
 def test_the_axes_are_the_papers(model: RobotModel) -> None:

@@ -14,18 +14,18 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.control import commands as cmd
-from katana450.control.session import Session
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.errors import RobotDescriptionError
-from katana450.exchange.urdf_mechanism import load_mechanism
-from katana450.geometry import se3, so3
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.branch import branch_of
-from katana450.kinematics.forward import forward
-from katana450.kinematics.freedoms import pitch_and_roll, pitched_frame
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.projection import project
-from katana450.robot.model import RobotModel, load
+from katana450.maths.geometry import se3, so3
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.projection import project
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 

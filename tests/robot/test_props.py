@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from katana450.arm.robot.collision import standing_around, world_of
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import BASIN_AT, CUP_AT, load_props
 from katana450.errors import RobotDescriptionError
 from katana450.resources import PROPS_PATH
-from katana450.robot.collision import standing_around, world_of
-from katana450.robot.model import RobotModel
-from katana450.robot.props import BASIN_AT, CUP_AT, load_props
 from katana450.settings import Settings
 
 

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.api import answers, requests
-from katana450.cli.assembly import Jointed, recognised
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.model import load
+from katana450.assembly.robot_session import Jointed, recognised
 from katana450.client.client import connect
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.state import Reason
-from katana450.drivers.simulated import SimulatedDriver
 from katana450.errors import RobotDescriptionError
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.projection import project
-from katana450.robot.model import load
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.projection import project
+from katana450.server.api import answers, requests
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.robot.public_arms import (

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.collision.world import World
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.control.things import Form, Thing
-from katana450.geometry import se3
-from katana450.kinematics.forward import forward
-from katana450.robot.collision import hand_of, world_of
-from katana450.robot.model import RobotModel, load
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Form, Thing
+from katana450.arm.robot.collision import hand_of, world_of
+from katana450.arm.robot.model import RobotModel, load
+from katana450.maths.collision.world import World
+from katana450.maths.geometry import se3
+from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
 from tests.robot.public_arms import PX150, urdf
 

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 import pytest
 
+from katana450.arm.robot.bare import bare
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.weight import loads_of
 from katana450.errors import InputError
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import joint_frames
-from katana450.kinematics.statics import GRAVITY, Load, holding_torques
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import joint_frames
+from katana450.maths.kinematics.statics import GRAVITY, Load, holding_torques
 from katana450.resources import URDF_PATH
-from katana450.robot.bare import bare
-from katana450.robot.model import RobotModel
-from katana450.robot.weight import loads_of
 
 
 def energy(model: RobotModel, q: FloatArray) -> float:

@@ -11,15 +11,15 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.session import Session
-from katana450.drivers.simulated import SimulatedDriver
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.session import Session
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.link import ArmEnd, FrontEnd
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
 from katana450.errors import InputError
-from katana450.runtime.clock import MonotonicClock
-from katana450.runtime.link import ArmEnd, FrontEnd
-from katana450.runtime.loop import ControlLoop
-from katana450.runtime.mailbox import Mailbox
 
 SILENCE = 0.3
 

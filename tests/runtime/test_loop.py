@@ -9,16 +9,16 @@ import time
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.arm import Arm
-from katana450.control.session import Session
-from katana450.control.state import Status
-from katana450.drivers.driver import Sent
-from katana450.drivers.simulated import SimulatedDriver
-from katana450.geometry.arrays import FloatArray
-from katana450.runtime.clock import MonotonicClock
-from katana450.runtime.loop import ControlLoop
-from katana450.runtime.mailbox import Mailbox
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Status
+from katana450.arm.drivers.driver import Sent
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.maths.geometry.arrays import FloatArray
 
 RATE = 100.0
 

@@ -7,10 +7,10 @@ import threading
 import numpy as np
 import pytest
 
-from katana450.control import commands as cmd
-from katana450.control.session import Session
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.errors import InputError
-from katana450.runtime.mailbox import CAPACITY, Mailbox
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ import pickle
 import numpy as np
 import pytest
 
-from katana450.control.arm import Arm
-from katana450.control.following import Following
-from katana450.control.plans import plan_to
-from katana450.control.session import Session
-from katana450.control.solid import Solid
-from katana450.planning.plan import Plan
-from katana450.runtime.wire import KEPT_HERE, Names, Plans
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.following import Following
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.session import Session
+from katana450.arm.control.solid import Solid
+from katana450.arm.runtime.wire import KEPT_HERE, Names, Plans
+from katana450.maths.planning.plan import Plan
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from katana450.geometry import so3
-from katana450.geometry.arrays import FloatArray
-from katana450.robot.model import RobotModel
-from katana450.view.cameras import FOV, LOOKS, Preset
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.view.cameras import FOV, LOOKS, Preset
 
 ASPECT = 1.2
 """Width to height of the scene in a window of 1280 by 800 beside the panel."""

@@ -19,8 +19,8 @@ from viser import _messages as wire
 from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from katana450.view import frames
-from katana450.view.server import open_server
+from katana450.server.viser_bridge import frames
+from katana450.server.viser_bridge.viser_server import open_server
 
 
 def visers_own(monkeypatch: pytest.MonkeyPatch) -> Any:

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.control.joint_session import JointSession
-from katana450.control.looks import Looks, Trait
-from katana450.control.state import State
-from katana450.exchange.machine import Machine, load_machine
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.view.looks import PERSONAL
-from katana450.view.machine_nodes import MachineNodes
-from katana450.view.machine_panel import MachinePanel, page
-from katana450.view.paint import PaintNodes
-from katana450.view.programs import STEERING
+from katana450.arm.control.joint_session import JointSession
+from katana450.arm.control.looks import Looks, Trait
+from katana450.arm.control.state import State
+from katana450.arm.robot.machine import Machine, load_machine
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.view.looks import PERSONAL
+from katana450.server.view.machine_nodes import MachineNodes
+from katana450.server.view.machine_panel import MachinePanel, page
+from katana450.server.view.paint import PaintNodes
+from katana450.server.view.programs import STEERING
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.control.choices import Choice
-from katana450.control.commands import Command, SetJoints
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.geometry import so3
-from katana450.robot.conduit import Stretch
-from katana450.robot.model import RobotModel
-from katana450.view.branches import INTERVAL, BranchList
-from katana450.view.conduit import poses
-from katana450.view.controls import Clickable
-from katana450.view.scene import FrameTree
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.commands import Command, SetJoints
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.conduit import Stretch
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry import so3
+from katana450.server.view.branches import INTERVAL, BranchList
+from katana450.server.view.conduit import poses
+from katana450.server.view.controls import Clickable
+from katana450.server.view.scene import FrameTree
 
 
 def test_every_link_is_turned_as_its_joint_is(model: RobotModel, server: viser.ViserServer) -> None:

@@ -7,14 +7,14 @@ from dataclasses import replace
 import pytest
 import viser
 
-from katana450.control.looks import Looks, Trait
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.exchange.urdf_mechanism import load_mechanism
+from katana450.arm.control.looks import Looks, Trait
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.resources import URDF_PATH
-from katana450.robot.model import RobotModel
-from katana450.view.paint import PaintNodes
-from katana450.view.scene import ArmNodes
+from katana450.server.view.paint import PaintNodes
+from katana450.server.view.scene import ArmNodes
 
 
 class Shown:

@@ -8,8 +8,8 @@ import numpy as np
 import viser
 from viser import _messages as wire
 
-from katana450.view.conduit import ring
-from katana450.view.posing import arrange, place, turn
+from katana450.server.view.conduit import ring
+from katana450.server.viser_bridge.posing import arrange, place, turn
 
 TURN = (0.6, 0.0, -0.8, 0.0)
 POINT = (0.1, -0.2, 0.3)

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.api.answers import Progress as Told
-from katana450.api.fields import Order
-from katana450.control.session import Session
-from katana450.exchange.scripts import Scripts
-from katana450.kinematics.forward import forward
-from katana450.programs.bench import Rig
-from katana450.programs.program import Program, compiled
-from katana450.programs.script import parse
-from katana450.programs.timeline import Timeline
-from katana450.robot.model import RobotModel
-from katana450.view.preview import GHOSTS, _poses
-from katana450.view.programs import ProgramsPanel, _page
+from katana450.arm.control.session import Session
+from katana450.arm.robot.model import RobotModel
+from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import Scripts
+from katana450.extensions.programs.timeline import Timeline
+from katana450.maths.kinematics.forward import forward
+from katana450.server.api.answers import Progress as Told
+from katana450.server.api.fields import Order
+from katana450.server.view.preview import GHOSTS, _poses
+from katana450.server.view.programs import ProgramsPanel, _page
 from tests.browser.server import free_port
 
 

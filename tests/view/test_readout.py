@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.control.session import Session
-from katana450.kinematics.velocity import condition_number, limit_distances, manipulability
-from katana450.robot.model import RobotModel
-from katana450.view.controls import ends
-from katana450.view.readout import page
+from katana450.arm.control.session import Session
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.kinematics.velocity import condition_number, limit_distances, manipulability
+from katana450.server.view.controls import ends
+from katana450.server.view.readout import page
 
 
 def test_every_axis_tells_how_far_its_limit_is_and_the_nearest_stands_out(

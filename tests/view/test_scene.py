@@ -7,8 +7,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.robot.model import RobotModel
-from katana450.view.scene import COAT, DETAIL, coarse, surface
+from katana450.arm.robot.model import RobotModel
+from katana450.server.view.scene import COAT, DETAIL, coarse, surface
 
 
 @settings(deadline=None, max_examples=30)

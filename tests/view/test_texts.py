@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.collision.contact import Contact
-from katana450.control.choices import Choice
-from katana450.control.session import Session
-from katana450.control.state import Finding, Reason, State, Status
-from katana450.kinematics.badge import Badge
-from katana450.kinematics.branch import BRANCHES
-from katana450.kinematics.reading import Reading
-from katana450.view.texts import (
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.maths.collision.contact import Contact
+from katana450.maths.kinematics.badge import Badge
+from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.reading import Reading
+from katana450.server.view.texts import (
     AXIS_NAMES,
     BRANCH_HEADINGS,
     READING_HINTS,
@@ -32,7 +32,7 @@ from katana450.view.texts import (
     sentence,
     title,
 )
-from katana450.view.view import GHOST_COLOURS
+from katana450.server.view.view import GHOST_COLOURS
 
 
 @pytest.fixture

@@ -12,18 +12,18 @@ import pytest
 import trimesh
 import viser
 
-from katana450.control import commands as cmd
-from katana450.control.session import Session
-from katana450.control.solid import Look
-from katana450.control.state import Finding, Reason, State
-from katana450.control.things import Form, Surroundings, Thing
-from katana450.exchange.creases import drawn, glb
-from katana450.exchange.meshes import Mesh, Meshes, read_mesh
-from katana450.robot.props import load_props
-from katana450.view.objects import NOTHING, ObjectsPanel
-from katana450.view.things import ThingNodes
-from katana450.view.tint import Tint
-from katana450.water.around import Table
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.solid import Look
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.things import Form, Surroundings, Thing
+from katana450.arm.robot.props import load_props
+from katana450.extensions.importers.creases import drawn, glb
+from katana450.extensions.importers.meshes import Mesh, Meshes, read_mesh
+from katana450.maths.water.around import Table
+from katana450.server.view.objects import NOTHING, ObjectsPanel
+from katana450.server.view.things import ThingNodes
+from katana450.server.view.tint import Tint
 
 PATH = "/things/1"
 

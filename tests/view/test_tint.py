@@ -8,13 +8,13 @@ from typing import Any, cast
 import pytest
 import viser
 
-from katana450.control.session import Session
-from katana450.control.state import Finding, Reason, State
-from katana450.robot.collision import standing_around
-from katana450.robot.model import RobotModel
-from katana450.robot.props import load_props
-from katana450.view.tint import Tint
-from katana450.view.workcell import Workcell
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.robot.collision import standing_around
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
+from katana450.server.view.tint import Tint
+from katana450.server.view.workcell import Workcell
 
 
 @dataclass

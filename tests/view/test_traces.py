@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.control import commands as cmd
-from katana450.control.plans import plan_along
-from katana450.control.session import Session
-from katana450.kinematics.branch import branch_of
-from katana450.kinematics.tool import ToolTarget
-from katana450.planning.curve import Linear, ToolArc
-from katana450.planning.tool_path import ToolPath
-from katana450.robot.model import RobotModel
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.plans import plan_along
+from katana450.arm.control.session import Session
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.kinematics.branch import branch_of
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Linear, ToolArc
+from katana450.maths.planning.tool_path import ToolPath
+from katana450.server.view.traces import BAD, GOOD, WORST, Traces, coloured
 from katana450.settings import Settings
-from katana450.view.traces import BAD, GOOD, WORST, Traces, coloured
 from tests.browser.server import free_port
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.geometry import so3
-from katana450.robot.props import load_props
-from katana450.robot.water import around_of
-from katana450.view.water import WORTH_SENDING, WaterNodes
-from katana450.water.flow import Flow
-from katana450.water.puddle import THICKNESS
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.water import around_of
+from katana450.maths.geometry import so3
+from katana450.maths.water.flow import Flow
+from katana450.maths.water.puddle import THICKNESS
+from katana450.server.view.water import WORTH_SENDING, WaterNodes
 from tests.water.motions import UPRIGHT, over_basin, placed, poured, turned_to
 
 FLOW = Flow(around_of(load_props()))

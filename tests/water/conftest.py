@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from katana450.robot.props import load_props
-from katana450.robot.water import around_of
-from katana450.water.around import Around
-from katana450.water.flow import Flow
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.water import around_of
+from katana450.maths.water.around import Around
+from katana450.maths.water.flow import Flow
 
 
 @pytest.fixture(scope="session")

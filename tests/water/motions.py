@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.water.around import Around
-from katana450.water.flow import Flow, Water
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.around import Around
+from katana450.maths.water.flow import Flow, Water
 
 Step = tuple[FloatArray, FloatArray]
 """The pose of the cup (4, 4) and the acceleration of its middle (3,)."""

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from katana450.arm.robot.props import BASIN_AT, load_props
+from katana450.arm.robot.water import around_of
 from katana450.errors import InputError
-from katana450.robot.props import BASIN_AT, load_props
-from katana450.robot.water import around_of
-from katana450.water.around import Around, Basin
+from katana450.maths.water.around import Around, Basin
 from tests.geometry.strategies import repeatable
 
 radii = st.floats(0.01, 0.3)

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from katana450.control.commands import Command, SetJoint, Stop
-from katana450.control.session import Session
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.forward import forward
-from katana450.robot.model import RobotModel
-from katana450.water.flow import Flow, Water
+from katana450.arm.control.commands import Command, SetJoint, Stop
+from katana450.arm.control.session import Session
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.water.flow import Flow, Water
 
 DT = 0.01
 LEVEL = np.deg2rad((-50.0, -70.0, 100.0, -30.0, 0.0))

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.water.cylinder import Cylinder
+from katana450.maths.water.cylinder import Cylinder
 from tests.geometry.strategies import repeatable
 
 CUP = Cylinder(0.03, 0.087)

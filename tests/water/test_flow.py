@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.geometry.vectors import Vector
-from katana450.water.around import Around, Basin
-from katana450.water.flow import Flow, Water
-from katana450.water.parcel import Parcel
-from katana450.water.slosh import steady_acceleration
-from katana450.water.units import FEMTOLITRE, MILLILITRE, counted
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.vectors import Vector
+from katana450.maths.water.around import Around, Basin
+from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.parcel import Parcel
+from katana450.maths.water.slosh import steady_acceleration
+from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 from tests.water.motions import UPRIGHT, carried, over_basin, placed, poured, turned_to
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.water.around import Around
-from katana450.water.parcel import Ground, Parcel, landing
-from katana450.water.units import GRAVITY
+from katana450.maths.water.around import Around
+from katana450.maths.water.parcel import Ground, Parcel, landing
+from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
 
 speeds = st.floats(-2.0, 2.0)

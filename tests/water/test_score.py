@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from katana450.water.flow import Flow
-from katana450.water.score import Course, score
+from katana450.maths.water.flow import Flow
+from katana450.maths.water.score import Course, score
 from tests.water.motions import UPRIGHT, over_basin, poured, turned_to
 
 

@@ -9,10 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.geometry.arrays import FloatArray
-from katana450.water.cylinder import Cylinder
-from katana450.water.slosh import DAMPING, FIRST_MODE, STILL, Slosh, frequency, steady_acceleration
-from katana450.water.units import GRAVITY
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.slosh import (
+    DAMPING,
+    FIRST_MODE,
+    STILL,
+    Slosh,
+    frequency,
+    steady_acceleration,
+)
+from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
 
 CUP = Cylinder(0.03, 0.087)

@@ -10,12 +10,21 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.geometry.arrays import FloatArray
-from katana450.water.cylinder import Cylinder
-from katana450.water.flow import Flow, Surface
-from katana450.water.parcel import Parcel, landing
-from katana450.water.puddle import THICKNESS
-from katana450.water.surface import BODY_FACES, SIDES, STREAM_FACES, Faces, blob, body, disc, stream
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.flow import Flow, Surface
+from katana450.maths.water.parcel import Parcel, landing
+from katana450.maths.water.puddle import THICKNESS
+from katana450.maths.water.surface import (
+    BODY_FACES,
+    SIDES,
+    STREAM_FACES,
+    Faces,
+    blob,
+    body,
+    disc,
+    stream,
+)
 from tests.geometry.strategies import repeatable
 from tests.water.motions import over_basin, poured, turned_to
 

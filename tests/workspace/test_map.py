@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from katana450.arm.robot.model import RobotModel
 from katana450.errors import InputError
-from katana450.kinematics.forward import forward
-from katana450.robot.model import RobotModel
-from katana450.workspace import map as map_module
-from katana450.workspace.colors import share_colors
-from katana450.workspace.map import Survey
-from katana450.workspace.reachability import Reachability
+from katana450.extensions.reachability import map as map_module
+from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.map import Survey
+from katana450.extensions.reachability.reachability import Reachability
+from katana450.maths.kinematics.forward import forward
 
 
 @pytest.fixture(scope="module")

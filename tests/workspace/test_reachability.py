@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from katana450.arm.robot.model import RobotModel, load
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.geometry import screws, se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.arm import arm_of
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward, joint_frames
-from katana450.kinematics.projection import project
-from katana450.robot.model import RobotModel, load
-from katana450.workspace.reachability import MOST_STEPS, Reachability
+from katana450.extensions.reachability.reachability import MOST_STEPS, Reachability
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, joint_frames
+from katana450.maths.kinematics.projection import project
 from tests.kinematics.family import member, random_offsets
 
 ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from argparse import Namespace
 
-from katana450.control.lease import Role
-from katana450.gateway.access import AccessFile
-from katana450.gateway.door import public_origin
+from katana450.arm.control.lease import Role
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.authenticator import public_origin
 
 
 def access(options: Namespace) -> int:

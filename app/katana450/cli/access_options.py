@@ -6,7 +6,7 @@ import argparse
 import re
 from pathlib import Path
 
-from katana450.control.lease import Role
+from katana450.arm.control.lease import Role
 
 DEFAULT_FILE = Path("access.json")
 DEFAULT_DURATION = "12h"

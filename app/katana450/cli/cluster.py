@@ -19,8 +19,8 @@ import numpy as np
 
 from katana450.cli.version import version
 from katana450.errors import ConfigurationError, installing
-from katana450.workspace.grid import IntArray
-from katana450.workspace.map import Survey
+from katana450.extensions.reachability.grid import IntArray
+from katana450.extensions.reachability.map import Survey
 
 CONNECT_SECONDS = 5.0
 """For the scheduler to answer, and then for a first worker."""

@@ -7,20 +7,20 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
-from katana450.exchange.atomic import write_files, writer_of
-from katana450.exchange.c_source import c_files
-from katana450.exchange.glb import glb_files
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.trajectory_file import Motion, load_motion
-from katana450.exchange.urdf_mechanism import load_mechanism
-from katana450.exchange.urdf_package import (
+from katana450.extensions.export.c_source import c_files
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.trajectory_file import Motion, load_motion
+from katana450.extensions.export.urdf_package import (
     UNSTATED_LICENSE,
     UNSTATED_MAINTAINER,
     Maintainer,
     package_files,
 )
-from katana450.exchange.vrml import vrml_files
+from katana450.extensions.export.vrml import vrml_files
 from katana450.resources import URDF_PATH
 
 MOVES = ("vrml", "glb")

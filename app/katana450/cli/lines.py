@@ -11,18 +11,18 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from katana450.control.choices import met
+from katana450.arm.control.choices import met
+from katana450.arm.robot.collision import standing_around, world_of
+from katana450.arm.robot.model import load
+from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
-from katana450.geometry import se3, so3
-from katana450.geometry.arrays import FloatArray
-from katana450.kinematics.badge import Badge
-from katana450.kinematics.chain import Chain
-from katana450.kinematics.forward import forward
-from katana450.kinematics.inverse import inverse
-from katana450.kinematics.projection import project
-from katana450.robot.collision import standing_around, world_of
-from katana450.robot.model import load
-from katana450.robot.props import load_props
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.badge import Badge
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.projection import project
 
 LONGEST_SHOWN = 40
 """Characters of a wrong value that an error repeats."""

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
-from katana450.api import answers, requests
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, KatanaError
-from katana450.programs.script import Script
+from katana450.extensions.programs.script import Script
+from katana450.server.api import answers, requests
 
 NAME = "Terminal"
 """As which others see who started the program."""

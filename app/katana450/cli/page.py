@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from katana450.atomic import check_writable, write_files, writer_of
 from katana450.cli.performance import chosen
 from katana450.cli.progress import progress
 from katana450.errors import InputError
-from katana450.exchange.atomic import check_writable, write_files, writer_of
-from katana450.view.recording import recorded
+from katana450.server.view.recording import recorded
 
 FPS = 25.0
 """States a second that the page holds; what is in between it leaves out."""

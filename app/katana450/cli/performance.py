@@ -10,25 +10,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.cli.assembly import described
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.assembly.robot_session import described
 from katana450.cli.progress import progress
-from katana450.control.session import Session
-from katana450.control.state import State
-from katana450.drivers.simulated import SimulatedDriver
 from katana450.errors import InputError, KatanaError
-from katana450.exchange.mechanism import Mechanism
-from katana450.exchange.scripts import text_of
-from katana450.exchange.trajectory_file import load_motion
-from katana450.exchange.urdf_mechanism import load_mechanism
-from katana450.programs.bench import Rig
-from katana450.programs.circle import CircleDemo
-from katana450.programs.pour import PourDemo
-from katana450.programs.program import Program, compiled
-from katana450.programs.runner import Phase
-from katana450.programs.script import Script, parse
-from katana450.programs.source import ScriptError
-from katana450.report.trace import Rehearsal
-from katana450.robot.model import RobotModel
+from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.runner import Phase
+from katana450.extensions.programs.script import Script, parse
+from katana450.extensions.programs.script_files import text_of
+from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.report.trace import Rehearsal
 from katana450.settings import Settings
 
 DEMOS = {"circle": CircleDemo, "pour": PourDemo}

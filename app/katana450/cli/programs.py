@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from argparse import Namespace
 
-from katana450.exchange.scripts import text_of
-from katana450.programs.circle import CircleDemo
-from katana450.programs.pour import PourDemo
-from katana450.programs.script import parse
-from katana450.programs.source import ScriptError
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import text_of
+from katana450.extensions.programs.source import ScriptError
 
 
 def run(options: Namespace) -> int:
@@ -35,7 +35,7 @@ def demo(options: Namespace) -> int:
 
 def _run(text: str, source: str, options: Namespace) -> int:
     if options.report is not None:
-        from katana450.report.figures import check_drawable
+        from katana450.extensions.report.figures import check_drawable
 
         check_drawable()
     try:

@@ -6,9 +6,9 @@ import argparse
 import math
 from pathlib import Path
 
-from katana450.control.commands import LEAST_SPEED
-from katana450.programs.circle import CircleDemo
-from katana450.programs.pour import PourDemo
+from katana450.arm.control.commands import LEAST_SPEED
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.pour import PourDemo
 from katana450.resources import URDF_PATH
 
 URL = "http://127.0.0.1:8080"

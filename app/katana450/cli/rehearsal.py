@@ -6,16 +6,16 @@ import sys
 from argparse import Namespace
 from datetime import datetime
 
+from katana450.arm.robot.props import load_props
 from katana450.cli.performance import planned, played
 from katana450.cli.version import version
-from katana450.programs.order import Go
-from katana450.programs.program import Program
-from katana450.programs.script import Script
-from katana450.report.report import Report
-from katana450.report.stages import stage_pictures
-from katana450.robot.props import load_props
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.script import Script
+from katana450.extensions.report.report import Report
+from katana450.extensions.report.stages import stage_pictures
+from katana450.server.view.texts import part
 from katana450.settings import Settings
-from katana450.view.texts import part
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
 

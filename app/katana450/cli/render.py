@@ -16,24 +16,24 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.cli.assembly import described
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
+from katana450.assembly.robot_session import described
+from katana450.atomic import check_writable, write_files, writer_of
 from katana450.cli.performance import Performance, chosen
 from katana450.cli.progress import progress
-from katana450.control.session import Session
-from katana450.control.state import State
 from katana450.errors import InputError
-from katana450.exchange.atomic import check_writable, write_files, writer_of
-from katana450.render.camera import Camera
-from katana450.render.film import check_filmable, write_film
-from katana450.render.picture import MOVING, STILL, picture
-from katana450.render.png import png
-from katana450.render.stage import Stage
-from katana450.render.tracer import check_traceable
-from katana450.robot.model import RobotModel
-from katana450.robot.props import load_props
+from katana450.extensions.render.camera import Camera
+from katana450.extensions.render.film import check_filmable, write_film
+from katana450.extensions.render.picture import MOVING, STILL, picture
+from katana450.extensions.render.png import png
+from katana450.extensions.render.stage import Stage
+from katana450.extensions.render.tracer import check_traceable
+from katana450.server.view.cameras import FOV, Preset, look_from
+from katana450.server.view.room import THEMES, Theme
 from katana450.settings import Settings
-from katana450.view.cameras import FOV, Preset, look_from
-from katana450.view.room import THEMES, Theme
 
 Pixels = npt.NDArray[np.uint8]
 

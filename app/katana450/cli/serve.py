@@ -12,15 +12,15 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from katana450.cli.front import OPEN, READY, Front, Outfit
-from katana450.cli.log_lines import start_log
-from katana450.gateway.listen import HERE, listen
+from katana450.assembly.frontend_process import OPEN, READY, Front, Outfit
+from katana450.assembly.log_lines import start_log
 from katana450.resources import URDF_PATH
+from katana450.server.web.listen import HERE, listen
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
-    from katana450.cli.assembly import Described
-    from katana450.exchange.scene_file import StoredScene
+    from katana450.assembly.robot_session import Described
+    from katana450.extensions.importers.scene_file import StoredScene
 
 AWAKE = 0.2
 """[s] How soon a signal is heeded, and a front that ended."""
@@ -71,7 +71,7 @@ def serve(
     current, arm = Front(outfit), None
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
-        from katana450.cli.assembly import RunningArm, recognised
+        from katana450.assembly.robot_session import RunningArm, recognised
 
         found = recognised(settings, urdf, tool) if robot is None else robot
         arm = RunningArm(settings, found, None if stored is None else stored.scene)
@@ -124,8 +124,8 @@ def _furnished(
     """The robot and what stands around it, where somebody says what."""
     if scene is None and not objects:
         return None, None
-    from katana450.cli.assembly import described
-    from katana450.cli.furnishing import furnished
+    from katana450.assembly.initial_scene import furnished
+    from katana450.assembly.robot_session import described
 
     robot = described(settings, *urdf_and_tool)
     stored, said = furnished(robot, scene, objects)

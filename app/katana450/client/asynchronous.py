@@ -16,9 +16,9 @@ from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from katana450.api import answers, requests
-from katana450.api.fields import ROOT, Id
 from katana450.client.files import LostError, RefusedError, Site
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import ROOT, Id
 
 SOCKET = f"{ROOT}/socket"
 

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
-from katana450.api import answers, requests
 from katana450.client.asynchronous import FOLLOWED, AsyncClient, aconnect
+from katana450.server.api import answers, requests
 
 T = TypeVar("T")
 A = TypeVar("A", bound=answers.Answer)

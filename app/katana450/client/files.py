@@ -9,9 +9,9 @@ from urllib.parse import urlencode
 
 import msgspec
 
-from katana450.api import answers
-from katana450.api.fields import ROOT
 from katana450.errors import KatanaError
+from katana450.server.api import answers
+from katana450.server.api.fields import ROOT
 
 PATIENCE = 60.0
 """[s]"""

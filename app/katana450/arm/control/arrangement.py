@@ -1,0 +1,81 @@
+"""What stands around put elsewhere or taken away, and how it and the links are shown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.arm.control import solid
+from katana450.arm.control.looks import Choice, Look
+from katana450.arm.control.state import State
+from katana450.arm.control.thing_commands import Dress, Shift
+from katana450.arm.control.things import Thing, named
+
+
+def removed(state: State, name: str) -> State:
+    """Without the thing of that name; what is held stays."""
+    things = tuple(each for each in state.things if each.held or each.name != name)
+    return replace(state, things=things)
+
+
+def shifted(state: State, shift: Shift) -> State:
+    """With the thing elsewhere, unless the hand has it."""
+
+    def there(thing: Thing) -> Thing:
+        if thing.name != shift.name or thing.carried:
+            return thing
+        T = np.array(thing.T)
+        if shift.position is not None:
+            T[:3, 3] = shift.position
+        if shift.R is not None:
+            T[:3, :3] = shift.R
+        return replace(thing, T=T)
+
+    return replace(state, things=tuple(map(there, state.things)))
+
+
+def look_of(state: State, name: str) -> Look:
+    """How the link or thing of that name is shown."""
+    thing = named(state.things, name)
+    return state.looks.of(name) if thing is None else _as_link(thing.look)
+
+
+def dressed(state: State, dress: Dress) -> State:
+    """With one trait of a look changed. Things bear theirs themselves."""
+
+    def changed(thing: Thing) -> Thing:
+        if thing.name != dress.name:
+            return thing
+        look = _as_link(thing.look).having(dress.trait, dress.value)
+        return replace(thing, look=_as_thing(look))
+
+    if any(each.name == dress.name for each in state.things):
+        return replace(state, things=tuple(map(changed, state.things)))
+    return replace(state, looks=state.looks.having(dress.name, dress.trait, dress.value))
+
+
+PAINT = (204, 204, 204)
+"""Of a thing that is to be painted when nobody has mixed a colour."""
+
+
+def _as_link(look: solid.Look) -> Look:
+    """A thing's look in the words for a link's."""
+    painted = look.colour is not None or look.opacity < 1.0
+    choice = Choice.HIDDEN if look.hidden else Choice.PAINTED if painted else Choice.MADE
+    if look.colour is None:
+        return Look(choice, None, 1.0 - look.opacity)
+    red, green, blue = (part / 255.0 for part in look.colour)
+    return Look(choice, (red, green, blue), 1.0 - look.opacity)
+
+
+def _as_thing(look: Look) -> solid.Look:
+    """The other way; a thing as it is made has no paint to come back to."""
+    if look.choice is Choice.MADE:
+        return solid.PLAIN
+    colour = None if look.choice is Choice.HIDDEN else PAINT
+    if look.colour is not None:
+        red, green, blue = (round(255.0 * part) for part in look.colour)
+        colour = red, green, blue
+    opacity = max(1.0 - look.transparency, solid.FAINTEST)
+    return solid.Look(colour, opacity, look.choice is Choice.HIDDEN)

@@ -1,0 +1,71 @@
+"""What an arm cannot even be asked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.pouring import CUP, Pouring
+from katana450.arm.control.support import check_carried, is_loose
+from katana450.arm.control.things import Mount, Surroundings, Thing
+from katana450.errors import InputError
+
+NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
+
+
+def check(
+    arm: Arm, pouring: Pouring | None, surroundings: Surroundings, command: cmd.Command
+) -> None:
+    """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
+    n = arm.chain.n
+    match command:
+        case cmd.SetJoint(axis=axis) if axis >= n:
+            raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
+        case cmd.SetAxes(values=values):
+            for axis, value in values:
+                check(arm, pouring, surroundings, cmd.SetJoint(axis, value))
+        case cmd.Together(commands=commands):
+            for each in commands:
+                check(arm, pouring, surroundings, each)
+        case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
+            raise InputError(f"This arm has {n} joints, the command {q.size}.")
+        case cmd.SetTool(name=name):
+            arm.chain_to(name)
+        case cmd.Follow(plan=plan):
+            chains = [segment.path.chain for segment in plan.segments]
+            if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
+                raise InputError("The plan was made for another arm.")
+        case _:
+            _check_things(pouring, surroundings, command)
+
+
+def _check_things(
+    pouring: Pouring | None, surroundings: Surroundings, command: cmd.Command
+) -> None:
+    match command:
+        case cmd.Fill(volume=volume):
+            _check_water(pouring, volume)
+        case cmd.Furnish(things=things, volume=volume):
+            for thing in things:
+                _check_hand(surroundings, thing)
+                if is_loose(thing):
+                    check_carried(surroundings.table, things, thing)
+            if volume is not None:
+                has_cup = any(thing.name == CUP for thing in things)
+                _check_water(pouring if has_cup else None, volume)
+        case cmd.Place(thing=thing):
+            _check_hand(surroundings, thing)
+        case cmd.Attach(to=Mount.HAND) if surroundings.hand is None:
+            raise InputError(NO_HAND)
+
+
+def _check_water(pouring: Pouring | None, volume: float) -> None:
+    if pouring is None:
+        raise InputError("There is no cup to fill.")
+    pouring.check(volume)
+
+
+def _check_hand(surroundings: Surroundings, thing: Thing) -> None:
+    if thing.fixed and surroundings.hand is None:
+        raise InputError(NO_HAND)

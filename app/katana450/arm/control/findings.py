@@ -1,0 +1,104 @@
+"""Why the goal is not what was wished: reasons with numbers, in the order a person needs them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.arm.control.state import Finding, Reason
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.projection import (
+    ANGLE_WORTH_TELLING,
+    POSITION_WORTH_TELLING,
+    Projection,
+)
+from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.tracker import Tracked
+from katana450.maths.kinematics.velocity import followed, limit_distances
+
+HARDLY = 0.05
+"""Share of a jog that does not move the tool to speak of."""
+
+FREELY = 0.9
+"""Share of a jog from which on nothing is missed."""
+
+AT_LIMIT = math.radians(0.5)
+"""A joint so near to its limit holds a jog up."""
+
+
+def of_joints(chain: Chain, q: FloatArray) -> tuple[Finding, ...]:
+    """What clamping ``q`` (n,) [rad] to the limits takes away."""
+    findings = []
+    for axis, (angle, lower, upper) in enumerate(zip(q, chain.lower, chain.upper, strict=True)):
+        # A slider at its end is there through degrees and back, and asks for nothing beyond.
+        if angle < lower - tolerances.LIMIT_SLACK or angle > upper + tolerances.LIMIT_SLACK:
+            limit = float(lower if angle < lower else upper)
+            findings.append(Finding(Reason.AXIS_LIMIT, limit, axis))
+    return tuple(findings)
+
+
+def of_projection(
+    chain: Chain, best: Projection, reading: Reading, *, yaw_was_wished: bool
+) -> tuple[Finding, ...]:
+    """What the nearest feasible pose ``best`` gives up of the wished one."""
+    findings = []
+    in_place = best.position_error <= POSITION_WORTH_TELLING
+    pitch_gave_way, roll_error = best.pitch_error > ANGLE_WORTH_TELLING, best.roll_error
+    if not in_place:
+        kept = reading is Reading.PITCH and not pitch_gave_way
+        reason = Reason.POSITION_CHANGED if kept else Reason.OUT_OF_REACH
+        findings.append(Finding(reason, best.position_error))
+    if yaw_was_wished and best.yaw_error > ANGLE_WORTH_TELLING:
+        findings.append(Finding(Reason.YAW_FIXED, best.yaw_error))
+    elif in_place and not pitch_gave_way:
+        roll_error = max(roll_error, best.rotation_error)
+    if roll_error > ANGLE_WORTH_TELLING:
+        findings.append(Finding(Reason.ROLL_CHANGED, roll_error))
+    if pitch_gave_way and (in_place or reading is Reading.PITCH):
+        findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
+    if findings:
+        if best.axis1:
+            findings.append(Finding(Reason.AXIS_1))
+        if best.reach:
+            findings.append(Finding(Reason.LINKS))
+        for axis in best.limits:
+            q, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
+            findings.append(
+                Finding(Reason.AXIS_LIMIT, float(min(lower, upper, key=lambda b: abs(b - q))), axis)
+            )
+    return tuple(findings)
+
+
+def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
+    """What keeps a jog with the twist ``V`` (6,) in {S} from going on at ``q`` (n,) [rad]."""
+    if followed(chain, q, V) < HARDLY:
+        return (Finding(Reason.SINGULAR),)
+    near = limit_distances(chain, q) <= AT_LIMIT
+    # Looked at only where it matters: a tick has other things to do.
+    if not near.any() or followed(chain, q, V, AT_LIMIT) > FREELY:
+        return ()
+    ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
+    return tuple(
+        Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis)
+        for axis in np.flatnonzero(near).tolist()
+    )
+
+
+def of_tracked(chain: Chain, tracked: Tracked, reading: Reading) -> tuple[Finding, ...]:
+    """What following a drag gives up; first of all the leap that it does not make."""
+    given_up = of_projection(chain, tracked.best, reading, yaw_was_wished=False)
+    if tracked.ahead is None:
+        return given_up
+    axis, leap = tracked.leap_ahead()
+    held = Finding(Reason.ACROSS_GAP, leap, axis)
+    if tracked.ahead.position_error <= POSITION_WORTH_TELLING:
+        # Out of reach is what the arm cannot do at all.
+        given_up = tuple(
+            replace(f, reason=Reason.POSITION_CHANGED) if f.reason is Reason.OUT_OF_REACH else f
+            for f in given_up
+        )
+    return (held, *given_up)

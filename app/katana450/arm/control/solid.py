@@ -1,0 +1,76 @@
+"""What a mesh counts as where contacts are looked for, and how a thing looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.maths.collision.outer import MOST
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+
+LONGEST_KEY = 64
+
+FAINTEST = 0.05
+"""Opacity: what is fainter cannot be seen, for which there is ``Look.hidden``."""
+
+Colour = tuple[int, int, int]
+"""Red, green, blue of 255."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A mesh without its triangles, which stay where they are drawn: a state is to be small.
+
+    Attributes:
+        key: of the triangles, by their content.
+        size: of a box along the axes that holds them [m].
+        corners: (k, 3) of a convex body that holds them [m]; z = 0 is their underside, and the z
+            axis goes through the middle of the box.
+    """
+
+    key: str
+    size: tuple[float, float, float]
+    corners: FloatArray
+
+    def __post_init__(self) -> None:
+        if not (self.key.isalnum() and len(self.key) <= LONGEST_KEY):
+            raise InputError(f"The key of a mesh is up to {LONGEST_KEY} letters and digits.")
+        size = finite_array(self.size, (3,), "The size of a mesh")
+        if size.min() < 0.0 or size.max() <= 0.0:
+            raise InputError(f"The size of a mesh is three lengths, not {self.size}.")
+        x, y, z = size.tolist()
+        object.__setattr__(self, "size", (x, y, z))
+        corners = np.asarray(self.corners, dtype=np.float64)
+        if not 4 <= len(corners) <= MOST:
+            raise InputError(f"A mesh counts as 4 to {MOST} corners, not {len(corners)}.")
+        corners = finite_array(corners, (len(corners), 3), "The corners of a mesh")
+        object.__setattr__(self, "corners", frozen(corners))
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a thing is drawn.
+
+    Attributes:
+        colour: None for its own.
+        opacity: 1 is solid.
+        hidden: not drawn. It counts for contacts even so: what is not seen is still in the way.
+    """
+
+    colour: Colour | None = None
+    opacity: float = 1.0
+    hidden: bool = False
+
+    def __post_init__(self) -> None:
+        if self.colour is not None and not (
+            len(self.colour) == 3 and all(type(c) is int and 0 <= c <= 255 for c in self.colour)
+        ):
+            raise InputError(f"A colour is three whole numbers from 0 to 255, not {self.colour}.")
+        if not FAINTEST <= self.opacity <= 1.0:
+            raise InputError(f"An opacity is from {FAINTEST} to 1, not {self.opacity}.")
+
+
+PLAIN = Look()
+"""Of a thing of which nobody says."""

@@ -1,0 +1,302 @@
+"""The whole state of the session, one immutable value a tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from katana450.arm.control.following import Following
+from katana450.arm.control.looks import ALL_AS_MADE, Looks
+from katana450.arm.control.pouring import Poured
+from katana450.arm.control.things import Thing
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.limiter import Motion
+from katana450.maths.motion.stream import Stream
+
+__all__ = [
+    "Dragging",
+    "Finding",
+    "Halt",
+    "Jogging",
+    "JointTarget",
+    "Mode",
+    "PoseTarget",
+    "Reason",
+    "State",
+    "Status",
+    "Target",
+    "ToolTarget",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class JointTarget:
+    """The joints themselves are wished for: ``q`` (n,) [rad]."""
+
+    q: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTarget:
+    """A full pose ``T`` (4, 4) in {S}: one number more than five axes can follow."""
+
+    T: FloatArray
+
+
+Target = JointTarget | ToolTarget | PoseTarget
+
+
+class Status(Enum):
+    """How the goal of the arm stands to what was wished."""
+
+    OK = "ok"
+    LIMITED = "limited"
+    PAUSED = "paused"
+    BLOCKED = "blocked"
+    HELD = "held"
+    HALTED = "halted"
+    FAULT = "fault"
+
+
+class Reason(Enum):
+    """Why the goal differs from what was wished."""
+
+    HALTED = "halted"
+    PAUSED = "paused"
+    CONTACT = "contact"
+    ACROSS_GAP = "across a gap"
+    OUT_OF_REACH = "out of reach"
+    POSITION_CHANGED = "position changed"
+    AXIS_1 = "axis 1 in the way"
+    LINKS = "links reach no farther"
+    SINGULAR = "singular"
+    AXIS_LIMIT = "axis limit"
+    SLIDE_LIMIT = "slide limit"
+    GRIPPER_LIMIT = "gripper limit"
+    GRIPPER_SLIDE_LIMIT = "gripper slide limit"
+    YAW_FIXED = "yaw fixed"
+    PITCH_CHANGED = "pitch changed"
+    ROLL_CHANGED = "roll changed"
+    NOT_AT_START = "not at the start"
+    LOPSIDED = "one finger only"
+    INTERNAL = "internal error"
+
+
+GRIPPER_LIMITS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT)
+"""The reasons that are about the fingers alone."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One reason with its number.
+
+    Attributes:
+        reason: what holds the goal back.
+        amount: by how much [m or rad]; for a limit, the limit itself [rad or m]; for a gap, the
+            leap across it [rad]; for a contact, the distance that is left [m]; for a stop, how far
+            the tool, or else any link, went until it was at rest [m]; for a plan, how far its start
+            is [rad].
+        axis: the axis it is about, counted from 0, where it is about one.
+        parts: the two links or things it is about, where it is about two.
+        time: for a stop, how long that took [s].
+    """
+
+    reason: Reason
+    amount: float = 0.0
+    axis: int | None = None
+    parts: tuple[str, str] | None = None
+    time: float = 0.0
+
+
+@dataclass(frozen=True)
+class Halt:
+    """A stop: how far the tool, or else any link, went until it was at rest [m], and how long that
+    took [s]."""
+
+    way: float
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Jogging:
+    """Rates (5,) for a while: v of the tool point [m/s], pitch and roll [rad/s].
+
+    frame: whose axes v is along. until: when it ends unless it is renewed [s].
+    """
+
+    rates: FloatArray
+    frame: JogFrame
+    until: float
+
+
+@dataclass(frozen=True, eq=False)
+class Dragging:
+    """A target that is followed along the way of the hand.
+
+    since: how far along that way the goal has been taken. let_go: whether the hand has let go
+    meanwhile, so that the goal becomes the target in the end.
+    """
+
+    since: ToolTarget
+    let_go: bool = False
+
+
+Mode = Jogging | Stream | Dragging
+"""The cause that moves the goal from tick to tick; there is one at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything the session knows after a tick.
+
+    Attributes:
+        t: time of the tick [s].
+        q, gripper: where the arm is, as the driver last said, (n,) and scalar [rad].
+        motion, gripper_setpoint: what the driver is told in this tick, and how it moves.
+        goal, gripper_goal: where the arm is going: the nearest it can do to the target.
+        tool: the tool frame that targets and read-outs are of; empty where there are only joints,
+            and then the branch and the reading say nothing.
+        target: what was wished, kept as it was wished.
+        branch: the branch that dragging keeps.
+        reading: which numbers of a target count, and what gives way.
+        findings: why the goal is not what was last wished, or is not gone to; else empty.
+        blocked: whether the arm waits on its way because it would touch something.
+        halted: the stop that holds the arm until a person releases it; None when there is none.
+        paused: whether the arm waits on its way because a person wants it to.
+        speed: the share of every greatest speed that is allowed, above 0 and up to 1.
+        mode: the jog, stream or drag that moves the goal, if one does. A drag is over once the goal
+            is there; until then the findings are those from before.
+        things: what stands around or is held, and can be put elsewhere.
+        grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
+        poured: the water of the cup; None where there is none.
+        looks: how links and things are shown.
+        following: the plan the arm is on and where on it, until it is told to go elsewhere; None
+            when it is on none.
+    """
+
+    t: float
+    q: FloatArray
+    gripper: float
+    motion: Motion
+    gripper_setpoint: float
+    goal: FloatArray
+    gripper_goal: float
+    tool: str
+    target: Target
+    branch: Branch
+    reading: Reading = Reading.POSE
+    findings: tuple[Finding, ...] = ()
+    blocked: bool = False
+    halted: Halt | None = None
+    paused: bool = False
+    speed: float = 1.0
+    mode: Mode | None = None
+    following: Following | None = None
+    things: tuple[Thing, ...] = ()
+    grip: float | None = None
+    poured: Poured | None = None
+    looks: Looks = ALL_AS_MADE
+
+    @staticmethod
+    def standing(
+        q: FloatArray,
+        gripper: float,
+        t: float,
+        tool: str,
+        branch: Branch,
+        things: tuple[Thing, ...] = (),
+    ) -> State:
+        """Joints that stand at ``q`` (n,) and hold, with nothing asked of them yet."""
+        return State(
+            t=t,
+            q=q,
+            gripper=gripper,
+            motion=Motion.rest(q),
+            gripper_setpoint=gripper,
+            goal=q,
+            gripper_goal=gripper,
+            tool=tool,
+            target=JointTarget(q),
+            branch=branch,
+            things=things,
+        )
+
+    @property
+    def status(self) -> Status:
+        """What the findings come to."""
+        if any(finding.reason is Reason.INTERNAL for finding in self.findings):
+            return Status.FAULT
+        if self.halted is not None:
+            return Status.HALTED
+        if self.paused:
+            return Status.PAUSED
+        if any(finding.reason is Reason.CONTACT for finding in self.findings):
+            return Status.BLOCKED
+        if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
+            return Status.HELD
+        return Status.LIMITED if self.findings else Status.OK
+
+    @property
+    def jogging(self) -> Jogging | None:
+        """The jog under way, if one is."""
+        return self.mode if isinstance(self.mode, Jogging) else None
+
+    @property
+    def servo(self) -> Stream | None:
+        """The stream that is followed, if one is."""
+        return self.mode if isinstance(self.mode, Stream) else None
+
+    @property
+    def since(self) -> ToolTarget | None:
+        """Target up to which a drag has been followed along its path; None without a drag."""
+        return self.mode.since if isinstance(self.mode, Dragging) else None
+
+    @property
+    def moving(self) -> bool:
+        """Whether the arm or the gripper is still on its way."""
+        resting = self.blocked or self.paused or self.halted is not None
+        return self.under_way and not (resting and self.motion.at_rest)
+
+    @property
+    def setpoint(self) -> FloatArray:
+        """Where the driver is told to be, (n,) [rad]."""
+        return self.motion.q
+
+    @property
+    def x(self) -> FloatArray:
+        """Where the arm is and its finger joint behind it, (n + 1,) [rad], as bodies are placed."""
+        return np.append(self.q, self.gripper)
+
+    @property
+    def x_setpoint(self) -> FloatArray:
+        """Likewise, where the driver is told to be."""
+        return np.append(self.setpoint, self.gripper_setpoint)
+
+    @property
+    def near(self) -> frozenset[str]:
+        """The links and things that are about to touch."""
+        met = (each.parts for each in self.findings if each.reason is Reason.CONTACT)
+        return frozenset(part for parts in met for part in parts or ())
+
+    @property
+    def held(self) -> Thing | None:
+        """What the fingers hold."""
+        return next((each for each in self.things if each.held), None)
+
+    @property
+    def under_way(self) -> bool:
+        """Whether the setpoints differ from the goals, whatever stands between them."""
+        return bool(
+            (self.setpoint != self.goal).any()
+            or not self.motion.at_rest
+            or self.jogging is not None
+            or self.servo is not None
+            or (self.following is not None and not self.following.there)
+            or self.gripper_setpoint != self.gripper_goal
+        )

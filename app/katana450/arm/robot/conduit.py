@@ -1,0 +1,276 @@
+"""The conduit that carries the arm's cables from link to link, as curves between its fittings.
+
+A stretch of it hangs between two links with one joint between them, so its shape follows from that
+joint's angle alone: it is worked out once for a row of angles and read off in between.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, finite_array
+
+ANGLES = 49
+"""Angles a stretch is worked out for: some five degrees apart."""
+
+PIECES = 24
+"""Of each half of a curve: shorter than its ribs are apart."""
+
+FULLNESS = 1.15
+"""How long the tangents at the ends of a half are to its chord: between taut and slack."""
+
+HALVINGS = 24
+"""Of the way the middle may bulge: to less than a micrometre."""
+
+
+EASE = 6.0
+"""How sharply a slack curve becomes a taut one: the length is a norm of both, of this order."""
+
+GIVE = 0.25
+"""Share of its length by which a conduit with ribs can be drawn out or pushed together."""
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a stretch is held: point (3,) [m] and unit tangent (3,) in the frame of a link."""
+
+    link: str
+    point: FloatArray
+    tangent: FloatArray
+
+
+class Hinge(NamedTuple):
+    """The one joint between two links.
+
+    joint: its name. axis: (3,) in its own frame. lower, upper: [rad]. T_start_joint, T_joint_end:
+    (4, 4) from the first link's frame to the joint's at zero, and from that to the second's [m].
+    """
+
+    joint: str
+    axis: FloatArray
+    lower: float
+    upper: float
+    T_start_joint: FloatArray
+    T_joint_end: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One free run of conduit.
+
+    start, end: its ends; the tangents lead from the first to the second. radius, length: [m], the
+    length at rest. hinge: between the two links. winds: whether the conduit lies about the axis of
+    that, where its ribs are pushed together and drawn apart, by no more than GIVE.
+    """
+
+    start: End
+    end: End
+    radius: float
+    length: float
+    hinge: Hinge
+    winds: bool
+
+    @property
+    def angles(self) -> FloatArray:
+        """(ANGLES,) [rad] of its joint that it is worked out for; in between it is led linearly."""
+        return np.linspace(self.hinge.lower, self.hinge.upper, ANGLES)
+
+    def between(self, angle: float) -> tuple[int, float]:
+        """The number of the last of ``angles`` before ``angle`` [rad], and the share beyond it."""
+        lower, upper = self.hinge.lower, self.hinge.upper
+        row = (min(max(angle, lower), upper) - lower) / (upper - lower) * (ANGLES - 1)
+        low = min(int(row), ANGLES - 2)
+        return low, row - low
+
+    def courses(self, angles: Iterable[float], count: int) -> tuple[FloatArray, FloatArray]:
+        """``count`` points (A, n, 3) [m] evenly along it and unit tangents (A, n, 3).
+
+        With its joint at each of the A ``angles`` [rad]; in the frame of the first end's link.
+        """
+        rows = np.array([sum(self.between(angle)) for angle in angles])
+        curves = _between(self._curves, rows, 0)
+        spots = np.linspace(0.0, curves.shape[1] - 1.0, 2 * count + 1)[1::2]
+        steps = np.diff(curves, axis=1)
+        # Between the middles of pieces, or the ribs would stand on edge where pieces meet.
+        leading = _between(steps, np.clip(spots - 0.5, 0.0, steps.shape[1] - 1.0), 1)
+        leading /= np.linalg.norm(leading, axis=2, keepdims=True)
+        return _between(curves, spots, 1), leading
+
+    @cached_property
+    def _curves(self) -> FloatArray:
+        """(ANGLES, n, 3) points evenly along the conduit, for each of its angles."""
+        hinge, angles = self.hinge, self.angles
+        turns = [se3.from_rotation_translation(so3.exp(hinge.axis * a), ZERO) for a in angles]
+        T = hinge.T_start_joint @ np.array(turns) @ hinge.T_joint_end
+        q = T[:, :3, :3] @ self.end.point + T[:, :3, 3]
+        b = T[:, :3, :3] @ self.end.tangent
+        p, a = (np.broadcast_to(v, q.shape) for v in (self.start.point, self.start.tangent))
+        if self.winds:
+            return _even(self._wound(p, a, q, b, angles))
+        chord = q - p
+        outward = _across(a - b, chord)
+        return _even(_of_length(self.length, p, a, q, b, outward, lambda curve: curve))
+
+    def _wound(
+        self, p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray, angles: FloatArray
+    ) -> FloatArray:
+        """The same about the joint's axis: unrolled, a plain curve in radius, arc and height."""
+        frame = _frame_along(self.hinge.T_start_joint[:3, :3] @ self.hinge.axis)
+        origin = self.hinge.T_start_joint[:3, 3]
+        mean = float(np.linalg.norm(((p[0] - origin) @ frame)[:2]))
+
+        def unrolled(point: FloatArray, tangent: FloatArray) -> tuple[FloatArray, FloatArray]:
+            local, along = (point - origin) @ frame, tangent @ frame
+            r = np.hypot(local[:, 0], local[:, 1])
+            phi = np.arctan2(local[:, 1], local[:, 0])
+            x, y = local[:, 0] / r, local[:, 1] / r
+            lead = (x * along[:, 0] + y * along[:, 1], x * along[:, 1] - y * along[:, 0])
+            return np.stack((r, phi, local[:, 2]), 1), np.stack((*lead, along[:, 2]), 1)
+
+        def rolled(curve: FloatArray) -> FloatArray:
+            r, phi, z = curve[..., 0], curve[..., 1] / mean, curve[..., 2]
+            return origin + np.stack((r * np.cos(phi), r * np.sin(phi), z), -1) @ frame.T
+
+        (first, a_lead), (last, b_lead) = unrolled(p, a), unrolled(q, b)
+        # The angle follows the joint's over more than half a turn either way.
+        start = last[:, 1] - angles
+        last[:, 1] = start - math.tau * np.round((start - first[:, 1]) / math.tau) + angles
+        first[:, 1] *= mean
+        last[:, 1] *= mean
+        outward = np.broadcast_to((1.0, 0.0, 0.0), first.shape)
+        least = (1.0 - GIVE) * self.length
+        return rolled(_of_length(least, first, a_lead, last, b_lead, outward, rolled))
+
+
+ZERO = np.zeros(3)
+
+
+def _of_length(
+    length: float,
+    p: FloatArray,
+    a: FloatArray,
+    q: FloatArray,
+    b: FloatArray,
+    outward: FloatArray,
+    shown: Callable[[FloatArray], FloatArray],
+) -> FloatArray:
+    """Curves (A, n, 3) from p to q whose middle bulges outward so far that they are as long.
+
+    One that would be taut is drawn out a little before it is, or its belly would vanish at a snap.
+    shown: maps the curves to where their length is measured.
+    """
+
+    def long(bulge: FloatArray) -> FloatArray:
+        curve = shown(_arch(p, a, q, b, bulge[:, None] * outward))
+        return np.asarray(np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1))
+
+    taut = long(np.zeros(len(p)))
+    wanted = (taut**EASE + length**EASE) ** (1.0 / EASE)
+    low, high = np.zeros(len(p)), wanted
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        short = long(middle) < wanted
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return _arch(p, a, q, b, low[:, None] * outward)
+
+
+def _arch(
+    p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray, bulge: FloatArray
+) -> FloatArray:
+    """Two cubic Hermite pieces (A, n, 3) that meet at the middle, moved by ``bulge``."""
+    middle = 0.5 * (p + q) + bulge
+    chord = q - p
+    lead = chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    first = FULLNESS * np.linalg.norm(middle - p, axis=1, keepdims=True)
+    last = FULLNESS * np.linalg.norm(q - middle, axis=1, keepdims=True)
+    one = _hermite(p, first * a, middle, first * lead)
+    two = _hermite(middle, last * lead, q, last * b)
+    return np.concatenate((one[:, :-1], two), axis=1)
+
+
+def _hermite(p: FloatArray, a: FloatArray, q: FloatArray, b: FloatArray) -> FloatArray:
+    t = np.linspace(0.0, 1.0, PIECES + 1)[None, :, None]
+    p, a, q, b = (v[:, None] for v in (p, a, q, b))
+    return np.asarray(
+        (2 * t**3 - 3 * t**2 + 1) * p
+        + (t**3 - 2 * t**2 + t) * a
+        + (3 * t**2 - 2 * t**3) * q
+        + (t**3 - t**2) * b
+    )
+
+
+def _even(curves: FloatArray) -> FloatArray:
+    """The same curves with their points evenly spaced."""
+    n = curves.shape[1]
+    result = np.empty_like(curves)
+    for curve, even in zip(curves, result, strict=True):
+        along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))))
+        spots = np.linspace(0.0, along[-1], n)
+        for k in range(3):
+            even[:, k] = np.interp(spots, along, curve[:, k])
+    return result
+
+
+def _between(rows: FloatArray, spots: FloatArray, axis: int) -> FloatArray:
+    """What ``rows`` come to at ``spots`` (n,), which count them along ``axis`` from 0."""
+    low = np.minimum(spots.astype(int), rows.shape[axis] - 2)
+    share = np.expand_dims(spots - low, (1, 2) if axis == 0 else (0, 2))
+    first, second = rows.take(low, axis), rows.take(low + 1, axis)
+    return np.asarray(first + share * (second - first))
+
+
+def _across(v: FloatArray, chord: FloatArray) -> FloatArray:
+    """Unit vectors (A, 3): ``v`` without what of it is along ``chord``."""
+    along = chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    rest = v - (v * along).sum(axis=1, keepdims=True) * along
+    return np.asarray(rest / np.linalg.norm(rest, axis=1, keepdims=True))
+
+
+def _frame_along(axis: FloatArray) -> FloatArray:
+    """(3, 3) whose columns are a frame with z along ``axis``."""
+    x = np.eye(3)[int(np.abs(axis).argmin())]
+    y = np.cross(axis, x)
+    y /= np.linalg.norm(y)
+    return np.stack((np.cross(y, axis), y, axis), axis=1)
+
+
+def read_stretches(path: Path, find: Callable[[str, str], Hinge]) -> tuple[Stretch, ...]:
+    """The stretches in a file of conduits, JSON with lengths in m; none when there is no file.
+
+    find: the one joint between two links; KeyError when there is not one.
+
+    Raises RobotDescriptionError when the file is broken or of another arm; says what is wrong.
+    """
+    if not path.is_file():
+        return ()
+    try:
+        stretches = json.loads(path.read_text(encoding="utf-8"))["conduits"]
+        return tuple(_stretch(each, find) for each in stretches)
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        raise RobotDescriptionError(f"{path} does not describe conduits: {error!r}.") from error
+
+
+def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> Stretch:
+    start, end = (
+        End(
+            str(one["link"]),
+            finite_array(one["point"], (3,), "The point of a conduit"),
+            finite_array(one["tangent"], (3,), "The tangent of a conduit"),
+        )
+        for one in each["ends"]
+    )
+    hinge = find(start.link, end.link)
+    radius, length = float(each["radius"]), float(each["length"])
+    if not 0.0 < radius < length < math.inf:
+        raise ValueError(f"a conduit {length} m long and {radius} m thick is none")
+    return Stretch(start, end, radius, length, hinge, winds=each["winds"] == hinge.joint)

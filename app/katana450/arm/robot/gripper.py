@@ -1,0 +1,151 @@
+"""The fingers behind the last axis of an arm, driven together by one number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from katana450.arm.control.arm import NO_GRIPPER, Gripper
+from katana450.errors import RobotDescriptionError
+from katana450.maths.geometry.arrays import FloatArray
+
+SLIDING = "prismatic"
+
+SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
+"""[rad/s, m/s] Of a finger whose file names no speed."""
+
+ACROSS = 0.5
+"""Cosine between two axes up to which neither their sense nor its opposite is meant."""
+
+
+@dataclass(frozen=True)
+class Fingers:
+    """The joints of a gripper.
+
+    Attributes:
+        gripper: limits and speed of the number that drives them: the value of the first.
+        follow: of each finger joint (factor, offset): its value is factor * driven + offset
+            [rad or m]. The first is the driven one itself.
+        driven: the finger joints that mimic no other.
+        resting: the value [rad or m] of each joint that stays where it is.
+        notes: sentences for a person on the joints that stay where they are.
+    """
+
+    gripper: Gripper
+    follow: Mapping[str, tuple[float, float]]
+    driven: tuple[str, ...]
+    resting: Mapping[str, float]
+    notes: tuple[str, ...]
+
+
+def fingers_of(
+    hand: Sequence[Any], others: Sequence[Any], frames: Mapping[str, FloatArray]
+) -> Fingers:
+    """The gripper made of the movable joints ``hand``; those and ``others`` that are none rest.
+
+    frames: (4, 4) of every link in the root at zero. Driven fingers without `mimic` each go from
+    one of their limits to the other together.
+    """
+    able = [j for j in hand if j.mimic is None and _range(j)]
+    # The one that opens towards positive numbers drives the rest.
+    able.sort(key=lambda joint: -sum(_range(joint)))
+    follow: dict[str, tuple[float, float]] = {}
+    gripper = NO_GRIPPER
+    if able:
+        lead, *rest = able
+        follow = {lead.name: (1.0, 0.0)} | {j.name: _beside(lead, j, frames) for j in rest}
+        speed = min(_speed(j) / abs(follow[j.name][0]) for j in able)
+        lower, upper = _range(lead)
+        gripper = Gripper(lower, upper, speed, slides=lead.type == SLIDING)
+    by_name = {joint.name: joint for joint in (*hand, *others)}
+    notes = []
+    for joint in hand:
+        found = _led(joint, by_name, follow) if joint.mimic is not None else None
+        if found is not None:
+            follow[joint.name] = found
+    resting = {}
+    for joint in by_name.values():
+        if joint.name not in follow:
+            value = _at_rest(joint)
+            resting[joint.name] = value
+            place = "zero" if value == 0.0 else f"{value:g} {_unit(joint)}"
+            notes.append(f"Joint {joint.name!r} is {joint.type} and stays at {place}.")
+    return Fingers(gripper, follow, tuple(j.name for j in able), resting, tuple(notes))
+
+
+def _range(joint: Any) -> tuple[float, ...]:
+    """Lower and upper limit [rad or m] of a joint that has room between them; else nothing."""
+    if joint.type not in ("revolute", SLIDING) or joint.limit is None:
+        return ()
+    # As URDF has it, a limit that is not named is 0.
+    lower, upper = float(joint.limit.lower or 0.0), float(joint.limit.upper or 0.0)
+    return (lower, upper) if -math.inf < lower < upper < math.inf else ()
+
+
+def _speed(joint: Any) -> float:
+    """[rad/s or m/s]"""
+    speed = joint.limit.velocity
+    if speed is None or not 0.0 < speed < math.inf:
+        return SLOW_SLIDE if joint.type == SLIDING else SLOW_TURN
+    return float(speed)
+
+
+def _unit(joint: Any) -> str:
+    return "m" if joint.type == SLIDING else "rad"
+
+
+def _at_rest(joint: Any) -> float:
+    """Zero, or the limit next to it."""
+    if joint.mimic is not None or not _range(joint):
+        return 0.0
+    lower, upper = _range(joint)
+    return min(max(0.0, lower), upper)
+
+
+def _beside(lead: Any, joint: Any, frames: Mapping[str, FloatArray]) -> tuple[float, float]:
+    """Factor and offset of a driven finger that closes when ``lead`` does."""
+    low, high = _range(lead)
+    lower, upper = _range(joint)
+    same, mirrored = (math.dist((low, high), each) for each in ((lower, upper), (-upper, -lower)))
+    if same == mirrored:
+        # Fingers that close on each other move in opposite senses.
+        one, other = (frames[j.child][:3, :3] @ np.asarray(j.axis) for j in (lead, joint))
+        turned = bool(one @ other > ACROSS * np.linalg.norm(one) * np.linalg.norm(other))
+    else:
+        turned = mirrored < same
+    if turned:
+        lower, upper = upper, lower
+    factor = (upper - lower) / (high - low)
+    return factor, lower - factor * low
+
+
+def _led(
+    joint: Any, joints: Mapping[str, Any], follow: Mapping[str, tuple[float, float]]
+) -> tuple[float, float] | None:
+    """Factor and offset of a joint that mimics another; None where no finger is behind it.
+
+    Raises RobotDescriptionError where it mimics itself in the end.
+    """
+    factor, offset = 1.0, 0.0
+    passed = [joint.name]
+    while joint.mimic is not None:
+        offset += factor * float(joint.mimic.offset or 0.0)
+        factor *= 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
+        above = joints.get(joint.mimic.joint)
+        if above is None:
+            return None
+        if above.name in passed:
+            raise RobotDescriptionError(
+                f"Joint {passed[0]!r} mimics {joint.mimic.joint!r}, which no driven joint stands "
+                "behind."
+            )
+        passed.append(above.name)
+        joint = above
+    if joint.name not in follow:
+        return None
+    a, b = follow[joint.name]
+    return factor * a, factor * b + offset

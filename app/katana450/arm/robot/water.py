@@ -1,0 +1,28 @@
+"""The props as what holds and catches water."""
+
+from __future__ import annotations
+
+from katana450.arm.robot.props import BASIN_AT, Point, Props, Vessel
+from katana450.maths.water.around import Around, Basin, Cup, Table
+from katana450.maths.water.cylinder import Cylinder
+
+
+def around_of(props: Props, basin_at: Point = BASIN_AT) -> Around:
+    """``basin_at``: where the basin stands [m], in the base frame. The floor bears the table."""
+    cup, basin, table = props.cup, props.basin, props.table
+    return Around(
+        Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor),
+        Basin(
+            basin_at,
+            basin.floor,
+            basin.floor_radius,
+            basin.inner_radius,
+            _depth(basin),
+            basin.outer_radius,
+        ),
+        Table(table.x, table.y, -table.thickness),
+    )
+
+
+def _depth(vessel: Vessel) -> float:
+    return vessel.height - vessel.floor

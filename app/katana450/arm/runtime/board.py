@@ -1,0 +1,62 @@
+"""Where the control loop shows what it does, to whoever looks, in this process or another."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.state import State
+from katana450.arm.runtime.lateness import Lateness
+
+KEPT = 500
+"""Entries of the ledger that are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """What the loop shows the world: a state, and the last mailbox ticket that is in it."""
+
+    state: State
+    ticket: int
+
+
+class Board:
+    """One thread pins up, any look."""
+
+    def __init__(self, first: Snapshot, lateness: Lateness) -> None:
+        self._snapshot = first
+        self._ledger: deque[Entry] = deque(maxlen=KEPT)
+        self._pinned = threading.Condition()
+        self.lateness = lateness
+        """How well the loop keeps its period."""
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest one."""
+        return self._snapshot
+
+    @property
+    def ledger(self) -> tuple[Entry, ...]:
+        """The last reasons why the arm did not do what was wished, oldest first."""
+        return tuple(self._ledger)
+
+    def pin(self, snapshot: Snapshot, news: Sequence[Entry] = ()) -> None:
+        """Show ``snapshot`` from now on, and ``news`` in the ledger."""
+        with self._pinned:
+            self._ledger.extend(news)
+            self._snapshot = snapshot
+            self._pinned.notify_all()
+
+    def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
+        """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""
+        with self._pinned:
+            self._pinned.wait_for(lambda: self._snapshot is not seen, timeout)
+            return self._snapshot
+
+    def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
+        """Return as soon as a command newer than ``seen`` is in, or ``timeout`` [s] is up."""
+        with self._pinned:
+            self._pinned.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)

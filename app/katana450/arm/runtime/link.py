@@ -1,0 +1,313 @@
+"""Between the process that moves the arm and the one that people and programs speak to.
+
+What takes long over there, pictures for a crowd above all, must not make the control loop late, and
+what crashes there must not let the arm go on. So the loop has a process of its own. Commands and
+signs of life come in by a pipe, snapshots go out; when nothing comes any more the arm stops.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.things import same
+from katana450.arm.runtime.board import Board, Snapshot
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.lateness import Lateness
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.readiness import readable, writable
+from katana450.arm.runtime.wire import Names, Plans
+from katana450.errors import InputError
+
+log = logging.getLogger(__name__)
+
+GONE = (EOFError, OSError)
+"""What a pipe raises when there is nobody at its other end."""
+
+PULSE_EVERY = 0.1
+"""[s] Between two words of the arm's process at least, as long as its control loop ticks."""
+
+PULSE = b"."
+"""Says only that the control loop has ticked."""
+
+UNANSWERED = 0.5
+"""[s] Without a word of the arm's process, after which it is given no command but a stop."""
+
+REPORT_EVERY = 1.0
+"""[s] Between two reports of how late the ticks are."""
+
+ENDING_SECONDS = 2.0
+"""[s] A thread that waits to report wakes sooner."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """A command, with the front's own number for it."""
+
+    number: int
+    command: cmd.Command
+
+
+@dataclass(frozen=True)
+class Alive:
+    """A sign of life."""
+
+
+@dataclass(frozen=True, eq=False)
+class News:
+    """A snapshot, whose ticket is the front's number; what is new in the ledger; how late it is."""
+
+    snapshot: Snapshot
+    ledger: tuple[Entry, ...]
+    lateness: Lateness
+
+
+class ArmEnd:
+    """The end at the arm: puts in what is told, shows what the loop does, stops when it is cut."""
+
+    def __init__(
+        self, pipe: Connection, loop: ControlLoop, mailbox: Mailbox, silence: float
+    ) -> None:
+        """``silence``: [s] without a word that stops an arm that moves."""
+        self._pipe = pipe
+        self._loop = loop
+        self._mailbox = mailbox
+        self._silence = silence
+        self._numbers: deque[tuple[int, int]] = deque([(mailbox.last_ticket, 0)])
+        self._numbering = threading.Lock()
+        self._heard = time.monotonic()
+        self._names = Names()
+        self.cut = threading.Event()
+        """Set once there is nobody at the other end."""
+        self._threads = [
+            threading.Thread(target=target, name=f"link {name}", daemon=True)
+            for name, target in (("in", self._listen), ("out", self._show), ("watch", self._watch))
+        ]
+
+    def start(self) -> None:
+        """In threads of its own, until it is cut."""
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def unheard(self) -> float:
+        """[s] Since anything came from the other end."""
+        return time.monotonic() - self._heard
+
+    def close(self) -> None:
+        """Cut it: the other end hangs up, and the arm stops."""
+        self.cut.set()
+        with suppress(*GONE):
+            self._pipe.send(None)
+
+    def join(self) -> None:
+        """Return once its threads have ended, as they do when both ends are closed."""
+        for thread in self._threads:
+            thread.join(ENDING_SECONDS)
+
+    def _listen(self) -> None:
+        try:
+            while True:
+                said = self._pipe.recv()
+                self._heard = time.monotonic()
+                if isinstance(said, Told):
+                    self._put(said)
+        except GONE:
+            self.cut.set()
+            # Nobody is left who could say where to go on to.
+            self._mailbox.put(cmd.Stop())
+
+    def _put(self, told: Told) -> None:
+        if isinstance(told.command, cmd.Follow):
+            self._names.note(told.number, told.command.plan)
+        with self._numbering:
+            try:
+                ticket = self._mailbox.put(told.command)
+            except InputError as error:
+                # Checked over there, so only too many at once can be wrong with it.
+                log.warning("A command was dropped: %s", error)
+                ticket = self._mailbox.last_ticket
+            self._numbers.append((ticket, told.number))
+
+    def _show(self) -> None:
+        board = self._loop.board
+        seen, reported, ticks = board.snapshot, time.monotonic(), self._loop.ticks
+        try:
+            ledger = board.ledger
+            self._send(News(self._named(seen), ledger, board.lateness))
+            last = ledger[-1] if ledger else None
+            while not self.cut.is_set():
+                snapshot = board.wait_for_change(seen, PULSE_EVERY)
+                now = time.monotonic()
+                if snapshot is seen and self._loop.ticks == ticks:
+                    # A loop that does not tick gives no sign of life.
+                    continue
+                ticks = self._loop.ticks
+                if snapshot is seen and now - reported < REPORT_EVERY:
+                    self._pipe.send_bytes(PULSE)
+                    continue
+                if now - reported >= REPORT_EVERY:
+                    reported, board.lateness = now, self._loop.lateness
+                fresh = _newer(board.ledger, last)
+                last = fresh[-1] if fresh else last
+                self._send(News(self._named(snapshot), fresh, board.lateness))
+                seen = snapshot
+        except GONE:
+            self.cut.set()
+
+    def _send(self, news: News) -> None:
+        self._pipe.send_bytes(self._names.dumped(news))
+
+    def _named(self, snapshot: Snapshot) -> Snapshot:
+        """``snapshot`` with the front's number of the last command that is in it."""
+        with self._numbering:
+            while len(self._numbers) > 1 and self._numbers[1][0] <= snapshot.ticket:
+                self._numbers.popleft()
+            return Snapshot(snapshot.state, self._numbers[0][1])
+
+    def _watch(self) -> None:
+        while not self.cut.wait(self._silence / 4):
+            silent = self.unheard
+            state = self._loop.board.snapshot.state
+            if silent > self._silence and state.moving and state.halted is None:
+                log.error("Nothing was heard from the page's server for %.2f s: STOP.", silent)
+                self._mailbox.put(cmd.Stop())
+
+
+class FrontEnd:
+    """The end where people and programs are: a mailbox that reaches over, and a board."""
+
+    def __init__(self, pipe: Connection, check: Callable[[cmd.Command], None]) -> None:
+        """Waits for the first snapshot. ``check``: see ``Mailbox``. Raises EOFError."""
+        self._pipe = pipe
+        self._check = check
+        self._sending = threading.Lock()
+        self._unsent: deque[Told] = deque()
+        self._number = 0
+        self._plans = Plans()
+        first = _loaded(pipe.recv_bytes(), self._plans)
+        self._heard = time.monotonic()
+        self.board = Board(first.snapshot, first.lateness)
+        self.board.pin(first.snapshot, first.ledger)
+        self.cut = threading.Event()
+        """Set once there is no arm any more."""
+        self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
+
+    def start(self) -> None:
+        """Follow the arm in a thread of its own."""
+        self._thread.start()
+
+    @property
+    def last_ticket(self) -> int:
+        """The ticket of the newest command."""
+        with self._sending:
+            return self._number
+
+    def put(self, command: cmd.Command) -> int:
+        """Send ``command`` to the arm; returns its ticket. Raises InputError for what cannot be.
+
+        An arm's process that does not answer is given nothing but a stop.
+        """
+        self._check(command)
+        age = self.age
+        if isinstance(command, cmd.Servo):
+            # The sooner it is stamped, the less of our own delays looks like its motion.
+            command = replace(command, t=MonotonicClock().now())
+        with self._sending:
+            if isinstance(command, cmd.Stop):
+                # What has not gone yet is dead the moment it comes.
+                self._unsent.clear()
+            elif age > UNANSWERED:
+                raise InputError(
+                    f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
+                )
+            self._number += 1
+            if isinstance(command, cmd.Follow):
+                self._plans.note(self._number, command.plan)
+            self._unsent.append(Told(self._number, command))
+            self._flush()
+            return self._number
+
+    @property
+    def age(self) -> float:
+        """Time since the newest word of the arm's process [s], which came from a running loop.
+
+        What came and is not read yet counts as new.
+        """
+        if self.cut.is_set():
+            return time.monotonic() - self._heard
+        return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
+
+    def beat(self) -> None:
+        """Give a sign of life."""
+        with self._sending:
+            if self._flush():
+                self._send(Alive())
+
+    def _flush(self) -> bool:
+        """Send what waits; whether nothing waits any more. A full pipe keeps nobody waiting."""
+        while self._unsent and self._send(self._unsent[0]):
+            self._unsent.popleft()
+        return not self._unsent
+
+    def _send(self, said: Told | Alive) -> bool:
+        try:
+            if not writable(self._pipe.fileno()):
+                return False
+            self._pipe.send(said)
+        except GONE:
+            self.cut.set()
+        return True
+
+    def _listen(self) -> None:
+        try:
+            while True:
+                data = self._pipe.recv_bytes()
+                self._heard = time.monotonic()
+                if self._unsent:
+                    with self._sending:
+                        self._flush()
+                if data == PULSE:
+                    continue
+                news = _loaded(data, self._plans)
+                self.board.lateness = news.lateness
+                seen = self.board.snapshot
+                if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
+                    self.board.pin(_known(news.snapshot, seen), news.ledger)
+        except GONE:
+            self.cut.set()
+
+
+def _known(news: Snapshot, seen: Snapshot) -> Snapshot:
+    """``news`` with the things of ``seen`` where they are the same.
+
+    What comes by the pipe is another object each time, which would be taken for a change.
+    """
+    if not same(news.state.things, seen.state.things):
+        return news
+    return Snapshot(replace(news.state, things=seen.state.things), news.ticket)
+
+
+def _loaded(data: bytes, plans: Plans) -> News:
+    """What ``data`` from the arm's end says; EOFError when that hangs up."""
+    news = plans.loaded(data)
+    if not isinstance(news, News):
+        raise EOFError
+    return news
+
+
+def _newer(ledger: tuple[Entry, ...], last: Entry | None) -> tuple[Entry, ...]:
+    """What stands in ``ledger`` behind ``last``."""
+    for index in range(len(ledger) - 1, -1, -1):
+        if ledger[index] is last:
+            return ledger[index + 1 :]
+    return ledger

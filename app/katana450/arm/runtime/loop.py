@@ -1,0 +1,136 @@
+"""The control loop: a fixed number of ticks a second, whatever the view does."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections.abc import Iterable
+from typing import Protocol
+
+from katana450.arm.control.commands import Command, Stop
+from katana450.arm.control.ledger import news
+from katana450.arm.control.state import State
+from katana450.arm.drivers.driver import Driver
+from katana450.arm.runtime.board import Board, Snapshot
+from katana450.arm.runtime.clock import Clock
+from katana450.arm.runtime.lateness import Lateness, Punctuality
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.maths.geometry.arrays import FloatArray
+
+log = logging.getLogger(__name__)
+
+
+class Rules(Protocol):
+    """What decides; a ``Session`` is one."""
+
+    def begin(self, q: FloatArray, gripper: float, t: float) -> State: ...
+
+    def step(self, state: State, commands: Iterable[Command], t: float) -> State: ...
+
+    def observe(self, state: State, q: FloatArray, gripper: float) -> State: ...
+
+    def fail(self, state: State) -> State: ...
+
+
+class ControlLoop:
+    """Drain, step, send, publish."""
+
+    def __init__(
+        self,
+        session: Rules,
+        driver: Driver,
+        mailbox: Mailbox,
+        clock: Clock,
+        rate: float,
+        held_up: float = math.inf,
+    ) -> None:
+        """``rate``: ticks a second [Hz]. ``held_up``: lateness of a tick [s] that stops an arm
+        which moves: nobody watched over it meanwhile."""
+        self._session = session
+        self._driver = driver
+        self._mailbox = mailbox
+        self._clock = clock
+        self._period = 1.0 / rate
+        self._held_up = held_up
+        t = clock.now()
+        sent = driver.start(t)
+        self._state = session.begin(sent.q, sent.gripper, t)
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._punctuality = Punctuality(self._period)
+        self.board = Board(Snapshot(self._state, 0), self.lateness)
+        """Where it shows what it does."""
+        self.ticks = 0
+        """Ticks that were completed."""
+
+    @property
+    def lateness(self) -> Lateness:
+        """How well the ticks come when they are due."""
+        return self._punctuality.lateness
+
+    def tick(self) -> None:
+        """One turn: take the commands, move on, tell the arm, publish what changed."""
+        commands, ticket = self._mailbox.drain()
+        before = self._state
+        t = self._clock.now()
+        try:
+            state = self._session.step(before, commands, t)
+            sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
+            state = self._session.observe(state, sent.q, sent.gripper)
+        except Exception:
+            # Whatever went wrong, the loop lives on and the arm holds: a person must see it.
+            log.exception("The control loop met an error; the arm holds.")
+            state = self._session.fail(before)
+        self._state = state
+        # An arm at rest wakes nobody: time alone is no news.
+        if commands or _differs(before, state):
+            self.board.pin(Snapshot(state, ticket), news(before, state))
+        self.ticks += 1
+
+    @property
+    def running(self) -> bool:
+        """Whether the thread runs; False once it has ended, for whatever reason."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def start(self) -> None:
+        """Run the ticks in a thread of their own until ``stop``."""
+        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and let go of the arm."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._driver.stop()
+
+    def _run(self) -> None:
+        due = self._clock.now()
+        while not self._stopping.is_set():
+            late = self._clock.now() - due
+            self._punctuality.note(late)
+            if late > self._held_up and self._state.moving and self._state.halted is None:
+                log.error("The control loop was %.2f s late while the arm moved: STOP.", late)
+                self._mailbox.put(Stop())
+            if late > self._period:
+                # Do not run after lost ticks: the session moves by the time that passed.
+                due += late
+            self.tick()
+            due += self._period
+            self._clock.sleep_until(due)
+
+
+def _differs(a: State, b: State) -> bool:
+    return (
+        a.q is not b.q
+        or a.gripper != b.gripper
+        or a.setpoint is not b.setpoint
+        or a.gripper_setpoint != b.gripper_setpoint
+        or a.goal is not b.goal
+        or a.target is not b.target
+        or a.findings != b.findings
+        or a.things is not b.things
+        or a.poured is not b.poured
+        or a.looks is not b.looks
+    )

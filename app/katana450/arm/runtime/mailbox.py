@@ -1,0 +1,89 @@
+"""The only way from other threads into the control loop."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Protocol
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import Command
+from katana450.errors import InputError
+
+CAPACITY = 256
+"""Commands that may wait for one tick: far more than people make in 10 ms, few enough to do."""
+
+STREAMS = (
+    cmd.SetJoint,
+    cmd.SetJoints,
+    cmd.Servo,
+    cmd.MoveTool,
+    cmd.TurnTool,
+    cmd.SetPose,
+    cmd.SetGripper,
+)
+"""Commands of which the last one is enough when several of a kind follow each other."""
+
+
+class CommandSink(Protocol):
+    """Takes commands, here or at the end of a pipe."""
+
+    @property
+    def last_ticket(self) -> int:
+        """The ticket of the newest command."""
+        ...
+
+    def put(self, command: Command) -> int:
+        """Leave ``command`` for the next tick; returns its ticket. Raises InputError."""
+        ...
+
+
+class Mailbox:
+    """Commands in the order they came, each checked at the door.
+
+    A ticket is the number of commands put in so far; ``drain`` hands out the last one, so that a
+    sender can tell from the loop's next snapshot whether what it said has been taken.
+    """
+
+    def __init__(self, check: Callable[[Command], None]) -> None:
+        """``check`` raises an InputError for a command that must not enter."""
+        self._check = check
+        self._lock = threading.Lock()
+        self._waiting: list[Command] = []
+        self._tickets = 0
+
+    def put(self, command: Command) -> int:
+        """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
+        self._check(command)
+        with self._lock:
+            if isinstance(command, cmd.Stop):
+                # Never refused, and what waits before it is dead the moment it comes.
+                self._waiting = [command]
+            elif self._waiting and _supersedes(command, self._waiting[-1]):
+                self._waiting[-1] = command
+            elif len(self._waiting) >= CAPACITY:
+                raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
+            else:
+                self._waiting.append(command)
+            self._tickets += 1
+            return self._tickets
+
+    def drain(self) -> tuple[list[Command], int]:
+        """Everything that waits, oldest first, and the last ticket given."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, []
+            return waiting, self._tickets
+
+    @property
+    def last_ticket(self) -> int:
+        """The ticket of the newest command."""
+        with self._lock:
+            return self._tickets
+
+
+def _supersedes(new: Command, old: Command) -> bool:
+    if not isinstance(new, STREAMS) or type(new) is not type(old):
+        return False
+    return not (isinstance(new, cmd.SetJoint) and isinstance(old, cmd.SetJoint)) or (
+        new.axis == old.axis
+    )

@@ -1,0 +1,1 @@
+"""A running application, put together from its parts."""

@@ -1,0 +1,66 @@
+"""What the front shows and steers: a view and the arm as its gateway sees it, put together."""
+
+from __future__ import annotations
+
+from multiprocessing.connection import Connection
+
+from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.runtime.link import FrontEnd
+from katana450.arm.runtime.navigator import Navigator
+from katana450.assembly.frontend_process import Outfit
+from katana450.assembly.robot_session import Described, Jointed, recognised
+from katana450.errors import ConfigurationError
+from katana450.extensions.export.reachability_file import load_map
+from katana450.extensions.importers.meshes import Meshes
+from katana450.extensions.programs.script_files import Scripts
+from katana450.server.service.arm_handle import Motion
+from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
+from katana450.server.view.follower import Follower
+from katana450.server.view.machine_view import MachineView
+from katana450.server.view.view import Besides, View
+from katana450.server.web.web_server import Gateway
+from katana450.settings import Settings
+
+
+def attached(
+    gateway: Gateway, outfit: Outfit, meshes: Meshes, pipe: Connection
+) -> tuple[FrontEnd, Follower]:
+    """The front's end of ``pipe``, and the view, neither running yet; ``gateway`` has the arm.
+
+    ``meshes``: those that things are of. Raises ConfigurationError, EOFError.
+    """
+    settings, workspace = outfit.settings, outfit.workspace
+    found = recognised(settings, outfit.urdf, outfit.tool)
+    link = FrontEnd(pipe, found.session.check)
+    if isinstance(found, Jointed):
+        if workspace is not None:
+            raise ConfigurationError(
+                f"{workspace} maps where a tool can be. {found.machine.joints.why}"
+            )
+        return link, _machine(gateway, settings, found, link)
+    stored = None if workspace is None else load_map(workspace)
+    besides = Besides(stored, (gateway.steering, Scripts(settings.programs)), meshes)
+    return link, _arm(gateway, outfit, found, link, besides)
+
+
+def _arm(
+    gateway: Gateway, outfit: Outfit, found: Described, link: FrontEnd, besides: Besides
+) -> View:
+    model, session, _ = found
+    navigator = Navigator(session, link.board, link)
+    frame_rate = outfit.settings.frame_rate
+    view = View(gateway.viser, model, link.board, navigator, session, frame_rate, besides)
+    navigator.tell = gateway.announce
+    navigator.redirected = gateway.steering.redirected
+    mechanism, _ = load_mechanism(outfit.urdf)
+    nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
+    gateway.attach(Motion(model, session, link, navigator, nodes, view.let_go))
+    return view
+
+
+def _machine(gateway: Gateway, settings: Settings, found: Jointed, link: FrontEnd) -> MachineView:
+    machine, session, _ = found
+    view = MachineView(gateway.viser, machine, link.board, link, settings.frame_rate)
+    nodes = Nodes(machine.mechanism, machine_of(machine), session.surroundings)
+    gateway.attach(Motion(machine, session, link, None, nodes, view.let_go))
+    return view

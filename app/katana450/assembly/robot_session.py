@@ -1,0 +1,158 @@
+"""The parts of a running app, put together: the arm in one process, what people see in another."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import os
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import NamedTuple
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.joint_session import JointSession
+from katana450.arm.control.session import Session
+from katana450.arm.control.things import Hand, Thing
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.bare import bare
+from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.machine import Machine, load_machine
+from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.water import around_of
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.link import ArmEnd
+from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.errors import RobotDescriptionError
+from katana450.extensions.scene.scene import Scene
+from katana450.server.view.texts import UNCHECKED
+from katana450.settings import Settings
+
+log = logging.getLogger(__name__)
+
+PROMPT = -10
+"""Niceness of the process that moves the arm, where the system allows it."""
+
+
+class Described(NamedTuple):
+    """A robot as its files tell it, the rules for it, and sentences on what they leave open."""
+
+    model: RobotModel
+    session: Session
+    notes: tuple[str, ...]
+
+
+def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
+    """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``."""
+    model = load(urdf, tool)
+    if settings.bare:
+        model = bare(model)
+    world, left_out = world_of(model)
+    notes = [*model.notes, *left_out]
+    props = load_props()
+    hand: Hand | None = None
+    things: tuple[Thing, ...] = ()
+    if world is None:
+        notes.append(UNCHECKED)
+    else:
+        hand, things = hand_of(model, world), things_of(props)
+        world = world.with_obstacles((table(),))
+    session = Session(
+        model.arm,
+        model.ready(settings.ready),
+        world,
+        hand=hand,
+        things=things,
+        around=around_of(props) if things else None,
+    )
+    return Described(model, session, tuple(notes))
+
+
+class Jointed(NamedTuple):
+    """Likewise of a mechanism that is driven joint by joint."""
+
+    machine: Machine
+    session: JointSession
+    notes: tuple[str, ...]
+
+
+def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described | Jointed:
+    """An arm of the family with all it can do; of any other mechanism, its joints.
+
+    Raises RobotDescriptionError for what is neither, or where a tool was asked for.
+    """
+    try:
+        return described(settings, urdf, tool)
+    except RobotDescriptionError as error:
+        if tool is not None or settings.bare or not urdf.is_file():
+            raise
+        machine = load_machine(urdf, str(error))
+        notes = (*machine.notes, f"Joints only. {error}")
+        return Jointed(machine, JointSession(machine.joints, machine.way), notes)
+
+
+class RunningArm:
+    """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
+
+    def __init__(
+        self, settings: Settings, robot: Described | Jointed, scene: Scene | None = None
+    ) -> None:
+        """``scene``: what stands around in place of the robot's own, and where the arm stands."""
+        arm = robot.model.arm if isinstance(robot, Described) else robot.machine.joints
+        session, self.notes = robot.session, robot.notes
+        start = session.ready if scene is None or scene.joints is None else scene.joints
+        driver = SimulatedDriver(arm, start, gripper=0.0)
+        self._mailbox = Mailbox(session.check)
+        if scene is not None:
+            self._mailbox.put(cmd.Furnish(scene.things, scene.water))
+        self._loop = ControlLoop(
+            session, driver, self._mailbox, MonotonicClock(), settings.rate, settings.silence
+        )
+        self._silence = settings.silence
+        self._link: ArmEnd | None = None
+
+    def start(self) -> None:
+        """Run the control loop in a thread of its own."""
+        _be_prompt()
+        self._loop.start()
+
+    def attach(self, pipe: Connection) -> None:
+        """Obey who is at the other end of ``pipe``, in place of anybody before."""
+        if self._link is not None:
+            self._link.close()
+        self._link = ArmEnd(pipe, self._loop, self._mailbox, self._silence)
+        self._link.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether its control loop runs."""
+        return self._loop.running
+
+    @property
+    def unheard(self) -> float:
+        """[s] Since whoever it obeys was heard of."""
+        return 0.0 if self._link is None else self._link.unheard
+
+    def stop(self) -> None:
+        """Cut the pipe, and end the loop."""
+        if self._link is not None:
+            self._link.close()
+        self._loop.stop()
+
+    def join(self) -> None:
+        """After ``stop``, once the other end of the pipe is gone too: let nothing of it run on."""
+        if self._link is not None:
+            self._link.join()
+
+
+def _be_prompt() -> None:
+    """Let nothing that can wait come between the ticks."""
+    # What is there by now stays: looking through it for garbage takes longer than a tick may be
+    # late.
+    gc.collect()
+    gc.freeze()
+    if hasattr(os, "setpriority"):
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, PROMPT)

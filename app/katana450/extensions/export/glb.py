@@ -1,0 +1,211 @@
+"""A mechanism as binary glTF 2.0: a node a link, its joint told in `extras`, and its motion."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.robot.mechanism import Joint, Link, Material, Mechanism, Shape
+from katana450.errors import InputError
+from katana450.extensions.export.names import distinct
+from katana450.extensions.export.trajectory_file import Motion
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+
+ARRAY, ELEMENT = 34962, 34963
+FLOAT, USHORT, UINT = 5126, 5123, 5125
+
+Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+"""xyzw: glTF's y is up, the root's z is."""
+
+
+def glb_files(
+    mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
+) -> dict[str, bytes]:
+    """Name and content of the one file, at the joint `values` [rad, m] or where a motion begins."""
+    (name,) = distinct([mechanism.name])
+    return {f"{name}.glb": _Document(mechanism, values, motion).content()}
+
+
+class _Document:
+    """The JSON chunk and the binary one as they grow."""
+
+    def __init__(
+        self, mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None
+    ) -> None:
+        values = values if motion is None else motion.start
+        self._data = bytearray()
+        self._views: list[dict[str, Any]] = []
+        self._accessors: list[dict[str, Any]] = []
+        self._meshes: list[dict[str, Any]] = []
+        self._materials: dict[Material, int] = {}
+        # Node 0 turns z up into y up; that of link k is node k + 1.
+        number = {link.name: place for place, link in enumerate(mechanism.links, start=1)}
+        nodes: list[dict[str, Any]] = [{"name": "z_up", "rotation": Y_UP, "children": [1]}]
+        nodes += [self._node(mechanism, link, values, number) for link in mechanism.links]
+        self._json: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "katana450"},
+            "scene": 0,
+            "scenes": [{"name": mechanism.name, "nodes": [0]}],
+            "nodes": nodes,
+        }
+        if motion is not None and mechanism.joints:
+            self._json["animations"] = [self._animation(mechanism, motion, number)]
+
+    def content(self) -> bytes:
+        """The file."""
+        parts = {
+            "meshes": self._meshes,
+            "materials": [_material(material) for material in self._materials],
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [{"byteLength": len(self._data)}] if self._data else [],
+        }
+        document = self._json | {name: part for name, part in parts.items() if part}
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        if self._data:
+            chunks += struct.pack("<I4s", len(self._data), b"BIN\0") + bytes(self._data)
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+    def _node(
+        self,
+        mechanism: Mechanism,
+        link: Link,
+        values: Mapping[str, float],
+        number: Mapping[str, int],
+    ) -> dict[str, Any]:
+        T, joint = link.T_parent_link, link.joint
+        if joint is not None:
+            T = T @ joint.motion(values[joint.name])
+        node: dict[str, Any] = {
+            "name": link.name,
+            "translation": T[:3, 3].tolist(),
+            "rotation": _xyzw(T[:3, :3]),
+        }
+        children = [number[child.name] for child in mechanism.children(link)]
+        if children:
+            node["children"] = children
+        if joint is not None:
+            node["extras"] = {"joint": _told(joint)}
+        if link.shapes:
+            node["mesh"] = len(self._meshes)
+            primitives = [self._primitive(shape) for shape in link.shapes]
+            self._meshes.append({"name": link.name, "primitives": primitives})
+        return node
+
+    def _primitive(self, shape: Shape) -> dict[str, Any]:
+        index = shape.faces.reshape(-1, 1)
+        wide = len(shape.vertices) >= 1 << 16
+        return {
+            "attributes": {
+                "POSITION": self._vectors(shape.vertices, ARRAY),
+                "NORMAL": self._vectors(shape.normals, ARRAY),
+            },
+            "indices": self._add(
+                index.astype("<u4" if wide else "<u2"), UINT if wide else USHORT, ELEMENT
+            ),
+            "material": self._materials.setdefault(shape.material, len(self._materials)),
+        }
+
+    def _animation(
+        self, mechanism: Mechanism, motion: Motion, number: Mapping[str, int]
+    ) -> dict[str, Any]:
+        samplers: list[dict[str, Any]] = []
+        channels: list[dict[str, Any]] = []
+        for link in mechanism.links:
+            joint = link.joint
+            if joint is None:
+                continue
+            t, values = motion.keys(joint.name)
+            poses = np.array([link.T_parent_link @ joint.motion(value) for value in values])
+            rows = (
+                poses[:, :3, 3]
+                if joint.slides
+                else np.array([_xyzw(pose[:3, :3]) for pose in poses])
+            )
+            channels.append(
+                {
+                    "sampler": len(samplers),
+                    "target": {
+                        "node": number[link.name],
+                        "path": "translation" if joint.slides else "rotation",
+                    },
+                }
+            )
+            samplers.append(
+                {
+                    "input": self._vectors(t.reshape(-1, 1)),
+                    "output": self._vectors(rows),
+                    "interpolation": "LINEAR",
+                }
+            )
+        return {"name": "motion", "samplers": samplers, "channels": channels}
+
+    def _vectors(self, rows: FloatArray, target: int | None = None) -> int:
+        if not np.isfinite(rows).all():
+            raise InputError("A shape has coordinates that are no finite numbers.")
+        return self._add(rows.astype("<f4"), FLOAT, target)
+
+    def _add(self, rows: npt.NDArray[Any], kind: int, target: int | None) -> int:
+        """Append rows (n, width) and return the number of their accessor."""
+        raw = rows.tobytes()
+        view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": len(raw)}
+        self._views.append(view if target is None else view | {"target": target})
+        self._data += raw + bytes(-len(raw) % 4)
+        accessor: dict[str, Any] = {
+            "bufferView": len(self._views) - 1,
+            "componentType": kind,
+            "count": len(rows),
+            "type": {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[rows.shape[1]],
+        }
+        if kind == FLOAT:
+            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        self._accessors.append(accessor)
+        return len(self._accessors) - 1
+
+
+def _xyzw(R: FloatArray) -> list[float]:
+    w, x, y, z = so3.to_quaternion(R).tolist()
+    return [x, y, z, w]
+
+
+def _material(material: Material) -> dict[str, Any]:
+    return {
+        "name": material.name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*(_linear(part) for part in material.colour), 1.0],
+            "metallicFactor": material.metallic,
+            "roughnessFactor": material.rough,
+        },
+    }
+
+
+def _linear(srgb: float) -> float:
+    """IEC 61966-2-1; glTF tells colours as light."""
+    return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
+
+
+def _told(joint: Joint) -> dict[str, Any]:
+    told: dict[str, Any] = {
+        "name": joint.name,
+        "type": "prismatic" if joint.slides else "revolute",
+        "axis": joint.axis.tolist(),
+    }
+    for side, limit in (("lower", joint.lower), ("upper", joint.upper)):
+        if math.isfinite(limit):
+            told[side] = limit
+    if joint.leader != joint.name:
+        told["mimic"] = {
+            "joint": joint.leader,
+            "multiplier": joint.factor,
+            "offset": joint.offset,
+        }
+    return told

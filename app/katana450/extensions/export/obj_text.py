@@ -1,0 +1,62 @@
+"""Wavefront OBJ and its materials, for programs that read no glTF."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from katana450.arm.robot.mechanism import Material, Shape
+from katana450.extensions.export.rows import distinct_rows
+from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+DIGITS = 5
+"""Decimals of a coordinate [m]: a hundredth of a millimetre."""
+
+NORMAL_DIGITS = 3
+
+LIBRARY = "materials.mtl"
+"""Name of the file with the materials, beside those that use them."""
+
+SHARPEST = 250.0
+"""Exponent of the highlight on a surface without roughness; MTL allows up to 1000."""
+
+
+def obj_text(shapes: Sequence[Shape], material: str | None) -> str:
+    """Return ``shapes`` [m] as one object, in ``material`` of `LIBRARY` where one is named."""
+    points, point = distinct_rows([shape.vertices for shape in shapes], DIGITS)
+    normals, normal = distinct_rows([shape.normals for shape in shapes], NORMAL_DIGITS)
+    starts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
+    faces = np.concatenate(
+        [shape.faces + start for shape, start in zip(shapes, starts, strict=False)]
+    )
+    lines = [] if material is None else [f"mtllib {LIBRARY}", f"usemtl {material}"]
+    lines += _rows("v", points, DIGITS)
+    lines += _rows("vn", normals, NORMAL_DIGITS)
+    lines += _faces(point[faces] + 1, normal[faces] + 1)
+    return "\n".join((*lines, ""))
+
+
+def mtl_text(materials: Mapping[str, Material]) -> str:
+    """Return the library of ``materials`` by the names that OBJ files use for them."""
+    return "\n".join(
+        f"newmtl {name}\n"
+        f"Kd {' '.join(f'{part:.4f}' for part in material.colour)}\n"
+        f"Ks {' '.join([f'{material.gleam:.4f}'] * 3)}\n"
+        f"Ns {SHARPEST * (1.0 - material.rough):.2f}\n"
+        for name, material in materials.items()
+    )
+
+
+def _rows(word: str, rows: FloatArray, digits: int) -> list[str]:
+    return [f"{word} {x:.{digits}f} {y:.{digits}f} {z:.{digits}f}" for x, y, z in rows.tolist()]
+
+
+def _faces(points: IntArray, normals: IntArray) -> list[str]:
+    """Return the triangles that rounding left: those with three different corners."""
+    a, b, c = points.T
+    kept = (a != b) & (b != c) & (c != a)
+    return [
+        f"f {i}//{u} {j}//{v} {k}//{w}"
+        for (i, j, k), (u, v, w) in zip(points[kept].tolist(), normals[kept].tolist(), strict=True)
+    ]

@@ -1,0 +1,152 @@
+"""A motion as a table of times and joint values, in CSV or JSON.
+
+CSV begins with a line of names, `t` first, and every line after it is one time [s] with the
+value of each joint named [rad, m]:
+
+    t,theta1,theta2,theta3,theta4,theta5,gripper
+
+`theta1` is the first driven joint and so on, `gripper` the driven joint after the fifth; joints can
+be named by their own names too. JSON is an object of lists of the same names, all of one length.
+Joints that are not named stay at zero.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.robot.mechanism import Mechanism
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+
+THETA = re.compile(r"theta([1-9][0-9]?)")
+
+GRIPPER = 6
+"""Number of the driven joint that `gripper` names."""
+
+MOST = 100_000
+"""Rows of a file; a longer one is no animation."""
+
+
+WIDEST_TURN = 1.0
+"""[rad] Between two keys; programs take the short way from one to the next, so it must be clear."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """t: (n,) [s], from 0 on, rising. values: (n,) [rad, m] of every joint of a mechanism."""
+
+    t: FloatArray
+    values: Mapping[str, FloatArray]
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Value [rad, m] of every joint at the first sample."""
+        return {name: float(values[0]) for name, values in self.values.items()}
+
+    def keys(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Times (k,) [s] and values (k,) of one joint, with more of them where it turns far."""
+        values = self.values[name]
+        counts = np.maximum(np.ceil(np.abs(np.diff(values)) / WIDEST_TURN), 1.0).astype(int)
+        places = [row + np.arange(count) / count for row, count in enumerate(counts.tolist())]
+        place = np.concatenate((*places, [len(counts)]))
+        rows = np.arange(len(values))
+        return np.interp(place, rows, self.t), np.interp(place, rows, values)
+
+
+def load_motion(path: Path, mechanism: Mechanism) -> Motion:
+    """The motion of `mechanism` in a .csv or .json file.
+
+    Raises InputError for a file that cannot be read, is no such table, names what is no joint, or
+    leaves a joint's limits.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read: {error}.") from error
+    match path.suffix.lower():
+        case ".csv":
+            columns = _csv_columns(path, text)
+        case ".json":
+            columns = _json_columns(path, text)
+        case _:
+            raise InputError(f"{path} must end in .csv or .json.")
+    return _motion(path, columns, mechanism)
+
+
+def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
+    rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
+    if not rows:
+        raise InputError(f"{path} is empty; its first line names the columns, t first.")
+    names = rows[0]
+    if len(set(names)) != len(names):
+        raise InputError(f"{path} names a column twice: {', '.join(names)}.")
+    numbers: list[list[object]] = []
+    for count, row in enumerate(rows[1:], start=1):
+        try:
+            if len(row) != len(names):
+                raise ValueError(f"has {len(row)} values and not {len(names)}")
+            numbers.append([float(cell) for cell in row])
+        except ValueError as error:
+            raise InputError(f"Row {count} of {path}: {error}.") from error
+    return {name: [row[place] for row in numbers] for place, name in enumerate(names)}
+
+
+def _json_columns(path: Path, text: str) -> dict[str, list[object]]:
+    try:
+        columns = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is no JSON: {error}.") from error
+    if not isinstance(columns, dict) or not all(isinstance(v, list) for v in columns.values()):
+        raise InputError(f"{path} must hold an object of lists, such as {{'t': [0, 1], ...}}.")
+    return columns
+
+
+def _motion(path: Path, columns: Mapping[str, list[object]], mechanism: Mechanism) -> Motion:
+    if "t" not in columns:
+        raise InputError(f"{path} has no column t; it has {', '.join(columns)}.")
+    count = len(columns["t"])
+    if not 2 <= count <= MOST:
+        raise InputError(f"{path} has {count} rows; a motion has from 2 to {MOST}.")
+    table = {
+        name: finite_array(column, (count,), f"The column {name} of {path}")  # type: ignore[arg-type]
+        for name, column in columns.items()
+    }
+    t = table.pop("t")
+    if not (np.diff(t) > 0.0).all():
+        row = int(np.argmin(np.diff(t) > 0.0)) + 2
+        raise InputError(f"t of {path} must rise from row to row; in row {row} it does not.")
+    given: dict[str, FloatArray] = {}
+    for column, values in table.items():
+        name = _joint(path, column, mechanism)
+        if name in given:
+            raise InputError(f"{path} names the joint {name} twice.")
+        for value in (values.min(), values.max()):
+            mechanism.check(name, float(value))
+        given[name] = values
+    rows = [
+        mechanism.every({name: float(values[row]) for name, values in given.items()})
+        for row in range(count)
+    ]
+    every = {name: frozen([row[name] for row in rows]) for name in mechanism.joints}
+    return Motion(frozen(t - t[0]), every)
+
+
+def _joint(path: Path, column: str, mechanism: Mechanism) -> str:
+    driven = mechanism.driven
+    if column in driven:
+        return column
+    theta = THETA.fullmatch(column)
+    number = int(theta[1]) if theta else GRIPPER if column == "gripper" else 0
+    if not 1 <= number <= len(driven):
+        raise InputError(
+            f"{path} names {column!r}, which is no driven joint of {mechanism.name}; "
+            f"these are {', '.join(driven)}."
+        )
+    return driven[number - 1]

@@ -1,0 +1,259 @@
+"""A URDF with its meshes as a zip of a ROS package, to be unpacked into a workspace.
+
+Programs differ in what they find and read. `package://` names are for ROS, yourdfpy and PyBullet;
+MuJoCo drops folders from names; the URDF names the folder for it. PyBullet, RViz and Drake have
+trouble with glTF, so such meshes become OBJ, one file a material, and the URDF names the colours.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+
+from katana450.arm.robot.mechanism import Material, Shape
+from katana450.arm.robot.urdf_mechanism import shapes_of
+from katana450.arm.robot.visual import Visual, mesh_file
+from katana450.errors import RobotDescriptionError
+from katana450.extensions.export.names import distinct
+from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""Of every file in the zip, so that the same robot gives the same bytes."""
+
+CONVERTED = (".glb", ".gltf")
+"""Suffixes of meshes that become OBJ; others are copied as they are."""
+
+MUJOCO = {"strippath": "true", "meshdir": "../meshes", "fusestatic": "false"}
+"""MuJoCo's compiler finds the meshes without `package://`, and keeps links on fixed joints."""
+
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+CMAKE = """\
+cmake_minimum_required(VERSION 3.8)
+project({name} NONE)
+find_package(ament_cmake REQUIRED)
+install(DIRECTORY {folders} DESTINATION share/${{PROJECT_NAME}})
+ament_package()
+"""
+
+MANIFEST = """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>{name}</name>
+  <version>0.1.0</version>
+  <description>URDF and meshes of {robot}</description>
+  <maintainer email={email}>{maintainer}</maintainer>
+  <license>{license}</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+
+
+class Maintainer(NamedTuple):
+    """The person that `package.xml` names as responsible for the package."""
+
+    name: str
+    email: str
+
+
+UNSTATED_LICENSE = "TODO: License declaration"
+UNSTATED_MAINTAINER = Maintainer("TODO: Maintainer", "todo@todo.todo")
+"""Placeholders that ROS's own package generator writes where nothing is known."""
+
+
+class _Part(NamedTuple):
+    """A file of a mesh; ``material`` is the name of its one colour, in it and in the URDF."""
+
+    stem: str
+    suffix: str
+    content: bytes
+    material: str | None = None
+
+
+def package_files(
+    path: Path,
+    license_name: str = UNSTATED_LICENSE,
+    maintainer: Maintainer = UNSTATED_MAINTAINER,
+) -> dict[str, bytes]:
+    """Return name and content of the one zip of the URDF file at ``path``.
+
+    Raises RobotDescriptionError when the file is no URDF, and when a mesh is missing or unreadable.
+    """
+    try:
+        tree = ET.parse(path, parser=ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
+    except (OSError, ET.ParseError) as error:
+        raise RobotDescriptionError(f"{path} is not a robot description: {error}.") from error
+    root = tree.getroot()
+    robot = root.get("name", "")
+    if root.tag != "robot" or not robot:
+        raise RobotDescriptionError(f"{path} is not a robot description: it names no robot.")
+    (plain,) = distinct([robot])
+    package = f"{plain.lower()}_description"
+    _weigh_frames(root)
+    meshes = _with_meshes(root, path.parent, f"package://{package}/")
+    manifest = MANIFEST.format(
+        name=package,
+        robot=escape(robot),
+        license=escape(license_name),
+        maintainer=escape(maintainer.name),
+        email=quoteattr(maintainer.email),
+    )
+    files = {
+        "package.xml": manifest.encode(),
+        "CMakeLists.txt": CMAKE.format(
+            name=package, folders="urdf meshes" if meshes else "urdf"
+        ).encode(),
+        f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
+        **meshes,
+    }
+    return {f"{package}.zip": _zipped({f"{package}/{n}": c for n, c in files.items()})}
+
+
+def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes]:
+    """Point the URDF ``root`` at copies of its meshes and return these by place in the package.
+
+    ``folder``: that of the URDF. ``prefix``: stands before a place where the URDF names it.
+    """
+    used = [
+        (parent, element, mesh_file(mesh.get("filename", ""), folder))
+        for parent in root.iter()
+        for element in parent
+        if element.tag in ("visual", "collision")
+        for mesh in element.iterfind("geometry/mesh")
+    ]
+    if not used:
+        return {}
+    shapes: dict[Path, Sequence[Shape]] = {}
+    for _, _, source in used:
+        if not source.is_file():
+            raise RobotDescriptionError(f"There is no mesh at {source}.")
+        if source.suffix.lower() in CONVERTED and source not in shapes:
+            shapes[source] = shapes_of(Visual(np.eye(4), np.ones(3), source))
+            if not shapes[source]:
+                raise RobotDescriptionError(f"{source} holds no triangles. Export the mesh anew.")
+    shown = dict.fromkeys(source for _, element, source in used if element.tag == "visual")
+    names = _names(root, [shape.material for source in shown for shape in shapes.get(source, ())])
+    # A mesh that is only copied is one file for both uses.
+    keys = [(source, source in shapes and element.tag == "visual") for _, element, source in used]
+    groups = {
+        (source, shown): _parts(source, shapes.get(source), names if shown else None)
+        for source, shown in dict.fromkeys(keys)
+    }
+    stems = iter(distinct(part.stem for group in groups.values() for part in group))
+    placed = {
+        key: [(f"meshes/{next(stems)}{part.suffix}", part) for part in group]
+        for key, group in groups.items()
+    }
+    for (parent, element, _), key in zip(used, keys, strict=True):
+        at = list(parent).index(element)
+        parent.remove(element)
+        for k, (place, part) in enumerate(placed[key]):
+            parent.insert(at + k, _pointed(element, prefix + place, part.material, k))
+    for k, (material, name) in enumerate(names.items()):
+        root.insert(k, _material(name, material))
+    _tell_mujoco(root)
+    files = {place: part.content for group in placed.values() for place, part in group}
+    if names:
+        files[f"meshes/{LIBRARY}"] = mtl_text({n: m for m, n in names.items()}).encode()
+    return files
+
+
+def _names(root: ET.Element, materials: Sequence[Material]) -> dict[Material, str]:
+    """Return a name for each of ``materials`` that neither the URDF nor another one has."""
+    known = dict.fromkeys(element.get("name", "") for element in root.iter("material"))
+    new = list(dict.fromkeys(materials))
+    names = distinct([*known, *(material.name for material in new)])
+    return dict(zip(new, names[len(known) :], strict=True))
+
+
+def _parts(
+    source: Path, shapes: Sequence[Shape] | None, names: Mapping[Material, str] | None
+) -> list[_Part]:
+    """Return the files of a mesh: as it is, as one OBJ, or with ``names`` as one a material."""
+    stem = f"{source.parent.name}_{source.stem}"
+    if shapes is None:
+        return [_Part(stem, source.suffix, source.read_bytes())]
+    if names is None:
+        return [_Part(stem, ".obj", obj_text(shapes, None).encode())]
+    return [
+        _Part(
+            f"{stem}_{names[material]}",
+            ".obj",
+            obj_text([s for s in shapes if s.material == material], names[material]).encode(),
+            names[material],
+        )
+        for material in dict.fromkeys(shape.material for shape in shapes)
+    ]
+
+
+def _pointed(element: ET.Element, name: str, material: str | None, number: int) -> ET.Element:
+    """Return a copy of a visual or collision with the mesh ``name`` and, if it has none, a colour.
+
+    ``number`` keeps the names of several copies apart.
+    """
+    copied = copy.deepcopy(element)
+    for mesh in copied.iterfind("geometry/mesh"):
+        mesh.set("filename", name)
+    if number and copied.get("name"):
+        copied.set("name", f"{copied.get('name')}_{number}")
+    if material is not None and copied.find("material") is None:
+        last = copied[-1]
+        ET.SubElement(copied, "material", name=material).tail = last.tail
+        last.tail = "\n      "
+    return copied
+
+
+def _material(name: str, material: Material) -> ET.Element:
+    element = ET.Element("material", name=name)
+    element.tail = "\n  "
+    rgba = " ".join(f"{part:.4g}" for part in (*material.colour, 1.0))
+    ET.SubElement(element, "color", rgba=rgba)
+    return element
+
+
+def _weigh_frames(root: ET.Element) -> None:
+    """Write that links without mass on fixed joints weigh nothing; PyBullet would take 1 kg."""
+    fixed = {
+        child.get("link")
+        for joint in root.iterfind("joint[@type='fixed']")
+        for child in joint.iterfind("child")
+    }
+    for link in root.iterfind("link"):
+        if link.get("name") in fixed and link.find("inertial") is None:
+            inertial = ET.SubElement(link, "inertial")
+            ET.SubElement(inertial, "mass", value="0")
+            ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
+
+
+def _tell_mujoco(root: ET.Element) -> None:
+    """Set the attributes of `MUJOCO`; what else the file tells MuJoCo stays."""
+    extension = root.find("mujoco")
+    if extension is None:
+        extension = ET.Element("mujoco")
+        extension.tail = "\n  "
+        root.insert(0, extension)
+    compiler = extension.find("compiler")
+    if compiler is None:
+        compiler = ET.SubElement(extension, "compiler")
+    compiler.attrib.update(MUJOCO)
+
+
+def _zipped(files: dict[str, bytes]) -> bytes:
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        for name, content in sorted(files.items()):
+            entry = zipfile.ZipInfo(name, EPOCH)
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
+    return made.getvalue()

@@ -1,0 +1,235 @@
+"""A mechanism as a VRML97 world, the way the paper's LabVIEW and Simulink scenes take it.
+
+Geometry stands where it is at zero, in the root's frame, as a CAD program exports an assembly; each
+joint is a Transform whose `center` is a point of its axis and whose `rotation` is about that axis.
+The nested Transforms are therefore the product of exponentials, link by link.
+
+A link's shapes stand in a Switch: 0 as they are made, 1 painted in one colour, -1 hidden.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.arm.robot.mechanism import (
+    FIELD_OF_VIEW,
+    Joint,
+    Link,
+    Material,
+    Mechanism,
+    Shape,
+    camera,
+)
+from katana450.errors import InputError
+from katana450.extensions.export.names import distinct
+from katana450.extensions.export.trajectory_file import Motion
+from katana450.extensions.export.vrml_names import Names
+from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
+from katana450.extensions.export.vrml_text import world_text
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+
+DIGITS = 5
+"""Decimals of a coordinate [m]: a hundredth of a millimetre."""
+
+NORMAL_DIGITS = 3
+
+SKY = (0.87, 0.89, 0.92)
+
+Z_UP = (1.0, 0.0, 0.0, -math.pi / 2.0)
+"""VRML's y is up, the root's z is."""
+
+_TURN = so3.rotation_x(-math.pi / 2.0)
+
+
+def world_of(
+    mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
+) -> World:
+    """The whole mechanism at the joint `values` [rad, m]; with a motion it plays it by itself.
+
+    A motion also sets the static pose to its first sample, for programs that play none.
+    """
+    values = values if motion is None else motion.start
+    names = Names(mechanism)
+    root = _link(mechanism, mechanism.links[0], values, names, set())
+    nodes = [
+        *_surroundings(mechanism),
+        Node("Transform", (("rotation", Z_UP), ("children", (root,)))),
+    ]
+    routes: list[Route] = []
+    if motion is not None:
+        clock: list[tuple[str, Value]] = [("cycleInterval", float(motion.t[-1])), ("loop", True)]
+        nodes.append(Node("TimeSensor", tuple(clock), names.clock))
+        for name, joint in mechanism.joints.items():
+            nodes.append(_interpolator(joint, mechanism, motion, names))
+            target, way = names.joints[name], f"{names.joints[name]}{names.way}"
+            setter = "set_translation" if joint.slides else "set_rotation"
+            routes.append(Route(names.clock, "fraction_changed", way, "set_fraction"))
+            routes.append(Route(way, "value_changed", target, setter))
+    return World(tuple(nodes), tuple(routes))
+
+
+def vrml_files(
+    mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
+) -> dict[str, bytes]:
+    """Name and content of the file of the whole, and of one for each link with a shape."""
+    (whole,) = distinct([mechanism.name])
+    files = {f"{whole}.wrl": world_text(world_of(mechanism, values, motion)).encode()}
+    links = [link for link in mechanism.links if link.shapes]
+    for link, name in zip(links, distinct(link.name for link in links), strict=True):
+        files[f"parts/{name}.wrl"] = world_text(part_world(mechanism, link)).encode()
+    return files
+
+
+def part_world(mechanism: Mechanism, link: Link) -> World:
+    """One link alone where it is at zero, z up, so that all of them loaded make the mechanism."""
+    names = Names(mechanism)
+    shapes = _shapes(mechanism, link, names, set())
+    part = Node("Group", (("children", tuple(shapes)),), names.links[link.name])
+    title = Node("WorldInfo", (("title", f"{mechanism.name} {link.name}"),))
+    return World((title, Node("Transform", (("rotation", Z_UP), ("children", (part,))))))
+
+
+def _surroundings(mechanism: Mechanism) -> list[Node]:
+    view = camera(mechanism)
+    R = _TURN @ _looking(view.target - view.eye)
+    w = so3.log(R)
+    angle = float(np.linalg.norm(w))
+    axis = w / angle if angle else np.array([0.0, 0.0, 1.0])
+    return [
+        Node(
+            "WorldInfo",
+            (("title", mechanism.name), ("info", ("Metres and radians; z of the root is up.",))),
+        ),
+        Node("NavigationInfo", (("type", ("EXAMINE", "ANY")),)),
+        Node("Background", (("skyColor", SKY),)),
+        Node(
+            "Viewpoint",
+            (
+                ("position", _rounded(_TURN @ view.eye, 6)),
+                ("orientation", _rounded([*axis, angle], 9)),
+                ("fieldOfView", FIELD_OF_VIEW),
+                ("description", "All of it"),
+            ),
+        ),
+        Node("DirectionalLight", (("direction", (0.3, -1.0, -0.4)), ("intensity", 0.6))),
+    ]
+
+
+def _looking(way: FloatArray) -> FloatArray:
+    """(3, 3) of a camera in the root that looks along `way` (3,): its x right, y up, -z ahead."""
+    back = -way / np.linalg.norm(way)
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    return np.column_stack((right, np.cross(back, right), back))
+
+
+def _link(
+    mechanism: Mechanism,
+    link: Link,
+    values: Mapping[str, float],
+    names: Names,
+    told: set[Material],
+) -> Node:
+    """The node of a link with all that hangs on it."""
+    own = _switch(mechanism, link, names, told)
+    hung = [_link(mechanism, other, values, names, told) for other in mechanism.children(link)]
+    center = ("center", _rounded(mechanism.home[link.name][:3, 3], 9))
+    children = ("children", (*own, *hung))
+    if link.joint is None:
+        return Node("Transform", (center, children), names.links[link.name])
+    group = Node("Group", (children,), names.links[link.name])
+    moved = _moved(mechanism, link.joint, values[link.joint.name])
+    return Node("Transform", (center, moved, ("children", (group,))), names.joints[link.joint.name])
+
+
+def _switch(
+    mechanism: Mechanism, link: Link, names: Names, told: set[Material]
+) -> tuple[Node, ...]:
+    """The shapes of a link as they are made, and once more to be painted."""
+    if not link.shapes:
+        return ()
+    dressed = names.dressed[link.name]
+    colours = (("diffuseColor", _rounded(link.colour, 4)), ("transparency", 0.0))
+    paint: Node | Use = Node("Material", colours, dressed.paint)
+    made: list[Node] = []
+    painted: list[Node] = []
+    for number, shape in enumerate(_shapes(mechanism, link, names, told)):
+        name = f"{names.links[link.name]}{names.surface}{number}"
+        look, (field, surface) = shape.fields
+        assert isinstance(surface, Node)
+        made.append(replace(shape, fields=(look, (field, replace(surface, name=name)))))
+        one = Node("Appearance", (("material", paint),))
+        painted.append(Node("Shape", (("appearance", one), (field, Use(name)))))
+        paint = Use(dressed.paint)
+    choices = tuple(Node("Group", (("children", tuple(each)),)) for each in (made, painted))
+    return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.look),)
+
+
+def _moved(mechanism: Mechanism, joint: Joint, value: float) -> tuple[str, Value]:
+    axis = mechanism.axis(joint)
+    if joint.slides:
+        return "translation", _rounded(value * axis, 9)
+    return "rotation", (*_rounded(axis, 9), value)
+
+
+def _shapes(mechanism: Mechanism, link: Link, names: Names, told: set[Material]) -> list[Node]:
+    T = mechanism.home[link.name]
+    return [_shape(shape, T, names, told) for shape in link.shapes]
+
+
+def _shape(shape: Shape, T: FloatArray, names: Names, told: set[Material]) -> Node:
+    name = names.appearance(shape.material)
+    appearance: Node | Use
+    if shape.material in told:
+        appearance = Use(name)
+    else:
+        told.add(shape.material)
+        appearance = Node("Appearance", (("material", _material(shape.material)),), name)
+    points = shape.vertices @ T[:3, :3].T + T[:3, 3]
+    normals = shape.normals @ T[:3, :3].T
+    index = np.column_stack((shape.faces, np.full(len(shape.faces), -1)))
+    surface = Node(
+        "IndexedFaceSet",
+        (
+            ("coord", Node("Coordinate", (("point", _rounded(points, DIGITS)),))),
+            ("normal", Node("Normal", (("vector", _rounded(normals, NORMAL_DIGITS)),))),
+            ("coordIndex", tuple(index.ravel().tolist())),
+        ),
+    )
+    return Node("Shape", (("appearance", appearance), ("geometry", surface)))
+
+
+def _material(material: Material) -> Node:
+    return Node(
+        "Material",
+        (
+            ("diffuseColor", _rounded(material.colour, 4)),
+            ("specularColor", _rounded([material.gleam] * 3, 4)),
+            ("shininess", round(min(max(1.0 - material.rough, 0.0), 1.0), 4)),
+        ),
+    )
+
+
+def _interpolator(joint: Joint, mechanism: Mechanism, motion: Motion, names: Names) -> Node:
+    name = f"{names.joints[joint.name]}{names.way}"
+    axis = mechanism.axis(joint)
+    t, values = motion.keys(joint.name)
+    keys = ("key", tuple((t / motion.t[-1]).tolist()))
+    if joint.slides:
+        rows = values[:, None] * axis
+        return Node("PositionInterpolator", (keys, ("keyValue", _rounded(rows, 9))), name)
+    rows = np.column_stack((np.broadcast_to(axis, (len(t), 3)), values))
+    return Node("OrientationInterpolator", (keys, ("keyValue", _rounded(rows, 9))), name)
+
+
+def _rounded(values: object, digits: int) -> tuple[float, ...]:
+    # Adding zero makes 0 of -0.
+    flat = np.round(np.asarray(values, dtype=float), digits).ravel() + 0.0
+    if not np.isfinite(flat).all():
+        raise InputError("A shape has coordinates that are no finite numbers.")
+    return tuple(flat.tolist())

@@ -1,0 +1,332 @@
+"""VRML97 values as text, and strictly back."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import TypeVar
+
+from katana450.errors import InputError
+from katana450.extensions.export.vrml_node import (
+    EVENTS,
+    FIELDS,
+    KEYWORDS,
+    LISTS,
+    SETTERS,
+    WIDTHS,
+    Node,
+    Route,
+    Type,
+    Use,
+    Value,
+    World,
+)
+
+T = TypeVar("T")
+N = TypeVar("N", int, float)
+
+HEADER = "#VRML V2.0 utf8"
+
+LINE = 16
+"""Rows of numbers a line: long enough to be small, short enough for old readers."""
+
+LONGEST = 160
+"""Characters of what an error tells of a file."""
+
+DEEPEST = 200
+"""Nodes in nodes; a file that goes deeper is refused before Python's stack ends."""
+
+# Possessive, so that what does not match fails at once, whatever a stranger wrote.
+_TOKEN = re.compile(
+    r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
+)
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_ZERO_AFTER = re.compile(r"\.0(?![0-9e])")
+_INTEGER = re.compile(r"[+-]?(?:[0-9]{1,10}|0[xX][0-9a-fA-F]{1,8})")
+_NUMBERS, _INTEGERS = (
+    re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
+)
+_NAME = re.compile(r"[^\x00-\x20\"#',.\[\]\\{}\x7f0-9+-][^\x00-\x20\"#',.\[\]\\{}\x7f]*")
+
+
+def world_text(world: World) -> str:
+    """The file; floats are written so that they come back the same."""
+    parts = [HEADER, "\n"]
+    for node in world.nodes:
+        _write(parts, node, 0)
+    parts += [f"ROUTE {r.source}.{r.out} TO {r.target}.{r.into}\n" for r in world.routes]
+    return "".join(parts)
+
+
+def _write(parts: list[str], node: Node | Use | str | float, depth: int) -> None:
+    indent = " " * depth
+    if isinstance(node, Use):
+        parts.append(f"{indent}USE {node.name}\n")
+        return
+    assert isinstance(node, Node)
+    parts.append(f"{indent}{'' if node.name is None else f'DEF {node.name} '}{node.kind} {{\n")
+    for name, value in node.fields:
+        kind = FIELDS[node.kind][name]
+        if kind is Type.NODE:
+            assert isinstance(value, Node | Use)
+            parts.append(f"{indent} {name}\n")
+            _write(parts, value, depth + 1)
+        elif kind is Type.NODE_LIST:
+            assert isinstance(value, tuple)
+            parts.append(f"{indent} {name} [\n")
+            for child in value:
+                _write(parts, child, depth + 2)
+            parts.append(f"{indent} ]\n")
+        else:
+            parts.append(f"{indent} {name} {_plain(kind, value)}\n")
+    parts.append(f"{indent}}}\n")
+
+
+def _plain(kind: Type, value: Value) -> str:
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, float | int):
+        return _short(repr(value))
+    assert isinstance(value, tuple)
+    if kind is Type.STRING_LIST:
+        return f"[ {' '.join(_quoted(str(text)) for text in value)} ]"
+    numbers = list(map(repr, value))
+    if kind not in LISTS:
+        return _short(" ".join(numbers))
+    step = WIDTHS[kind] * LINE
+    rows = [" ".join(numbers[at : at + step]) for at in range(0, len(numbers), step)]
+    return "[" + _short("\n".join(rows)) + "]"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _short(numbers: str) -> str:
+    """Write 2 for 2.0. The zero of 0.5 stays: VTK reads .0122 as 0."""
+    return _ZERO_AFTER.sub("", numbers)
+
+
+def read_world(text: str, name: str = "The file") -> World:
+    """What a file of the nodes in FIELDS holds.
+
+    `name` says in errors which file it is. Raises InputError, with the line, for anything that
+    VRML97 does not allow or that is not among those nodes and fields.
+    """
+    if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
+        raise InputError(f"{name} does not begin with {HEADER!r}, so it is not VRML97.")
+    return Reader(text, name).world()
+
+
+class Reader:
+    """Reads the nodes of a table of their fields; what else is there it refuses."""
+
+    fields = FIELDS
+
+    def __init__(self, text: str, name: str) -> None:
+        """`name` says in errors which file the `text` is of."""
+        self._text, self._name = text, name
+        self._at = self._next = 0
+        self._tokens = self._scan()
+        self._ahead = next(self._tokens)
+        self._named: dict[str, Node | None] = {}
+
+    def world(self) -> World:
+        """What the file holds."""
+        nodes: list[Node] = []
+        routes: list[Route] = []
+        while self._ahead:
+            if self._ahead == "ROUTE":
+                routes.append(self._route())
+            else:
+                node = self._node(0)
+                if isinstance(node, Use):
+                    raise self._error("a file's own nodes are no USE")
+                nodes.append(node)
+        return World(tuple(nodes), tuple(routes))
+
+    def _scan(self) -> Iterator[str]:
+        self._next = len(self._text.partition("\n")[0])
+        while True:
+            found = _TOKEN.match(self._text, self._next)
+            if found is None:
+                raise self._error("a text that does not end, or a stray sign")
+            self._at, self._next = found.start(1), found.end()
+            yield found[1]
+
+    def _error(self, what: str) -> InputError:
+        line = self._text.count("\n", 0, self._at) + 1
+        short = what if len(what) <= LONGEST else f"{what[:LONGEST]}…"
+        return InputError(f"{self._name}, line {line}: {short}.")
+
+    def _take(self) -> str:
+        token = self._ahead
+        if not token:
+            raise self._error("the file ends too early")
+        self._ahead = next(self._tokens)
+        return token
+
+    def _expect(self, token: str) -> None:
+        if self._ahead != token:
+            raise self._error(f"{token!r} is wanted, not {self._ahead!r}")
+        self._take()
+
+    def _new_name(self) -> str:
+        name = self._take()
+        if not _NAME.fullmatch(name) or name in KEYWORDS:
+            raise self._error(f"{name!r} is no name")
+        return name
+
+    def _node(self, depth: int) -> Node | Use:
+        if depth > DEEPEST:
+            raise self._error(f"nodes lie more than {DEEPEST} deep in each other")
+        name: str | None = None
+        token = self._take()
+        if token == "USE":
+            used = self._new_name()
+            node = self._named.get(used)
+            if node is None:
+                raise self._error(f"{used!r} is used before it is defined")
+            return self._used(node, used)
+        if token == "DEF":
+            name = self._new_name()
+            self._define(name)
+            token = self._take()
+        kinds = self.fields.get(token)
+        if kinds is None:
+            node = self._unknown(token, name)
+            if name is not None:
+                self._named[name] = node
+            return node
+        self._expect("{")
+        fields: dict[str, Value] = {}
+        while self._ahead != "}":
+            field = self._take()
+            if field not in kinds:
+                self._stray(token, field)
+                continue
+            if field in fields:
+                raise self._error(f"the field {field} stands twice in one {token}")
+            fields[field] = self._value(kinds[field], depth)
+        self._take()
+        node = Node(token, tuple(fields.items()), name)
+        if name is not None:
+            self._named[name] = node
+        return node
+
+    def _define(self, name: str) -> None:
+        if name in self._named:
+            raise self._error(f"{name!r} is defined twice")
+        self._named[name] = None
+
+    def _used(self, _node: Node, name: str) -> Node | Use:
+        return Use(name)
+
+    def _unknown(self, kind: str, _name: str | None) -> Node:
+        """A node that is not in the table."""
+        raise self._error(f"{kind!r} is no node that is understood")
+
+    def _stray(self, kind: str, field: str) -> None:
+        """What stands where a node of that kind would have a field."""
+        raise self._error(f"{kind} has no field {field!r}")
+
+    def _value(self, kind: Type, depth: int) -> Value:
+        match kind:
+            case Type.NODE:
+                return self._node(depth + 1)
+            case Type.NODE_LIST:
+                return tuple(self._items(lambda: self._node(depth + 1)))
+            case Type.BOOL:
+                token = self._take()
+                if token not in ("TRUE", "FALSE"):
+                    raise self._error(f"TRUE or FALSE is wanted, not {token!r}")
+                return token == "TRUE"
+            case Type.STRING:
+                return self._string()
+            case Type.STRING_LIST:
+                return tuple(self._items(self._string))
+            case Type.INT:
+                return self._integer()
+            case Type.INT_LIST:
+                whole = self._row(_INTEGERS, int)
+                return tuple(self._items(self._integer)) if whole is None else whole
+        width = WIDTHS[kind]
+        if kind not in LISTS:
+            row = tuple(self._float() for _ in range(width))
+            return row[0] if width == 1 else row
+        # One value of a list may stand without brackets.
+        if self._ahead != "[":
+            return tuple(self._float() for _ in range(width))
+        numbers = self._row(_NUMBERS, float)
+        if numbers is None:
+            numbers = tuple(self._items(self._float))
+        if len(numbers) % width:
+            raise self._error(f"{len(numbers)} numbers are no rows of {width}")
+        return numbers
+
+    def _items(self, one: Callable[[], T]) -> Iterator[T]:
+        if self._ahead != "[":
+            yield one()
+            return
+        self._take()
+        while self._ahead != "]":
+            yield one()
+        self._take()
+
+    def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...] | None:
+        """A list that holds plain numbers alone, at once; None if it is not that simple."""
+        if self._ahead != "[":
+            return None
+        end = self._text.find("]", self._next)
+        plain = self._text[self._next : end].replace(",", " ")
+        if end < 0 or not pattern.fullmatch(plain):
+            return None
+        numbers = tuple(map(one, plain.split()))
+        if not all(map(math.isfinite, numbers)):
+            return None
+        self._next = end
+        self._take()
+        self._take()
+        return numbers
+
+    def _string(self) -> str:
+        token = self._take()
+        if not token.startswith('"'):
+            raise self._error(f"a text in quotes is wanted, not {token!r}")
+        return re.sub(r"\\(.)", r"\1", token[1:-1], flags=re.DOTALL)
+
+    def _float(self) -> float:
+        token = self._take()
+        if not _NUMBER.fullmatch(token):
+            raise self._error(f"a number is wanted, not {token!r}")
+        value = float(token)
+        if not math.isfinite(value):
+            raise self._error(f"{token!r} is too large a number")
+        return value
+
+    def _integer(self) -> int:
+        token = self._take()
+        if not _INTEGER.fullmatch(token):
+            raise self._error(f"a whole number is wanted, not {token!r}")
+        return int(token, 0) if "x" in token.lower() else int(token)
+
+    def _route(self) -> Route:
+        self._take()
+        source, out = self._end(EVENTS, "out of")
+        self._expect("TO")
+        target, into = self._end(SETTERS, "into")
+        kinds = {name: node.kind for name, node in self._named.items() if node is not None}
+        if EVENTS[kinds[source], out] is not SETTERS[kinds[target], into]:
+            raise self._error(f"{source}.{out} and {target}.{into} are of two types")
+        return Route(source, out, target, into)
+
+    def _end(self, events: Mapping[tuple[str, str], Type], which: str) -> tuple[str, str]:
+        token = self._take()
+        name, _, event = token.partition(".")
+        node = self._named.get(name)
+        if node is None or (node.kind, event) not in events:
+            raise self._error(f"no route goes {which} {token!r}")
+        return name, event

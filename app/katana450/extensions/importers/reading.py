@@ -1,0 +1,69 @@
+"""Reads one shape from standard input and writes it as .npz to standard output.
+
+``python -m katana450.extensions.importers.reading FORMAT NAME UNIT UP`` is started by
+`read_shape_guarded`. It bounds its memory and time before it reads its input. Keys of the .npz:
+vertices, faces, colours if there are any, unit and said, and corners, off,
+thickened and volume of the convex body round it; or error alone, a sentence.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.importers.shape_file import MEMORY, SECONDS, Format, Up, read_shape
+from katana450.maths.collision.outer import outer
+
+if sys.platform != "win32":
+    import resource
+
+
+def main(words: list[str]) -> None:
+    """Of one file; fails only where the bounds are met."""
+    bind()
+    format, name, unit, up = words
+    data = sys.stdin.buffer.read()
+    found: dict[str, object] = {}
+    try:
+        shape = read_shape(
+            data,
+            Format(format),
+            name,
+            float(unit) if unit else None,
+            Up(up) if up else None,
+        )
+        body = outer(shape.vertices)
+    except InputError as error:
+        found["error"] = str(error)
+    else:
+        found = {
+            key: getattr(shape, key) for key in ("vertices", "faces", "colours", "unit", "said")
+        } | vars(body)
+    made = io.BytesIO()
+    arrays = {key: np.array(value) for key, value in found.items() if value is not None}
+    np.savez(made, allow_pickle=False, **arrays)
+    sys.stdout.buffer.write(made.getvalue())
+
+
+def bind() -> None:
+    """Bound memory and time; Windows counts neither, but the parent's clock still does."""
+    if sys.platform == "win32":
+        return
+    limits = [("RLIMIT_AS", MEMORY), ("RLIMIT_CPU", round(SECONDS)), ("RLIMIT_CORE", 0)]
+    for limit, most in limits:
+        kind = getattr(resource, limit, None)
+        if kind is not None:
+            _, hard = resource.getrlimit(kind)
+            soft = most if hard == resource.RLIM_INFINITY else min(most, hard)
+            try:
+                resource.setrlimit(kind, (soft, hard))
+            except (ValueError, OSError):
+                # macOS refuses bounds that are below what it has mapped.
+                continue
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

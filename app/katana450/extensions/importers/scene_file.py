@@ -1,0 +1,178 @@
+"""A scene with its meshes: as a folder, and as one .zip of the same files.
+
+All of it is read and checked before anybody sees any of it. A path leads to nothing outside.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from katana450.errors import InputError
+from katana450.extensions.importers.meshes import Mesh, read_mesh
+from katana450.extensions.importers.shape_file import MOST_BYTES, Up
+from katana450.extensions.programs.source import LARGEST, Problem, ScriptError
+from katana450.extensions.scene.scene import MeshFile, Scene
+from katana450.extensions.scene.text import parsed, written
+from katana450.maths.geometry.arrays import FloatArray
+
+SCENE = "scene.yaml"
+"""Its text in a .zip."""
+
+FOLDER = "meshes"
+
+LARGEST_ZIP = 60_000_000
+"""Bytes of one, and of what is in it."""
+
+MOST_FILES = 64
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The oldest time that a .zip knows: the same scene is the same bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredScene:
+    """A scene, and the meshes its things are of."""
+
+    scene: Scene
+    meshes: tuple[Mesh, ...] = ()
+
+
+def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
+    """The scene in a .zip. Raises InputError; ScriptError with the lines where its text is wrong.
+
+    ``T_palm_tool``: see ``Hand``; None for an arm without.
+    """
+    if len(data) > LARGEST_ZIP:
+        raise InputError(f"A scene has at most {LARGEST_ZIP // 1_000_000} MB.")
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            names = archive.namelist()
+            if len(names) > MOST_FILES:
+                raise InputError(f"A scene has at most {MOST_FILES} files.")
+            if len(set(names)) < len(names):
+                raise InputError("Two files of the scene have the same name.")
+            if SCENE not in names:
+                raise InputError(f"There is no {SCENE} in the .zip.")
+            left = LARGEST_ZIP
+
+            def opened(path: str, most: int) -> bytes:
+                nonlocal left
+                if path not in names:
+                    raise InputError(f"There is no file {path} in the .zip.")
+                # What a .zip says of its sizes need not be so.
+                with archive.open(path) as file:
+                    content = file.read(min(most, left) + 1)
+                left -= len(content)
+                if left < 0:
+                    raise InputError(f"Unpacked it has more than {LARGEST_ZIP // 1_000_000} MB.")
+                return content
+
+            return _read(_text(opened(SCENE, LARGEST), SCENE), opened, T_palm_tool)
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError) as error:
+        raise InputError(f"This is no .zip that can be read: {error}.") from error
+    except (OSError, EOFError, ValueError, zlib.error) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"The .zip is broken: {error}.") from error
+
+
+def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene:
+    """The scene whose text is the file ``path``, its meshes beside or below it; or a .zip."""
+    if path.suffix.lower() == ".zip":
+        return read_scene_zip(_content(path, LARGEST_ZIP), T_palm_tool)
+    folder = path.resolve().parent
+
+    def opened(name: str, most: int) -> bytes:
+        found = (folder / name).resolve()
+        if not found.is_relative_to(folder):
+            raise InputError(f"{name} is not in the folder of the scene.")
+        return _content(found, most)
+
+    try:
+        return _read(_text(_content(path, LARGEST), path.name), opened, T_palm_tool)
+    except ScriptError as error:
+        raise InputError(f"{path}:\n{error}") from error
+
+
+def scene_zip(stored: StoredScene, T_palm_tool: FloatArray | None) -> bytes:
+    """The scene as a .zip."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in _files(stored, T_palm_tool).items():
+            archive.writestr(zipfile.ZipInfo(name, EPOCH), content, zipfile.ZIP_DEFLATED)
+    return out.getvalue()
+
+
+def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, bytes]:
+    """What there is to write, by relative paths."""
+    files: dict[str, MeshFile] = {}
+    contents: dict[str, bytes] = {}
+    for mesh in stored.meshes:
+        # Two files of one name are told apart by what is in them.
+        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", mesh.name).strip("_") or "mesh"
+        path = f"{FOLDER}/{stem}.{mesh.format.value}"
+        if path in contents:
+            path = f"{FOLDER}/{stem}_{mesh.key[:8]}.{mesh.format.value}"
+        up = None if mesh.up is None else mesh.up.value
+        files[mesh.key] = MeshFile(path, mesh.unit, up, mesh.sha256)
+        contents[path] = mesh.file
+    return {SCENE: written(stored.scene, files, T_palm_tool).encode()} | contents
+
+
+def _read(
+    text: str, opened: Callable[[str, int], bytes], T_palm_tool: FloatArray | None
+) -> StoredScene:
+    draft = parsed(text)
+    wanted = {entry.mesh: entry.at for entry in reversed(draft.entries) if entry.mesh is not None}
+    meshes: dict[MeshFile, Mesh] = {}
+    problems: list[Problem] = []
+    for file, at in reversed(wanted.items()):
+        try:
+            meshes[file] = _mesh(file, opened)
+        except InputError as error:
+            problems += at.wrong(str(error)).problems
+    if problems:
+        raise ScriptError(tuple(problems))
+    scene = draft.scene({file: mesh.solid for file, mesh in meshes.items()}, T_palm_tool)
+    kept = {mesh.key: mesh for mesh in meshes.values()}
+    return StoredScene(scene, tuple(kept.values()))
+
+
+def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
+    parts = PurePosixPath(file.path)
+    if (
+        parts.is_absolute()
+        or ".." in parts.parts
+        or re.search(r"[\\:\0]", file.path)
+        or not file.path.isprintable()
+    ):
+        raise InputError(f"{file.path!r} is no relative path within the scene.")
+    content = opened(file.path, MOST_BYTES)
+    mesh = read_mesh(content, file.path, file.unit, None if file.up is None else Up(file.up))
+    if file.sha256 is not None and mesh.sha256 != file.sha256:
+        raise InputError(
+            f"{file.path} is another file than the scene was saved with: its SHA-256 is "
+            f"{mesh.sha256}. If it is meant, leave `sha256` out."
+        )
+    return mesh
+
+
+def _content(path: Path, most: int) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(most + 1)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+
+
+def _text(content: bytes, name: str) -> str:
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{name} is no text in UTF-8: {error.reason}.") from error

@@ -1,0 +1,283 @@
+"""Shapes of other programs: .wrl, .stl, .obj, .ply, .glb and .gltf as triangles in metres, z up.
+
+A file is a stranger's. Readers open no other file, run nothing, and stop at bounds of their own;
+`read_shape_guarded` adds those of the system, in a process that can be lost.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+
+import katana450
+from katana450.errors import InputError, digits_beyond
+from katana450.extensions.importers.gltf_file import read_gltf
+from katana450.extensions.importers.obj_file import read_obj
+from katana450.extensions.importers.ply_file import read_ply
+from katana450.extensions.importers.stl_file import read_stl
+from katana450.extensions.importers.surface import Colours, Reading, Surface
+from katana450.extensions.importers.vrml_file import read_wrl
+from katana450.maths.collision.outer import Outer
+from katana450.maths.geometry.arrays import FloatArray, IntArray, frozen
+
+MOST_BYTES = 20_000_000
+
+LARGEST, SMALLEST = 2.0, 1e-3
+"""[m] Bounds of the longest side, the same as in arm/control/things, which takes long to load."""
+
+ROUNDING = 1e-6
+"""[1] Of a bound: what single precision makes of a length that is on it."""
+
+LONGEST_NAME = 40
+"""Characters; of things too."""
+
+SECONDS = 5.0
+"""Until a file has to be read."""
+
+MEMORY = 1 << 30
+"""[bytes] That reading it may take."""
+
+UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m": 1.0}
+"""[m] Those that programs write, by their signs."""
+
+
+class Format(Enum):
+    """By the end of a file's name."""
+
+    WRL = "wrl"
+    STL = "stl"
+    OBJ = "obj"
+    PLY = "ply"
+    GLB = "glb"
+    GLTF = "gltf"
+
+    @classmethod
+    def of(cls, file: str) -> Format:
+        """That of a file's name; .wrz is a .wrl that is compressed. Raises InputError."""
+        suffix = file.rpartition(".")[2].lower() if "." in file else ""
+        known = {each.value: each for each in cls} | {"wrz": cls.WRL}
+        if suffix not in known:
+            raise InputError(
+                f"{label(file)} is of no format that is read; give a file that ends in "
+                f"{', '.join(f'.{each}' for each in known)}."
+            )
+        return known[suffix]
+
+
+class Up(Enum):
+    """Which axis of a file points up."""
+
+    Y = "y"
+    Z = "z"
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeFile:
+    """What was read, in metres, z up.
+
+    Attributes:
+        name: from the file's, fit for a thing.
+        vertices: (n, 3) [m], each of a face and no two alike.
+        faces: (m, 3) indices of them, counter-clockwise seen from outside.
+        colours: (m, 4) sRGB and opacity a face; None where the file says none.
+        unit: metres a unit of the file.
+        said: for people: the unit and why, how many triangles, how large, what was left out.
+    """
+
+    name: str
+    vertices: FloatArray
+    faces: IntArray
+    colours: Colours | None
+    unit: float
+    said: str
+
+    def __post_init__(self) -> None:
+        for array in (self.vertices, self.faces, self.colours):
+            if array is not None:
+                array.setflags(write=False)
+
+
+def read_shape(
+    data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
+) -> ShapeFile:
+    """The shape in a file of that name.
+
+    Args:
+        data: its bytes.
+        format: of which kind it is.
+        name: of the file, with or without folders.
+        unit: metres a unit of the file; None to guess.
+        up: its axis that points up; None for the one that the format has.
+
+    Raises InputError for a file that is broken, too large, or not of that format.
+    """
+    file = label(name)
+    _check(data, file, unit)
+    try:
+        reading = _read(data, format, file)
+    except RecursionError as error:
+        raise InputError(f"{file} is broken: its parts lie too deep in each other.") from error
+    surface = reading.surface.tidy()
+    if not len(surface.faces):
+        without = f" It has {_listed(reading.left_out)}." if reading.left_out else ""
+        raise InputError(f"{file} has no triangles.{without}")
+    sides = np.ptp(surface.vertices, axis=0)
+    longest = float(sides.max())
+    told, why = _unit(format, longest, unit)
+    _check_size(longest, told, file)
+    axis = up or (Up.Z if format in (Format.STL, Format.OBJ, Format.PLY) else Up.Y)
+    vertices = surface.vertices * told
+    if axis is Up.Y:
+        vertices = vertices[:, (0, 2, 1)] * (1.0, -1.0, 1.0)
+    said = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
+    if reading.left_out:
+        said += f" Left out: {_listed(reading.left_out)}."
+    return ShapeFile(thing_name(name), vertices, surface.faces, surface.colours, told, said)
+
+
+def read_shape_guarded(
+    data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
+) -> tuple[ShapeFile, Outer]:
+    """As `read_shape`, with the convex body round it, both worked out in a process of its own.
+
+    It has `SECONDS` and, where the system counts it, `MEMORY`; InputError beyond that too, and
+    when it crashes.
+    """
+    file = label(name)
+    _check(data, file, unit)
+    words = [
+        format.value,
+        file,
+        "" if unit is None else str(float(unit)),
+        "" if up is None else up.value,
+    ]
+    # One thread: a pool for every core would take address space, which is what is bounded.
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
+            cwd=Path(katana450.__file__).parents[1],
+            env=environment,
+            input=data,
+            capture_output=True,
+            timeout=SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise InputError(
+            f"{file} takes longer than {SECONDS:g} s to read; save it simpler."
+        ) from error
+    if done.returncode:
+        raise InputError(
+            f"{file} cannot be read: it wants more than {SECONDS:g} s or {MEMORY >> 20} MiB, or is "
+            "broken in a new way; save it simpler."
+        )
+    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
+        if "error" in found:
+            raise InputError(str(found["error"]))
+        shape = ShapeFile(
+            thing_name(name),
+            found["vertices"],
+            found["faces"],
+            found.get("colours"),
+            float(found["unit"]),
+            str(found["said"]),
+        )
+        body = Outer(
+            frozen(found["corners"]),
+            float(found["off"]),
+            bool(found["thickened"]),
+            float(found["volume"]),
+        )
+        return shape, body
+
+
+def label(name: str) -> str:
+    """What a file is called in sentences: without folders, and short."""
+    last = re.split(r"[\\/]", name)[-1]
+    printed = "".join(sign for sign in last if sign.isprintable()).strip()
+    if len(printed) > LONGEST_NAME:
+        printed = f"{printed[: LONGEST_NAME - 9]}…{printed[-8:]}"
+    return printed or "The file"
+
+
+def thing_name(name: str) -> str:
+    """What a thing of that file is called."""
+    stem = label(name).rpartition(".")[0].strip()
+    return stem or "shape"
+
+
+def _check(data: bytes, file: str, unit: float | None) -> None:
+    if len(data) > MOST_BYTES:
+        raise InputError(
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {MOST_BYTES // 1_000_000} are read; "
+            "save it coarser, or as a binary file."
+        )
+    if unit is not None and not (math.isfinite(unit) and unit > 0.0):
+        raise InputError(f"The unit has to be a length in metres above 0, not {unit}.")
+
+
+def _read(data: bytes, format: Format, file: str) -> Reading:
+    match format:
+        case Format.WRL:
+            return read_wrl(data, file, MOST_BYTES)
+        case Format.STL:
+            return read_stl(data, file)
+        case Format.OBJ:
+            return read_obj(data, file)
+        case Format.PLY:
+            return read_ply(data, file)
+    return read_gltf(data, file)
+
+
+def _unit(format: Format, longest: float, told: float | None) -> tuple[float, str]:
+    """Metres a unit, and why."""
+    if told is not None:
+        return told, f"the unit is {_sign(told)}, as told"
+    if format in (Format.GLB, Format.GLTF):
+        return 1.0, "the unit is m, as glTF has it"
+    if longest > LARGEST * (1.0 + ROUNDING):
+        return 1e-3, f"the unit is taken as mm, since {longest:.4g} m would be too large"
+    return 1.0, f"the unit is taken as m, since {longest:.4g} mm would be small"
+
+
+def _sign(unit: float) -> str:
+    return next((sign for sign, metres in UNITS.items() if metres == unit), f"{unit:g} m")
+
+
+def _check_size(longest: float, unit: float, file: str) -> None:
+    length = longest * unit
+    if SMALLEST * (1.0 - ROUNDING) <= length <= LARGEST * (1.0 + ROUNDING):
+        return
+    fitting = [s for s, metres in UNITS.items() if SMALLEST <= longest * metres <= LARGEST]
+    hint = f"it would fit with the unit {' or '.join(fitting)}" if fitting else "no unit would fit"
+    said = digits_beyond(1e3 * length, 1e3 * SMALLEST, 1e3 * LARGEST)
+    raise InputError(
+        f"{file} would be {said} mm long, with {_sign(unit)} as its unit; "
+        f"from {SMALLEST * 1e3:g} to {LARGEST * 1e3:g} mm can be shown, and {hint}."
+    )
+
+
+def _size(vertices: FloatArray, surface: Surface) -> str:
+    x, y, z = (f"{side * 1e3:.4g}" for side in np.ptp(vertices, axis=0))
+    count = len(surface.faces)
+    return f"{count} triangle{'s' if count > 1 else ''}, {x} × {y} × {z} mm"
+
+
+def _turned(axis: Up, told: Up | None) -> str:
+    why = ", as told" if told is not None else ""
+    return f"z is up{why}" if axis is Up.Z else f"y of the file is up{why}, and turned to z"
+
+
+def _listed(parts: tuple[str, ...]) -> str:
+    few = [part if len(part) <= LONGEST_NAME else f"{part[:LONGEST_NAME]}…" for part in parts[:8]]
+    return ", ".join(few) + (f" and {len(parts) - 8} more" if len(parts) > 8 else "")

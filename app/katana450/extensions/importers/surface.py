@@ -1,0 +1,190 @@
+"""Triangles on their way in: what every reader makes of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.errors import InputError
+from katana450.extensions.importers.polygons import cut
+from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+Colours = npt.NDArray[np.uint8]
+
+GREY = (204, 204, 204, 255)
+"""What has no colour beside something that has: VRML97's own default."""
+
+MOST_TRIANGLES = 200_000
+
+MOST_COPIES = 20_000
+"""Nodes of a scene, each counted as often as it is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """vertices: (n, 3). faces: (m, 3) indices of them, counter-clockwise seen from outside.
+
+    colours: (m, 4) sRGB and opacity a face; None where the file says none.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    colours: Colours | None = None
+
+    def moved(self, T: FloatArray) -> Surface:
+        """Under the affine map `T` (4, 4); a mirrored surface keeps its outside."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            vertices = self.vertices @ T[:3, :3].T + T[:3, 3]
+            mirrored = float(np.linalg.det(T[:3, :3])) < 0.0
+        return Surface(vertices, self.faces[:, ::-1] if mirrored else self.faces, self.colours)
+
+    def painted(self, colour: Sequence[float] | None) -> Surface:
+        """In one colour (4,) 0..1, where it has none of its own."""
+        if colour is None or self.colours is not None:
+            return self
+        return Surface(self.vertices, self.faces, np.tile(as_bytes([colour]), (len(self.faces), 1)))
+
+    def tidy(self) -> Surface:
+        """With equal vertices made one, and without what is of no face or spans no triangle."""
+        rows, faces = _used(self.vertices, self.faces)
+        # Adding zero makes 0 of -0.
+        rows = rows + 0.0
+        order = np.lexsort(rows.T)
+        first = np.ones(len(rows), dtype=bool)
+        first[1:] = (np.diff(rows[order], axis=0) != 0.0).any(axis=1)
+        number = np.empty(len(rows), dtype=np.int64)
+        number[order] = np.cumsum(first) - 1
+        faces = number[faces]
+        a, b, c = faces.T
+        kept = (a != b) & (b != c) & (c != a)
+        vertices, faces = _used(rows[order][first], faces[kept])
+        return Surface(vertices, faces, None if self.colours is None else self.colours[kept])
+
+
+def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Those vertices that are of a face, and the faces with their new indices."""
+    used = np.zeros(len(vertices), dtype=bool)
+    used[faces] = True
+    return vertices[used], (np.cumsum(used) - 1)[faces]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What a reader found: the surface in the file's own units and axes, and in words what it
+    left out."""
+
+    surface: Surface
+    left_out: tuple[str, ...] = ()
+
+
+class Pile:
+    """Surfaces that are put together to one, as long as they are few enough."""
+
+    def __init__(self, name: str) -> None:
+        """`name` says in errors which file it is."""
+        self._name = name
+        self._parts: list[Surface] = []
+        self._triangles = 0
+
+    def add(self, part: Surface) -> None:
+        """Raises InputError for more triangles than may be, and for places that are not finite."""
+        self._triangles += len(part.faces)
+        check_triangles(self._triangles, self._name)
+        check_finite(part.vertices, self._name)
+        self._parts.append(part)
+
+    def surface(self) -> Surface:
+        """All of them; in colour if one of them is."""
+        coloured = any(part.colours is not None for part in self._parts)
+        offsets = np.cumsum([0, *(len(part.vertices) for part in self._parts)])
+        paint = [value / 255.0 for value in GREY]
+        parts = [part.painted(paint if coloured else None) for part in self._parts]
+        return Surface(
+            np.concatenate([np.zeros((0, 3)), *(part.vertices for part in parts)]),
+            np.concatenate(
+                [np.zeros((0, 3), dtype=np.int64)]
+                + [part.faces + offset for part, offset in zip(parts, offsets, strict=False)]
+            ),
+            np.concatenate([part.colours for part in parts if part.colours is not None])
+            if coloured
+            else None,
+        )
+
+
+def check_triangles(count: int, name: str) -> None:
+    """InputError for more than may be."""
+    if count > MOST_TRIANGLES:
+        raise InputError(
+            f"{name} has more than {MOST_TRIANGLES} triangles, which is the most; "
+            "save it coarser, or in parts."
+        )
+
+
+def of_polygons(
+    vertices: FloatArray,
+    corners: IntArray,
+    sizes: IntArray,
+    name: str,
+    colours: Colours | None = None,
+    corner_colours: FloatArray | None = None,
+    vertex_colours: FloatArray | None = None,
+) -> Surface:
+    """The surface of polygons, concave ones too.
+
+    Args:
+        vertices: (n, 3).
+        corners: (k,) indices of vertices, polygon after polygon.
+        sizes: (p,) corners each; polygons of fewer than three are left out.
+        name: of the file.
+        colours: (p, 4) a polygon.
+        corner_colours: (k, 4) 0..1 a corner; a triangle has the mean of its three.
+        vertex_colours: (n, 4) 0..1 a vertex; the same.
+
+    Raises InputError for indices of no vertex, coordinates that are no finite numbers, and more
+    triangles than may be.
+    """
+    check_triangles(int(np.maximum(sizes - 2, 0).sum()), name)
+    wrong = (corners < 0) | (corners >= len(vertices))
+    if wrong.any():
+        raise InputError(
+            f"{name} has a face with vertex {int(corners[wrong][0])}, counted from 0, "
+            f"but only {len(vertices)} vertices."
+        )
+    check_finite(vertices[corners], name)
+    triangles, polygon = cut(vertices, corners, sizes)
+    if vertex_colours is not None:
+        colours = as_bytes(vertex_colours[corners[triangles]].mean(axis=1))
+    elif corner_colours is not None:
+        colours = as_bytes(corner_colours[triangles].mean(axis=1))
+    elif colours is not None:
+        colours = colours[polygon]
+    return Surface(vertices, corners[triangles], colours)
+
+
+def doubles(values: npt.NDArray[Any]) -> FloatArray:
+    """The same numbers in double precision, quietly where one is no number."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)
+
+
+def check_finite(vertices: FloatArray, name: str) -> None:
+    """InputError for NaN, infinity, and what soon would be."""
+    if not (np.abs(vertices) < 1e30).all():
+        raise InputError(f"{name} has coordinates that are no finite numbers.")
+
+
+def as_bytes(colours: Iterable[Sequence[float]] | FloatArray) -> Colours:
+    """(m, 4) bytes of colours 0..1; what is beyond is brought in."""
+    rows = np.nan_to_num(np.asarray(colours, dtype=np.float64))
+    return np.rint(np.clip(rows, 0.0, 1.0) * 255.0).astype(np.uint8).reshape(-1, 4)
+
+
+def display(light: FloatArray) -> FloatArray:
+    """sRGB 0..1 of light 0..1 (..., 3), IEC 61966-2-1; glTF tells colours as light."""
+    light = np.clip(np.nan_to_num(light), 0.0, 1.0)
+    root = 1.055 * np.power(light, 1.0 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, root)

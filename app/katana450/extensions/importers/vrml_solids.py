@@ -1,0 +1,284 @@
+"""The surfaces that VRML97's geometry nodes stand for, in their own frames.
+
+Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
+6.23 IndexedFaceSet, 6.42 Sphere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.export.vrml_node import Node
+from katana450.extensions.importers.surface import Surface, check_triangles, of_polygons
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+ROUND = 32
+"""Sides of what is round."""
+
+
+def surface_of(node: Node, name: str) -> Surface | None:
+    """Of a geometry node; None where it has none, as of lines.
+
+    `name` is the file's. Raises InputError for a node that contradicts itself.
+    """
+    make = MAKERS.get(node.kind)
+    return None if make is None else make(node, name)
+
+
+def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
+    """(k, width) of a field of numbers."""
+    value = node.get(field)
+    return np.array(default if value is None else value, dtype=np.float64).reshape(-1, width)
+
+
+def number(node: Node, field: str, default: float) -> float:
+    """Of a field of one number."""
+    value = node.get(field)
+    return default if value is None else float(value)  # type: ignore[arg-type]
+
+
+def flag(node: Node, field: str, default: bool = True) -> bool:
+    """Of a field that is true or false."""
+    value = node.get(field)
+    return default if value is None else bool(value)
+
+
+def part(node: Node, field: str) -> Node | None:
+    """The node in a field."""
+    value = node.get(field)
+    return value if isinstance(value, Node) else None
+
+
+def _positive(node: Node, name: str, **fields: float) -> list[float]:
+    values = [number(node, field, default) for field, default in fields.items()]
+    if min(values) <= 0.0:
+        raise InputError(f"{name} has a {node.kind} of no size.")
+    return values
+
+
+def _box(node: Node, name: str) -> Surface:
+    half = numbers(node, "size", (2.0, 2.0, 2.0))[:, 0] / 2.0
+    if half.min() <= 0.0:
+        raise InputError(f"{name} has a Box of no size.")
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    sides = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
+    return of_polygons(signs * half, np.array(sides), np.full(6, 4), name)
+
+
+def _cone(node: Node, name: str) -> Surface:
+    radius, height = _positive(node, name, bottomRadius=1.0, height=2.0)
+    ring = [(radius, -height / 2.0), (0.0, height / 2.0)]
+    return _turned(ring, flag(node, "bottom"), flag(node, "side"), False, name)
+
+
+def _cylinder(node: Node, name: str) -> Surface:
+    radius, height = _positive(node, name, radius=1.0, height=2.0)
+    ring = [(radius, -height / 2.0), (radius, height / 2.0)]
+    return _turned(ring, flag(node, "bottom"), flag(node, "side"), flag(node, "top"), name)
+
+
+def _sphere(node: Node, name: str) -> Surface:
+    (radius,) = _positive(node, name, radius=1.0)
+    angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, ROUND // 2 + 1)
+    profile = np.column_stack((np.cos(angles), np.sin(angles))) * radius
+    profile[[0, -1], 0] = 0.0
+    return _turned(profile, False, True, False, name)
+
+
+def _turned(
+    profile: Sequence[tuple[float, float]] | FloatArray,
+    bottom: bool,
+    side: bool,
+    top: bool,
+    name: str,
+) -> Surface:
+    """A profile (k, 2) of radius and y, from the bottom up, turned about y."""
+    rows = np.asarray(profile, dtype=np.float64)
+    turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
+    ring = np.column_stack((np.sin(turn), np.zeros(ROUND), np.cos(turn)))
+    points = (rows[:, None, :1] * ring + rows[:, None, 1:] * (0.0, 1.0, 0.0)).reshape(-1, 3)
+    corners: list[IntArray] = []
+    sizes: list[int] = []
+    here, ahead = np.arange(ROUND), np.roll(np.arange(ROUND), -1)
+    if side:
+        for row in range(len(rows) - 1):
+            low, high = row * ROUND, (row + 1) * ROUND
+            quads = np.column_stack((low + here, low + ahead, high + ahead, high + here))
+            corners.append(quads.ravel())
+            sizes += [4] * ROUND
+    if bottom:
+        corners.append(here[::-1])
+        sizes.append(ROUND)
+    if top:
+        corners.append((len(rows) - 1) * ROUND + here)
+        sizes.append(ROUND)
+    flat = np.concatenate([np.zeros(0, dtype=np.int64), *corners])
+    return of_polygons(points, flat, np.array(sizes, dtype=np.int64), name)
+
+
+def _face_set(node: Node, name: str) -> Surface:
+    coord, color = part(node, "coord"), part(node, "color")
+    points = np.zeros((0, 3)) if coord is None else numbers(coord, "point", (), 3)
+    index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
+    corners, sizes = _split(index)
+    face_colours = corner_colours = None
+    if color is not None:
+        paint = numbers(color, "color", (), 3)
+        chosen = numbers(node, "colorIndex", ())[:, 0].astype(np.int64)
+        if flag(node, "colorPerVertex"):
+            places, their_sizes = _split(chosen) if len(chosen) else (corners, sizes)
+            fits = np.array_equal(sizes, their_sizes)
+            corner_colours = _chosen(paint, places, fits, name)
+        else:
+            places = chosen if len(chosen) else np.arange(len(sizes))
+            face_colours = _chosen(paint, places[: len(sizes)], len(places) >= len(sizes), name)
+    turned = not flag(node, "ccw")
+    if face_colours is not None:
+        corner_colours = np.repeat(face_colours, sizes, axis=0)
+    surface = of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
+    return _facing(surface, turned)
+
+
+def _split(index: IntArray) -> tuple[IntArray, IntArray]:
+    """Corners (k,), and how many (p,) each polygon has, of a list with -1 between polygons."""
+    ends = np.flatnonzero(np.append(index, -1) < 0)
+    sizes = np.diff(ends, prepend=-1) - 1
+    # The last polygon needs no -1.
+    return index[index >= 0], sizes if len(index) == 0 or index[-1] >= 0 else sizes[:-1]
+
+
+def _chosen(paint: FloatArray, places: IntArray, fits: bool, name: str) -> FloatArray:
+    """(k, 4) of the colours (c, 3) at those places."""
+    if not fits or (places < 0).any() or (places >= len(paint)).any():
+        raise InputError(f"{name} has an IndexedFaceSet whose colours do not go with its faces.")
+    return np.column_stack((paint[places], np.ones(len(places))))
+
+
+def _facing(surface: Surface, turned: bool) -> Surface:
+    if not turned:
+        return surface
+    return Surface(surface.vertices, surface.faces[:, ::-1], surface.colours)
+
+
+def _grid(node: Node, name: str) -> Surface:
+    columns, rows = (int(number(node, f"{axis}Dimension", 0.0)) for axis in "xz")
+    height = numbers(node, "height", ())[:, 0]
+    if min(columns, rows) < 0 or columns * rows != len(height):
+        raise InputError(f"{name} has an ElevationGrid whose heights are not as many as it says.")
+    if min(columns, rows) < 2:
+        return of_polygons(np.zeros((0, 3)), np.arange(0), np.arange(0), name)
+    x = np.arange(columns) * number(node, "xSpacing", 1.0)
+    z = np.arange(rows) * number(node, "zSpacing", 1.0)
+    points = np.column_stack((np.tile(x, rows), height, np.repeat(z, columns)))
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    corners = np.column_stack((first, first + columns, first + columns + 1, first + 1)).ravel()
+    corner_colours = None
+    color = part(node, "color")
+    if color is not None:
+        paint = numbers(color, "color", (), 3)
+        by_vertex = flag(node, "colorPerVertex")
+        places = corners if by_vertex else np.repeat(np.arange(len(first)), 4)
+        corner_colours = _chosen(paint, places, True, name)
+    surface = of_polygons(
+        points, corners, np.full(len(first), 4), name, corner_colours=corner_colours
+    )
+    return _facing(surface, not flag(node, "ccw"))
+
+
+def _extrusion(node: Node, name: str) -> Surface:
+    square = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
+    section = numbers(node, "crossSection", square, 2)
+    spine = numbers(node, "spine", (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), 3)
+    scale = numbers(node, "scale", (1.0, 1.0), 2)
+    turns = numbers(node, "orientation", (0.0, 0.0, 1.0, 0.0), 4)
+    count, rows = len(section), len(spine)
+    if count < 2 or rows < 2 or not len(scale) or not len(turns):
+        raise InputError(f"{name} has an Extrusion that is too short.")
+    check_triangles(2 * (count - 1) * (rows - 1), name)
+    frames = _frames(spine)
+    points = np.empty((rows, count, 3))
+    for row in range(rows):
+        x, y, z, angle = turns[min(row, len(turns) - 1)]
+        flat = section * scale[min(row, len(scale) - 1)]
+        placed = np.column_stack((flat[:, 0], np.zeros(count), flat[:, 1]))
+        R = frames[row] @ so3.exp(angle * unit(np.array((x, y, z))))
+        points[row] = placed @ R.T + spine[row]
+    first = (np.arange(rows - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    quads = np.column_stack((first, first + 1, first + count + 1, first + count))
+    corners, sizes = [quads.ravel()], [np.full(len(first), 4)]
+    # The last corner of a section that is closed is the first once more.
+    closed = bool((section[0] == section[-1]).all())
+    cap = np.arange(count - closed)
+    for wanted, polygon in (
+        (flag(node, "beginCap"), cap[::-1]),
+        (flag(node, "endCap"), (rows - 1) * count + cap),
+    ):
+        if wanted and len(polygon) > 2:
+            corners.append(polygon)
+            sizes.append(np.array([len(polygon)]))
+    surface = of_polygons(
+        points.reshape(-1, 3), np.concatenate(corners), np.concatenate(sizes), name
+    )
+    return _facing(surface, not flag(node, "ccw"))
+
+
+def _frames(spine: FloatArray) -> list[FloatArray]:
+    """(3, 3) of the section's plane at each point of a spine, as 6.18 has it: y along the spine,
+    z out of its bend; where there is none, as at the point before."""
+    closed = bool((spine[0] == spine[-1]).all())
+    ahead, behind = np.roll(spine, -1, axis=0), np.roll(spine, 1, axis=0)
+    if closed:
+        ahead[-1], behind[0] = spine[1], spine[-2]
+    else:
+        ahead[-1], behind[0] = spine[-1], spine[0]
+    along = [unit(row) for row in ahead - behind]
+    bends = [unit(row) for row in np.cross(ahead - spine, behind - spine)]
+    if not closed:
+        bends[0], bends[-1] = bends[min(1, len(bends) - 1)], bends[max(len(bends) - 2, 0)]
+    frames: list[FloatArray] = []
+    y = next((row for row in along if row.any()), np.array((0.0, 1.0, 0.0)))
+    z = next((row for row in bends if row.any()), None)
+    if z is None:
+        z = _least_turn(y)[:, 2]
+    for direction, bend in zip(along, bends, strict=True):
+        y = direction if direction.any() else y
+        z = bend if bend.any() else z
+        # Bends that go the other way would turn the section over.
+        if frames and float(z @ frames[-1][:, 2]) < 0.0:
+            z = -z
+        x = unit(np.cross(y, z))
+        frames.append(np.column_stack((x, y, np.cross(x, y))))
+    return frames
+
+
+def _least_turn(y: FloatArray) -> FloatArray:
+    """(3, 3) the rotation by the least angle that takes the y axis to the unit vector `y`."""
+    axis = np.cross((0.0, 1.0, 0.0), y)
+    sine, cosine = float(np.linalg.norm(axis)), float(y[1])
+    way = axis / sine if sine > 0.0 else np.array((0.0, 0.0, 1.0))
+    return so3.exp(way * float(np.arctan2(sine, cosine)))
+
+
+def unit(v: FloatArray) -> FloatArray:
+    """Of length 1; 0 stays 0."""
+    size = float(np.abs(v).max())
+    if not size > 0.0:
+        return np.zeros_like(v)
+    v = v / size
+    return np.asarray(v / np.linalg.norm(v))
+
+
+MAKERS: dict[str, Callable[[Node, str], Surface]] = {
+    "Box": _box,
+    "Cone": _cone,
+    "Cylinder": _cylinder,
+    "Sphere": _sphere,
+    "IndexedFaceSet": _face_set,
+    "ElevationGrid": _grid,
+    "Extrusion": _extrusion,
+}
+"""By the kind of a node."""

@@ -1,0 +1,61 @@
+"""How a hand comes up to a thing, and takes what it holds elsewhere."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.extensions.programs.bench import Bench
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
+from katana450.maths.planning.plan import JOINED
+
+APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
+"""[m] From how far the open fingers come, and how far they draw back, the farthest first."""
+
+UP = frozen((0.0, 0.0, 1.0))
+
+
+def before(middle: FloatArray, pitch: float, back: float) -> ToolTarget:
+    """The tool ``back`` [m] before ``middle`` (3,), coming along its own axis."""
+    out = np.array((middle[0], middle[1], 0.0)) / math.hypot(middle[0], middle[1])
+    along = math.cos(pitch) * out - math.sin(pitch) * UP
+    return ToolTarget(middle - back * along, pitch, 0.0)
+
+
+def carry(bench: Bench, to: ToolTarget, name: str) -> None:
+    """To ``to``: up or down and round axis 1 as the tool is turned now, then out or in.
+
+    So what is held upright stays so, unless ``to`` has it otherwise.
+    """
+    at = bench.at
+    here = math.atan2(at.position[1], at.position[0])
+    there = math.atan2(to.position[1], to.position[0])
+    radius = math.hypot(at.position[0], at.position[1])
+    z = float(to.position[2])
+    raised = replace(at, position=at.position * (1, 1, 0) + UP * max(z, at.position[2]))
+    turned = ToolArc(
+        raised.position,
+        np.zeros(3),
+        UP,
+        there - here,
+        Linear(at.pitch, at.pitch),
+        Linear(at.roll, at.roll),
+    )
+    over = replace(
+        raised,
+        position=np.array((radius * math.cos(there), radius * math.sin(there), raised.position[2])),
+    )
+    curves: list[Curve] = []
+    if (raised.position != at.position).any():
+        curves.append(ToolLine(at, raised))
+    if abs(there - here) > JOINED:
+        curves.append(turned)
+    turns = abs(to.pitch - over.pitch), abs(to.roll - over.roll)
+    if max(float(np.abs(over.position - to.position).max()), *turns) > JOINED:
+        curves.append(ToolLine(over, to))
+    if curves:
+        bench.lead(curves, name)

@@ -1,0 +1,159 @@
+"""A script: what it is called, what it is for, its poses and steps, each with its line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from katana450.arm.control.commands import LEAST_SPEED
+from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.bench import Place
+from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.manner import Tool
+from katana450.extensions.programs.measures import MEASURES
+from katana450.extensions.programs.places import place
+from katana450.extensions.programs.setting import Setting
+from katana450.extensions.programs.source import Problem, ScriptError, Value
+from katana450.extensions.programs.source import read as read_text
+from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.steps import STEPS
+
+MOST_STEPS = 1000
+"""All repetitions counted."""
+
+MOST_TIMES = 1000
+
+LONGEST_NAME = 40
+
+NOTHING: dict[str, tuple[float, float]] = {}
+"""Is expected where a script does not say."""
+
+
+class Placed(NamedTuple):
+    """A step, and where it stands."""
+
+    step: Step
+    line: int
+    column: int
+
+
+@dataclass(frozen=True)
+class Script:
+    """name, about: for people. bare: whether it is for an arm without its gripper.
+
+    speed: share of full speed. steps: in their order, all repetitions written out. expected: of
+    measures by name, the least and the most they may be.
+    """
+
+    name: str
+    about: str
+    bare: bool
+    speed: float
+    steps: tuple[Placed, ...]
+    expected: Mapping[str, tuple[float, float]]
+
+
+def parse(text: str) -> Script:
+    """The script that ``text`` is. Raises ScriptError with all that is wrong, line by line."""
+    top = Fields(read_text(text), "a script")
+    name = top.take("name", _name, "Script")
+    about = top.take("about", read.text, "")
+    fitted = top.take("gripper", read.choice("fitted", "none"), "fitted")
+    frame = top.take("frame", read.choice("shoulder", "base"), "shoulder")
+    speed = top.take("speed", read.number(LEAST_SPEED, 1.0), 1.0)
+    in_base = frame == "base"
+    no_poses: dict[str, Place] = {}
+    poses = top.take("poses", lambda value: _poses(value, in_base=in_base), no_poses)
+    setting = Setting(in_base, poses)
+    tool = top.take("tool", lambda value: Placed(Tool.read(value, setting), *_at(value)), None)
+    expected = top.take("expect", _expected, NOTHING)
+    steps: tuple[Placed, ...]
+    steps = top.need("steps", lambda value: _steps(value, setting), ())
+    top.done()
+    if tool is not None:
+        steps = (tool, *steps)
+    return Script(name, about, fitted == "none", speed, steps, expected)
+
+
+def _steps(value: Value, setting: Setting) -> tuple[Placed, ...]:
+    found: list[Placed] = []
+    problems: list[Problem] = []
+    for item in value.items if value.kind == "list" else ():
+        try:
+            found += _step(item, setting)
+        except ScriptError as error:
+            problems += error.problems
+        if len(found) > MOST_STEPS:
+            said = f"A script has at most {MOST_STEPS} steps, repetitions counted."
+            problems += item.wrong(said).problems
+            break
+    if value.kind != "list" or not value.items:
+        what = "an empty one" if value.kind == "list" else value
+        problems += value.wrong(f"A list of steps goes here, not {what}.").problems
+    if problems:
+        raise ScriptError(tuple(problems))
+    return tuple(found)
+
+
+def _step(item: Value, setting: Setting) -> tuple[Placed, ...]:
+    """One step, or what a `repeat` comes to."""
+    name, value = item, Value(item.line, item.column, None, "nothing")
+    if item.kind == "mapping":
+        if len(item.fields) != 1:
+            names = ", ".join(str(name.held) for name, _ in item.fields)
+            raise item.wrong(f"A step is one name with what belongs to it, not {names or 'none'}.")
+        ((name, value),) = item.fields
+    known = (*STEPS, "repeat")
+    if name.held not in known:
+        raise name.wrong(f"There is no step {name}{read.or_known(str(name.held), known)}")
+    if name.held != "repeat":
+        return (Placed(STEPS[str(name.held)].read(value, setting), *_at(name)),)
+    fields = Fields(value, "a repeat")
+    times = fields.need("times", read.whole(1, MOST_TIMES), 1)
+    steps = fields.need("steps", lambda inner: _steps(inner, setting), ())
+    fields.done()
+    if times * len(steps) > MOST_STEPS:
+        raise name.wrong(f"These are {times * len(steps)} steps; at most {MOST_STEPS} go.")
+    return steps * times
+
+
+def _poses(value: Value, *, in_base: bool) -> dict[str, Place]:
+    """By their names; each may be named by those after it."""
+    fields = Fields(value, "the poses")
+    found: dict[str, Place] = {}
+    for name in [str(key.held) for key, _ in value.fields]:
+        read_place = fields.take(name, lambda each: place(each, Setting(in_base, found)), None)
+        if read_place is not None:
+            found[name] = read_place
+    fields.done()
+    return found
+
+
+def _expected(value: Value) -> dict[str, tuple[float, float]]:
+    fields = Fields(value, "what is expected")
+    found = {name: fields.take(name, _bounds, None) for name in MEASURES}
+    fields.done()
+    return {name: bounds for name, bounds in found.items() if bounds is not None}
+
+
+def _bounds(value: Value) -> tuple[float, float]:
+    fields = Fields(value, "a bound")
+    any_number = read.number(-1e9, 1e9)
+    bounds = (
+        fields.take("at_least", any_number, float("-inf")),
+        fields.take("at_most", any_number, float("inf")),
+    )
+    fields.done()
+    return bounds
+
+
+def _name(value: Value) -> str:
+    name = read.text(value)
+    if len(name) > LONGEST_NAME or not name.isprintable():
+        raise value.wrong(f"A name has at most {LONGEST_NAME} characters, all on one line.")
+    return name
+
+
+def _at(value: Value) -> tuple[int, int]:
+    return value.line, value.column

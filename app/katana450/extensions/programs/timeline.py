@@ -1,0 +1,53 @@
+"""Where a program has the arm at a time: its plans one after another."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.program import Program
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.planning.plan import Segment
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """The motions of a program at full speed, on the clock of `Program.duration`; pauses between
+    them, for the gripper for example, are left out.
+
+    pieces: in their order, each with the finger joint meanwhile [rad]. begins: [s] when each does,
+    and the last ends.
+    """
+
+    pieces: tuple[tuple[Segment, float], ...]
+    begins: tuple[float, ...]
+
+    @staticmethod
+    def of(program: Program) -> Timeline:
+        """The timeline of ``program``."""
+        plans = [task.order.plan for task in program.tasks if isinstance(task.order, Go)]
+        pieces = tuple((segment, plan.fingers) for plan in plans for segment in plan.segments)
+        durations = (segment.scaling.duration for segment, _ in pieces)
+        return Timeline(pieces, tuple(accumulate(durations, initial=0.0)))
+
+    @property
+    def span(self) -> float:
+        """[s] to its end."""
+        return self.begins[-1]
+
+    def at(self, t: float) -> tuple[FloatArray, float]:
+        """The joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
+
+        There has to be a motion.
+        """
+        number = min(max(bisect_right(self.begins, t) - 1, 0), len(self.pieces) - 1)
+        segment, fingers = self.pieces[number]
+        return segment.at(segment.scaling.tau_after(t - self.begins[number])).q, fingers
+
+    def postures(self, count: int) -> list[tuple[FloatArray, float]]:
+        """``count`` of them evenly in time, from start to end."""
+        return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]

@@ -1,0 +1,107 @@
+"""What there is to be seen: triangles in one place, and what each of them is of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.robot.mechanism import Material, Shape
+from katana450.maths.geometry.arrays import FloatArray
+
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int32]
+Bools = npt.NDArray[np.bool_]
+
+
+class Item(NamedTuple):
+    """name: of the link or thing. T: (4, 4) of the frame of its shape in the base frame [m]."""
+
+    name: str
+    shape: Shape
+    T: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Every triangle.
+
+    Attributes:
+        names: of each item.
+        vertices, normals: (v, 3) in the base frame [m], normals of unit length.
+        faces: (f, 3) corners, counter-clockwise seen from outside.
+        item: (f,) the item that each is of.
+        colour: (i, 3) of light, not of sRGB, for each item; metallic, rough: (i,) glTF's factors.
+    """
+
+    names: tuple[str, ...]
+    vertices: Floats
+    normals: Floats
+    faces: Ints
+    item: Ints
+    colour: Floats
+    metallic: Floats
+    rough: Floats
+
+    @classmethod
+    def of(cls, items: Sequence[Item]) -> Scene:
+        """All of ``items``."""
+        shapes = [item.shape for item in items]
+        starts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
+        turned = [(item.shape, item.T[:3, :3].T, item.T[:3, 3]) for item in items]
+        materials = [shape.material for shape in shapes]
+        return cls(
+            tuple(item.name for item in items),
+            _stacked([shape.vertices @ R + p for shape, R, p in turned], np.float32),
+            _stacked([shape.normals @ R for shape, R, _ in turned], np.float32),
+            _stacked([s.faces + at for s, at in zip(shapes, starts[:-1], strict=True)], np.int32),
+            np.repeat(np.arange(len(shapes)), [len(shape.faces) for shape in shapes]).astype("i4"),
+            _stacked([[linear(material) for material in materials]], np.float32),
+            np.array([material.metallic for material in materials], dtype=np.float32),
+            np.array([material.rough for material in materials], dtype=np.float32),
+        )
+
+    @cached_property
+    def flat(self) -> Floats:
+        """(f, 3) unit normals of the triangles themselves; 0 of one without area."""
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        return unit(np.cross(b - a, c - a))
+
+
+def linear(material: Material) -> Floats:
+    """(3,) its colour as light: IEC 61966-2-1."""
+    return light_of(np.array(material.colour, dtype=np.float32))
+
+
+def light_of(srgb: npt.NDArray[Any]) -> Floats:
+    """Of sRGB 0..1, whatever the shape: IEC 61966-2-1."""
+    low = srgb / 12.92
+    return np.where(srgb <= 0.04045, low, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def unit(v: npt.NDArray[Any]) -> Floats:
+    """Vectors (..., 3) of length 1; 0 stays 0."""
+    length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
+    found = np.divide(v, length, out=np.zeros_like(v), where=length > 0.0)
+    return np.asarray(found, dtype=np.float32)
+
+
+def smooth(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> FloatArray:
+    """Normals (n, 3) of the corners of a surface (n, 3), (m, 3): the mean of its faces by area."""
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    across = np.cross(b - a, c - a)
+    found = np.zeros(vertices.shape)
+    for corner in range(3):
+        np.add.at(found, faces[:, corner], across)
+    size = np.linalg.norm(found, axis=1, keepdims=True)
+    return np.where(size > 0.0, found / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
+
+
+def _stacked(parts: Sequence[Any], kind: Any) -> npt.NDArray[Any]:
+    if not parts or not len(parts[0]):
+        return np.empty((0, 3), dtype=kind)
+    return np.concatenate(parts).astype(kind)

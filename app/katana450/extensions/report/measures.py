@@ -1,0 +1,231 @@
+"""What is measured of a run, and whether it is as its script expects.
+
+Two errors are kept apart: that of the kinematics, forward of the planned joints from the path that
+was wished for, and that of the motion, where the arm was told to be at each tick and between two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from katana450.arm.control.arm import Arm
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.pouring import POURING
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.script import Script
+from katana450.extensions.report.trace import Trace
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.velocity import singular_values, tool_speed
+from katana450.maths.planning.curve import Tool
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.path import joint_derivatives
+from katana450.maths.planning.tool_path import ToolPath
+from katana450.maths.water.score import score
+
+PLACES = 2000
+"""Of each path at which the kinematics are held against it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """One path of the tool: sigma (N,), desired and traced points (N, 3) in {S} [m].
+
+    turned: (N,) how far off pitch and roll are [rad].
+    """
+
+    name: str
+    sigma: FloatArray
+    desired: FloatArray
+    traced: FloatArray
+    turned: FloatArray
+
+    @property
+    def error(self) -> FloatArray:
+        """(N,) [m]."""
+        return np.asarray(np.linalg.norm(self.traced - self.desired, axis=1))
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What a script expects of a measure, and what it was."""
+
+    name: str
+    low: float
+    high: float
+    value: float | None
+
+    @property
+    def held(self) -> bool:
+        """Whether it is so."""
+        return self.value is not None and self.low <= self.value <= self.high
+
+    @property
+    def wanted(self) -> str:
+        """The bound in words."""
+        wanted = [f"at least {self.low:g}"] if self.low > -np.inf else []
+        wanted += [f"at most {self.high:g}"] if self.high < np.inf else []
+        return " and ".join(wanted) or "any"
+
+    def __str__(self) -> str:
+        is_now = "was not measured" if self.value is None else f"is {self.value:.3g}"
+        return f"{self.name} {is_now}; expected is {self.wanted}."
+
+
+def alongs(program: Program) -> tuple[Along, ...]:
+    """The paths of the tool, repetitions once."""
+    found: dict[int, Along] = {}
+    for task in program.tasks:
+        if not isinstance(task.order, Go):
+            continue
+        for segment in task.order.plan.segments:
+            if isinstance(segment.path, ToolPath) and id(segment.path) not in found:
+                found[id(segment.path)] = _along(task.name, segment.path)
+    return tuple(found.values())
+
+
+def measured(program: Program, arm: Arm, trace: Trace) -> dict[str, float | None]:
+    """Each of MEASURES by its name; None where there is nothing to measure it on."""
+    paths = alongs(program)
+    errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
+    turned = np.concatenate([path.turned for path in paths]) if paths else np.empty(0)
+    at_ticks, between = executed(program, trace)
+    chains = [arm.chain_to(tool) for tool in trace.tools]
+    limits = arm.chain
+    room = np.minimum(trace.q - limits.lower, limits.upper - trace.q)
+    singular = [
+        float(singular_values(chain, q)[-1]) for chain, q in zip(chains, trace.q, strict=True)
+    ]
+    speeds = [
+        tool_speed(chain, q, qd) for chain, q, qd in zip(chains, trace.q, trace.qd, strict=True)
+    ]
+    nearest = [
+        task.order.plan.nearest.contact.distance
+        for task in program.tasks
+        if isinstance(task.order, Go)
+        and task.order.plan.nearest is not None
+        # What is lifted touches the table before.
+        and task.order.plan.nearest.contact.distance >= STOP
+    ]
+    return {
+        "max_position_error_mm": _most(1e3 * errors),
+        "rms_position_error_mm": 1e3 * float(np.sqrt(np.mean(errors**2))) if paths else None,
+        "max_orientation_error_deg": _most(np.degrees(turned)),
+        "executed_position_error_mm": _most(1e3 * at_ticks),
+        "between_ticks_error_mm": _most(1e3 * between),
+        "path_length_mm": 1e3 * sum(_length(path.desired) for path in paths) if paths else None,
+        "smallest_singular_value": min(singular),
+        "margin_to_limits_deg": float(np.degrees(room.min())),
+        "nearest_clearance_mm": 1e3 * min(nearest) if nearest else None,
+        "greatest_speed_share": float((np.abs(trace.qd) / limits.speed).max()),
+        "greatest_acceleration_share": _share(trace, arm.limits.acceleration, 2),
+        "greatest_jerk_share": _share(trace, arm.limits.jerk, 3),
+        "greatest_tool_speed_mm_s": 1e3 * max(speeds),
+        "duration_s": float(trace.t[-1]),
+        **_of_water(program, trace),
+    }
+
+
+def executed(program: Program, trace: Trace) -> tuple[FloatArray, FloatArray]:
+    """How far the arm was from its tool paths [m]: at the ticks, and half-way between two.
+
+    At a tick from where the path has the tool at that moment, so no less than from the path; half
+    way, with the joints on straight lines as a drive has them, across the path.
+    """
+    at_ticks: list[float] = []
+    between: list[float] = []
+    on = [_path_at(program, trace, tick) for tick in range(len(trace.t))]
+    for tick, path in enumerate(on):
+        if path is not None:
+            q, sigma = trace.sent[tick], float(trace.sigma[tick])
+            at_ticks.append(float(np.linalg.norm(_point(path, q) - _curve(path, sigma)[0])))
+    for before, after in pairwise(range(len(trace.t))):
+        path = on[before]
+        if path is None or path is not on[after] or trace.sigma[before] == trace.sigma[after]:
+            continue
+        q = 0.5 * (trace.sent[before] + trace.sent[after])
+        p, tangent = _curve(path, float(0.5 * (trace.sigma[before] + trace.sigma[after])))
+        off = _point(path, q) - p
+        between.append(float(np.linalg.norm(off - (off @ tangent) * tangent)))
+    return np.array(at_ticks), np.array(between)
+
+
+def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]:
+    """What ``script`` expects, beside what was."""
+    return tuple(
+        Bound(name, low, high, values[name]) for name, (low, high) in script.expected.items()
+    )
+
+
+def _along(name: str, path: ToolPath) -> Along:
+    sigma = np.linspace(0.0, 1.0, PLACES + 1)
+    tool = path.curve.at(Jet.variable(sigma))
+    columns = [np.broadcast_to(jet.c0, sigma.shape) for jet in tool]
+    desired = np.stack(columns[:3], axis=1)
+    traced = np.empty_like(desired)
+    turned = np.empty_like(sigma)
+    for number, q in enumerate(joint_derivatives(path, sigma)[0]):
+        traced[number] = forward(path.chain, q)[:3, 3]
+        found = ToolTarget.at(path.chain, q)
+        off = (found.pitch - columns[3][number], found.roll - columns[4][number])
+        turned[number] = max(abs(math.remainder(each, math.tau)) for each in off)
+    return Along(name, sigma, desired, traced, turned)
+
+
+def _path_at(program: Program, trace: Trace, tick: int) -> ToolPath | None:
+    order, segment = program.tasks[int(trace.task[tick])].order, int(trace.segment[tick])
+    if segment < 0 or not isinstance(order, Go):
+        return None
+    path = order.plan.segments[segment].path
+    return path if isinstance(path, ToolPath) else None
+
+
+def _point(path: ToolPath, q: FloatArray) -> FloatArray:
+    p: FloatArray = forward(path.chain, q)[:3, 3]
+    return p
+
+
+def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
+    """Point (3,) [m] and unit tangent (3,) at ``sigma``; no tangent where the tool only turns."""
+    tool: Tool = path.curve.at(Jet.variable(sigma))
+    p, rate = (
+        np.array([each.derivatives()[order] for each in tool[:3]], dtype=float) for order in (0, 1)
+    )
+    length = float(np.linalg.norm(rate))
+    return p, rate / length if length > 0.0 else rate
+
+
+def _share(trace: Trace, most: FloatArray, order: int) -> float:
+    """The greatest derivative of the setpoints of that order, of the most a joint has."""
+    period = float(trace.t[-1]) / (len(trace.t) - 1)
+    return float((np.abs(np.diff(trace.q, order, axis=0)) / period**order / most).max(initial=0.0))
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
+    """What is measured of the water, where there was any."""
+    end = trace.water[-1]
+    if end is None:
+        return {}
+    found = score(end.water, end.course)
+    pours = [number for number, task in enumerate(program.tasks) if task.name == POURING]
+    carried = trace.task < (pours[0] if pours else len(program.tasks))
+    return {
+        "emptied_percent": found.emptied_percent,
+        "spilled_ml": found.spilled_ml,
+        "carried_margin_to_rim_mm": 1e3 * float(trace.margin[carried].min()),
+        "cup_peak_jerk_m_s3": found.peak_jerk,
+    }
+
+
+def _most(values: FloatArray) -> float | None:
+    return float(values.max()) if values.size else None

@@ -1,0 +1,1 @@
+"""Pure mathematics: geometry, kinematics, collision, motion, planning, water."""

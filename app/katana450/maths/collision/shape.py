@@ -1,0 +1,113 @@
+"""Convex shapes, and how near two of them are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+
+FAR = 1e6
+"""[m] Radius of the ball that stands for a half-space where balls are compared: within a metre of
+its pole it is off by less than a micrometre."""
+
+FLAT = 1e-6
+"""[m] Points that deviate less than this from a plane have no volume."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A convex body in a frame of its own.
+
+    Attributes:
+        geometry: what coal measures.
+        centre, radius: of a ball that holds it, (3,) and scalar [m].
+        low, high: corners (3,) of a box along the axes that holds it [m].
+        mark: what it is made of; that of another shape is another.
+    """
+
+    geometry: Any
+    centre: FloatArray
+    radius: float
+    low: FloatArray
+    high: FloatArray
+    mark: bytes
+
+
+def hull(points: npt.ArrayLike) -> Shape:
+    """The convex hull of ``points`` (n, 3) [m]; InputError when they lie in one plane."""
+    points = np.asarray(points, dtype=np.float64)
+    corners = np.unique(finite_array(points, (len(points), 3), "The points of a hull"), axis=0)
+    # coal ends the whole program when it is given points without a volume.
+    spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
+    if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
+        raise InputError(f"{len(corners)} points in one plane make no body.")
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    listed = coal.StdVec_Vec3s()
+    listed.extend(list(corners))
+    geometry = coal.Convex.convexHull(listed, False, "")
+    centre = 0.5 * (low + high)
+    radius = float(np.linalg.norm(corners - centre, axis=1).max())
+    return Shape(geometry, frozen(centre), radius, frozen(low), frozen(high), corners.tobytes())
+
+
+def box(size: npt.ArrayLike) -> Shape:
+    """A box of ``size`` (3,) [m] about its middle."""
+    size = _lengths(size, 3, "The size of a box")
+    half = frozen(0.5 * size)
+    return Shape(
+        coal.Box(*size.tolist()),
+        frozen(np.zeros(3)),
+        float(np.linalg.norm(half)),
+        -half,
+        half,
+        b"box" + size.tobytes(),
+    )
+
+
+def cylinder(radius: float, length: float) -> Shape:
+    """An upright cylinder about its middle [m]."""
+    _lengths((radius, length), 2, "Radius and length of a cylinder")
+    half = frozen((radius, radius, 0.5 * length))
+    return Shape(
+        coal.Cylinder(radius, length),
+        frozen(np.zeros(3)),
+        float(np.hypot(radius, 0.5 * length)),
+        -half,
+        half,
+        b"cylinder" + half.tobytes(),
+    )
+
+
+def sphere(radius: float) -> Shape:
+    """A ball about its middle [m]."""
+    _lengths((radius,), 1, "The radius of a sphere")
+    half = frozen((radius, radius, radius))
+    return Shape(
+        coal.Sphere(radius), frozen(np.zeros(3)), radius, -half, half, b"sphere" + half.tobytes()
+    )
+
+
+def half_space() -> Shape:
+    """Everything with z <= 0."""
+    far = np.full(3, FAR)
+    return Shape(
+        coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0),
+        frozen((0.0, 0.0, -FAR)),
+        FAR,
+        frozen(-far),
+        frozen(far * (1.0, 1.0, 0.0)),
+        b"half-space",
+    )
+
+
+def _lengths(value: npt.ArrayLike, count: int, name: str) -> FloatArray:
+    lengths = finite_array(value, (count,), name)
+    if (lengths <= 0.0).any():
+        raise InputError(f"{name} must be above 0, not {lengths.tolist()}.")
+    return lengths

@@ -1,0 +1,320 @@
+"""The bodies of an arm and of what stands around it, and the pairs that may meet."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.linkage import GROUND, Linkage
+from katana450.maths.collision.shape import Shape
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+IndexArray = npt.NDArray[np.int64]
+
+SIGNED = coal.DistanceRequest()
+"""Of bodies that are in each other it asks how deep: a distance below zero."""
+
+FEW = 8
+"""Pairs that are measured as quickly as the boxes round their bodies are compared."""
+
+LONG_WAY = 1.2
+"""[1] How much longer than its tangent the way of a point may be: joints that turn by t_i at the
+distances r_i move it by d <= sum t_i (r_i + d), so this holds up to sum t_i = 1 - 1 / LONG_WAY."""
+
+LONGEST_WAY = 1.0 - 1.0 / LONG_WAY
+"""[rad] Up to which sum of turns `World.travel` is a bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One named link, or one thing that stands around the arm.
+
+    Attributes:
+        name: of the link or thing.
+        mover: index of the piece it moves with; GROUND stands still.
+        T_mover_shape: where each of its shapes is, (4, 4) in the frame of the piece [m].
+        shapes: convex; together they are the part.
+    """
+
+    name: str
+    mover: int
+    T_mover_shape: tuple[FloatArray, ...]
+    shapes: tuple[Shape, ...]
+
+
+def obstacle(name: str, T_base_shape: FloatArray, *shapes: Shape) -> Part:
+    """A thing that stands still, all its ``shapes`` in one frame."""
+    return Part(name, GROUND, tuple(frozen(T_base_shape) for _ in shapes), shapes)
+
+
+@dataclass(frozen=True, eq=False)
+class Likeness:
+    """The bodies and pairs of a world, as a digest, and where each is, (b, 4, 4)."""
+
+    bodies: bytes
+    places: FloatArray
+
+    def differs_by(self, other: Likeness) -> float:
+        """By how much any body is elsewhere [m or 1]; infinitely when they are other bodies."""
+        if self.bodies != other.bodies:
+            return np.inf
+        return float(np.abs(self.places - other.places).max(initial=0.0))
+
+
+class World:
+    """Convex bodies on the pieces of a linkage, and the pairs of them that may meet.
+
+    Attributes:
+        parts: of the arm, then the obstacles.
+        first, second: (p,) indices of the bodies of each pair; the second is of a later part.
+    """
+
+    def __init__(
+        self, linkage: Linkage, parts: Sequence[Part], pairs: Sequence[tuple[int, int]]
+    ) -> None:
+        """``pairs``: indices of the parts that may meet, the smaller first."""
+        self.linkage = linkage
+        self.parts = tuple(parts)
+        self.pairs = tuple(pairs)
+        bodies = [
+            (number, part.mover, T, shape)
+            for number, part in enumerate(self.parts)
+            for T, shape in zip(part.T_mover_shape, part.shapes, strict=True)
+        ]
+        shapes = [shape for _, _, _, shape in bodies]
+        count = len(bodies)
+        self.part_of = np.array([number for number, _, _, _ in bodies], dtype=np.int64)
+        self.mover_of = np.array([mover for _, mover, _, _ in bodies], dtype=np.int64)
+        self.T_mover_body = np.array([T for _, _, T, _ in bodies]).reshape(-1, 4, 4)
+        self.radius = np.array([shape.radius for shape in shapes])
+        # Most bodies share their frame with others of the same link.
+        frames: dict[tuple[int, bytes], int] = {}
+        frame_of = [
+            frames.setdefault((mover, T.tobytes()), len(frames)) for _, mover, T, _ in bodies
+        ]
+        first_of = [frame_of.index(frame) for frame in range(len(frames))]
+        self.frames = [(int(self.mover_of[i]), self.T_mover_body[i]) for i in first_of]
+        R = self.T_mover_body[:, :3, :3]
+        at = self.T_mover_body[:, :3, 3]
+        centres = np.array([shape.centre for shape in shapes]).reshape(-1, 3, 1)
+        # Centres in the base frame are this (b, 4 m) times the columns of all poses, (4 m, 3).
+        spread = np.zeros((count, linkage.count, 4))
+        spread[range(count), self.mover_of, :3] = (R @ centres)[:, :, 0] + at
+        spread[range(count), self.mover_of, 3] = 1.0
+        self.spread = spread.reshape(count, -1)
+        # A box along the axes of the piece round the box along those of the body.
+        middle = np.array([0.5 * (shape.low + shape.high) for shape in shapes]).reshape(-1, 3, 1)
+        half = np.array([0.5 * (shape.high - shape.low) for shape in shapes]).reshape(-1, 3, 1)
+        self.box_middle = (R @ middle)[:, :, 0] + at
+        self.box_half = (np.abs(R) @ half)[:, :, 0]
+
+        met = np.zeros((len(self.parts), len(self.parts)), dtype=bool)
+        for a, b in self.pairs:
+            met[a, b] = True
+        self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
+        # Of each pair what coal needs: both geometries, each with the number of its frame.
+        self.measured = [
+            (shapes[a].geometry, frame_of[a], shapes[b].geometry, frame_of[b])
+            for a, b in zip(self.first.tolist(), self.second.tolist(), strict=True)
+        ]
+        self.apart = self.spread[self.second] - self.spread[self.first]
+        self.radii = self.radius[self.first] + self.radius[self.second]
+        # Flat indices into (b, m) of a body seen from a piece.
+        directions = np.zeros((linkage.count, linkage.count, 4))
+        directions[range(linkage.count), range(linkage.count), :3] = linkage.axis
+        self.axes = directions.reshape(linkage.count, -1)
+        self._carries = linkage.carries[self.mover_of].astype(np.float64)
+        self._stays = (~linkage.carries).T.astype(np.float64)
+        self._second_seen = self.second * linkage.count + self.mover_of[self.first]
+        self._first_seen = self.first * linkage.count + self.mover_of[self.second]
+
+    def at(self, x: FloatArray) -> Placed:
+        """All bodies where ``x`` (k,) [rad] puts them."""
+        return Placed(self, self.linkage.poses(x))
+
+    def travel(self, placed: Placed, x: FloatArray, towards: FloatArray) -> FloatArray:
+        """At most how far the bodies of each pair move against each other, (p,) [m].
+
+        ``placed`` is at ``x`` (k,) [rad or m]; on the way to ``towards`` (k,) the joints turn by no
+        more than LONGEST_WAY together.
+        """
+        joints = self.linkage
+        turns = np.abs(joints.factor * (towards - x)[joints.variable])
+        # (b, m): how far a body is moved by the joints that do not move another piece with it.
+        moved = ((placed.reach() * turns * self._carries) @ self._stays).ravel()
+        return np.asarray(LONG_WAY * (moved[self._second_seen] + moved[self._first_seen]))
+
+    def nearest(self, x: FloatArray) -> Contact | None:
+        """The pair of bodies that are nearest to each other at ``x`` (k,) [rad].
+
+        None when no two parts can meet at all.
+        """
+        if not self.measured:
+            return None
+        placed = self.at(x)
+        found = placed.likely_nearest()
+        best = placed.distance(found)
+        pairs, bounds = placed.nearer_than(best)
+        for number in np.argsort(bounds).tolist():
+            if bounds[number] >= best:
+                break
+            pair = int(pairs[number])
+            distance = placed.distance(pair)
+            if distance < best:
+                best, found = distance, pair
+        return placed.contact(found)
+
+    def gap(self, x: FloatArray, one: str, other: str) -> float:
+        """How far two parts that may meet are apart at ``x`` (k,) [rad]; else infinitely [m]."""
+        names = [self.parts[number].name for number in self.part_of.tolist()]
+        placed, wanted = self.at(x), {one, other}
+        pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
+        gaps = [
+            placed.distance(pair)
+            for pair, (a, b) in enumerate(pairs)
+            if {names[a], names[b]} == wanted
+        ]
+        return min(gaps, default=np.inf)
+
+    @cached_property
+    def likeness(self) -> Likeness:
+        """By which another world, of another process too, is known to be the same."""
+        told = hashlib.sha256(repr(self.pairs).encode())
+        for part in self.parts:
+            told.update(f"{part.name} {part.mover}".encode())
+            for shape in part.shapes:
+                told.update(shape.mark)
+        return Likeness(told.digest(), frozen(self.T_mover_body))
+
+    def with_carried(self, carried: Part) -> World:
+        """This world and what the arm carries, which meets what more than one joint lets meet it.
+
+        What it is held by turns with it, and the next link turns under it.
+        """
+        count = len(self.parts)
+        met = [
+            (number, count)
+            for number, part in enumerate(self.parts)
+            if len(self.linkage.variables_between(part.mover, carried.mover)) > 1
+        ]
+        return World(self.linkage, (*self.parts, carried), (*self.pairs, *met))
+
+    def with_obstacles(self, obstacles: Sequence[Part]) -> World:
+        """This world and ``obstacles``, which every part that moves may meet."""
+        count = len(self.parts)
+        moving = [number for number, part in enumerate(self.parts) if part.mover != GROUND]
+        met = [(number, count + k) for number in moving for k in range(len(obstacles))]
+        return World(self.linkage, (*self.parts, *obstacles), (*self.pairs, *met))
+
+
+class Placed:
+    """The bodies of a world in one posture."""
+
+    def __init__(self, world: World, T_base_mover: FloatArray) -> None:
+        self._world = world
+        self._T = T_base_mover
+        self._transforms: dict[int, Any] = {}
+
+    @cached_property
+    def _columns(self) -> FloatArray:
+        """The columns of all poses below each other, (4 m, 3)."""
+        return self._T[:, :3, :].transpose(0, 2, 1).reshape(-1, 3)
+
+    @cached_property
+    def _centre(self) -> FloatArray:
+        """Of the ball round each body, (b, 3) in the base frame [m]."""
+        return np.asarray(self._world.spread @ self._columns)
+
+    @cached_property
+    def _apart(self) -> FloatArray:
+        """How far apart the balls round the bodies of each pair are, (p,) [m]."""
+        apart = self._world.apart @ self._columns
+        return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)) - self._world.radii)
+
+    def reach(self) -> FloatArray:
+        """The farthest that each body is from each joint's axis, (b, m) [m].
+
+        Of joints that slide it is 1: how far they move a body for each metre of their own.
+        """
+        axes = self._world.axes @ self._columns
+        origins = self._columns[3::4]
+        c = self._centre
+        along = c @ axes.T - np.einsum("ij,ij->i", origins, axes)
+        square = np.einsum("ij,ij->i", c, c)[:, None] - 2.0 * (c @ origins.T)
+        square += np.einsum("ij,ij->i", origins, origins) - along * along
+        reach = np.asarray(np.sqrt(np.maximum(square, 0.0)) + self._world.radius[:, None])
+        sliding = self._world.linkage.sliding
+        if sliding.size:
+            reach[:, sliding] = 1.0
+        return reach
+
+    def likely_nearest(self) -> int:
+        """The pair whose balls are nearest to each other, or farthest in each other."""
+        return int(self._apart.argmin())
+
+    def nearer_than(self, limit: FloatArray | float) -> tuple[IndexArray, FloatArray]:
+        """The pairs that may be nearer than ``limit``, (p,) or scalar [m].
+
+        Returns:
+            their indices (k,), and (k,) at least how far apart the bodies of each are [m].
+        """
+        world = self._world
+        pairs = np.nonzero(self._apart < limit)[0]
+        if len(pairs) <= FEW:
+            return pairs, self._apart[pairs]
+        # The ball of each against the box of the other, one way and the other.
+        a, b = world.first[pairs], world.second[pairs]
+        boxes, balls = np.concatenate((a, b)), np.concatenate((b, a))
+        T = self._T[world.mover_of[boxes]]
+        seen = np.einsum("ij,ijk->ik", self._centre[balls] - T[:, :3, 3], T[:, :3, :3])
+        outside = np.maximum(np.abs(seen - world.box_middle[boxes]) - world.box_half[boxes], 0.0)
+        away = np.sqrt(np.einsum("ij,ij->i", outside, outside))
+        # A centre inside the box tells nothing of how deep the ball is in it.
+        away = np.where(away > 0.0, away - world.radius[balls], -np.inf)
+        bounds = np.maximum(self._apart[pairs], away.reshape(2, -1).max(axis=0))
+        near = bounds < (limit[pairs] if isinstance(limit, np.ndarray) else limit)
+        return pairs[near], bounds[near]
+
+    def distances(self, pairs: IndexArray) -> FloatArray:
+        """Between the bodies of each of ``pairs`` (k,), as ``distance``, (k,) [m]."""
+        return np.array([self._measure(pair).min_distance for pair in pairs.tolist()])
+
+    def distance(self, pair: int) -> float:
+        """Between the bodies of a pair [m]; negative is how deep they are in each other."""
+        return float(self._measure(pair).min_distance)
+
+    def contact(self, pair: int) -> Contact:
+        """Where the bodies of a pair are nearest."""
+        world, result = self._world, self._measure(pair)
+        bodies = world.first[pair], world.second[pair]
+        one, other = (world.parts[world.part_of[body]].name for body in bodies)
+        return Contact(
+            (one, other),
+            float(result.min_distance),
+            frozen((result.getNearestPoint1(), result.getNearestPoint2())),
+            frozen(result.normal),
+        )
+
+    def _measure(self, pair: int) -> Any:
+        one, frame, other, other_frame = self._world.measured[pair]
+        result = coal.DistanceResult()
+        coal.distance(
+            one, self._transform(frame), other, self._transform(other_frame), SIGNED, result
+        )
+        return result
+
+    def _transform(self, frame: int) -> Any:
+        found = self._transforms.get(frame)
+        if found is None:
+            mover, T_mover_body = self._world.frames[frame]
+            T = self._T[mover] @ T_mover_body
+            found = self._transforms[frame] = coal.Transform3s(T[:3, :3], T[:3, 3])
+        return found

@@ -1,0 +1,276 @@
+"""The family of arms the closed forms cover, and the canonical arm each member is reduced to.
+
+A member pans about axis 1, bends about the parallel axes 2, 3 and 4, square to it, and rolls about
+axis 5, square to those. Nothing need cross: the shoulder may stand off the pan axis, the roll axis
+pass beside axes 1 and 4, links have any bearing at q = 0, axes either sign, {S} any place.
+
+The canonical arm is stretched along +x at alpha = 0, its axes are z, y, y, y and the roll axis:
+
+    {C}  on axis 1 at the height of axis 2, z along axis 1 (upwards in {S}), y along axis 2, x to
+         the side on which the arm lies at q = 0
+    {K}  on the roll axis beside the tool point, x along the roll axis, at alpha = 0 with its y
+         along that of {C}
+    alpha = sign * q + shift,   T_S_tool(q) = T_C_S^-1 T_C_K(alpha) T_K_tool
+    T_C_K = Rz(alpha1) [Ry(phi - tilt) Rx(alpha5), (a + l1 cos.. + l2 cos.. + l3 cos phi, d, ...)]
+
+with phi = alpha2 + alpha3 + alpha4 the angle of link 3 below the horizontal. The Katana is the
+member with a = d = tilt = 0, alpha = q, {C} = {S} and {K} the tool itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450 import tolerances
+from katana450.errors import RobotDescriptionError
+from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.turns import wrapped
+
+Five = tuple[float, float, float, float, float]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class FiveAxisArm:
+    """The canonical arm of a chain; see the module's text for the frames.
+
+    a: shoulder (axis 2) outward from axis 1. d: the arm's plane, which holds the roll axis, along y
+    from axis 1. l1, l2: axis 2 to 3 to 4. l3: axis 4 to {K}; all [m]. tilt: angle [rad] of link 3
+    below the roll axis. signs, shifts [rad]: alpha = sign * q + shift. T_C_S, T_K_tool: (4, 4).
+    off_axis: tool point from roll axis [m]. skew [rad], gap [m]: how far the chain is from the
+    family member it is taken for, both small enough to be rounding in a file.
+    """
+
+    a: float
+    d: float
+    l1: float
+    l2: float
+    l3: float
+    tilt: float
+    signs: Five
+    shifts: Five
+    T_C_S: FloatArray
+    T_K_tool: FloatArray
+    off_axis: float
+    skew: float
+    gap: float
+
+    @cached_property
+    def reach(self) -> float:
+        """No part of the arm is farther than this from the origin of {C} or of {S} [m]."""
+        links = abs(self.a) + abs(self.d) + self.l1 + self.l2 + self.l3 + self.off_axis
+        return links + float(np.linalg.norm(self.T_C_S[:3, 3]))
+
+    @cached_property
+    def T_tool_K(self) -> FloatArray:
+        """(4, 4), the inverse of T_K_tool."""
+        return frozen(se3.inverse(self.T_K_tool))
+
+    @cached_property
+    def is_canonical(self) -> bool:
+        """Whether {C} is {S} and {K} the tool, so that poses need no change of frames."""
+        return bool((np.eye(4) == self.T_C_S).all() and (self.T_K_tool == np.eye(4)).all())
+
+    @cached_property
+    def is_mirrored(self) -> bool:
+        """Whether half a turn about axis 1 takes the arm's plane to its own mirror image."""
+        return self.a == self.d == self.tilt == 0.0
+
+    def pose(self, T: FloatArray) -> FloatArray:
+        """T_C_K (4, 4) of the pose `T` (4, 4) = T_S_tool."""
+        return T if self.is_canonical else self.T_C_S @ T @ self.T_tool_K
+
+    def canonical(self, q: npt.ArrayLike) -> FloatArray:
+        """alpha (..., 5) [rad] of the joint angles `q` (..., 5) [rad]."""
+        return np.asarray(q) * self.signs + self.shifts
+
+    def joints(self, alpha: npt.ArrayLike) -> FloatArray:
+        """q (..., 5) [rad] of the canonical angles `alpha` (..., 5) [rad]."""
+        # + 0.0 leaves no negative zero behind.
+        return (np.asarray(alpha) - self.shifts) * self.signs + 0.0
+
+    def angles(self, q: FloatArray) -> Five:
+        """`canonical` of one joint vector (5,), as plain floats."""
+        one, two, three, four, five = self.canonical(q).tolist()
+        return one, two, three, four, five
+
+    def pitch(self, alpha: Five) -> float:
+        """Angle [rad] of the roll axis below the horizontal at the canonical angles `alpha`."""
+        return alpha[1] + alpha[2] + alpha[3] - self.tilt
+
+    def beside(self, pitch: float, roll: float) -> Vector:
+        """The tool point [m] from that of {K}, as the arm's plane sees it: outward, sideways, up.
+
+        pitch of the roll axis below the horizontal, and roll about it [rad].
+        """
+        if self.off_axis == 0.0:
+            return 0.0, 0.0, 0.0
+        x, y, z = self._tool_in_K
+        c, s = math.cos(roll), math.sin(roll)
+        y, z = c * y - s * z, s * y + c * z
+        c, s = math.cos(pitch), math.sin(pitch)
+        return c * x + s * z, y, c * z - s * x
+
+    def tool_point(self, alpha: Five) -> Vector:
+        """The tool point [m] in {C} at the canonical angles `alpha` [rad]."""
+        one, two, three, four, five = alpha
+        b = two + three
+        phi = b + four
+        outward, sideways, up = self.beside(phi - self.tilt, five)
+        l1, l2, l3 = self.l1, self.l2, self.l3
+        u = outward + self.a + l1 * math.cos(two) + l2 * math.cos(b) + l3 * math.cos(phi)
+        v = sideways + self.d
+        z = up - l1 * math.sin(two) - l2 * math.sin(b) - l3 * math.sin(phi)
+        c, s = math.cos(one), math.sin(one)
+        return c * u - s * v, s * u + c * v, z
+
+    @cached_property
+    def _tool_in_K(self) -> Vector:
+        x, y, z = self.T_K_tool[:3, 3].tolist()
+        return x, y, z
+
+
+@lru_cache(maxsize=64)
+def arm_of(chain: Chain) -> FiveAxisArm:
+    """The canonical arm of `chain`, found once a chain.
+
+    Raises RobotDescriptionError that names every axis which keeps the chain out of the family, by
+    how much, and what it would have to be.
+    """
+    if chain.n != 5:
+        raise RobotDescriptionError(
+            f"The closed-form kinematics need five joints; this arm has {chain.n}."
+        )
+    omega = [chain.S[:3, i] for i in range(5)]
+    skew = _refuse_skewed(omega)
+    T_C_S = _canonical_frame(chain)
+    shoulder, elbow, wrist, roll = (
+        T_C_S[:3, :3] @ screws.point_on(chain.S[:, i]) + T_C_S[:3, 3] for i in (1, 2, 3, 4)
+    )
+    home = T_C_S @ chain.M
+    tool = home[:3, 3]
+    # An axis that is off square by rounding is where it should be beside the tool.
+    turned = T_C_S[:3, :3] @ omega[4]
+    roll = roll + float((tool - roll) @ turned) * turned
+
+    along = T_C_S[:3, :3] @ omega[4]
+    along = np.array([along[0], 0.0, along[2]]) / math.hypot(along[0], along[2])
+    ahead = float(along @ (tool - wrist))
+    sign5 = -1.0 if ahead < -tolerances.FAMILY_LENGTH else 1.0
+    x_K = sign5 * along
+    foot = roll + (along @ (tool - roll)) * along
+    off_axis = float(np.linalg.norm(tool - foot))
+    gap = off_axis if off_axis <= tolerances.FAMILY_LENGTH else 0.0
+
+    l1, bearing1 = _link(elbow - shoulder)
+    l2, bearing2 = _link(wrist - elbow)
+    l3, bearing3 = _link(foot - wrist)
+    names = ("axes 2 and 3", "axes 3 and 4", "axis 4 and the tool point")
+    for name, length in zip(names, (l1, l2, l3), strict=True):
+        if length <= tolerances.FAMILY_LENGTH:
+            raise RobotDescriptionError(
+                "The closed-form kinematics do not cover this arm: "
+                f"{name} are {1e3 * length:.3g} mm apart; they must not coincide."
+            )
+    pitch = math.atan2(-x_K[2], x_K[0])
+    R_C_K = so3.rotation_y(pitch)
+    T_K_tool = se3.from_rotation_translation(
+        R_C_K.T @ home[:3, :3], np.zeros(3) if gap else R_C_K.T @ (tool - foot)
+    )
+    y_C = T_C_S[1, :3]
+    signs = (
+        math.copysign(1.0, T_C_S[2, :3] @ omega[0]),
+        *(math.copysign(1.0, y_C @ omega[i]) for i in (1, 2, 3)),
+        sign5,
+    )
+    shifts = (0.0, bearing1, wrapped(bearing2 - bearing1), wrapped(bearing3 - bearing2), 0.0)
+    return FiveAxisArm(
+        a=_tidy(shoulder[0]),
+        d=_tidy(roll[1]),
+        l1=l1,
+        l2=l2,
+        l3=l3,
+        tilt=_tidy(wrapped(bearing3 - pitch)),
+        signs=(signs[0], signs[1], signs[2], signs[3], signs[4]),
+        shifts=(0.0, _tidy(shifts[1]), _tidy(shifts[2]), _tidy(shifts[3]), 0.0),
+        T_C_S=frozen(_tidied(T_C_S)),
+        T_K_tool=frozen(_tidied(T_K_tool)),
+        off_axis=0.0 if gap else off_axis,
+        skew=skew,
+        gap=gap,
+    )
+
+
+def _refuse_skewed(omega: list[FloatArray]) -> float:
+    """The greatest angle [rad] by which an axis is off; raises when that is more than rounding."""
+    faults, skew, coarse = [], 0.0, True
+    for name, needed, off in _skews(omega):
+        skew = max(skew, off)
+        if off > tolerances.FAMILY_ANGLE:
+            faults.append(f"{name} must be {needed} and is {math.degrees(off):.3g} deg off")
+            coarse = coarse and off <= tolerances.COARSE_ANGLE
+    if faults:
+        raise RobotDescriptionError(
+            f"The closed-form kinematics do not cover this arm: {'; '.join(faults)}."
+            + (" Should they be right angles, write 1.570796 for 1.57." if coarse else "")
+        )
+    return skew
+
+
+def _skews(omega: list[FloatArray]) -> Iterator[tuple[str, str, float]]:
+    """(axis, what it must be, angle [rad] it is off) of every condition on the directions."""
+    one, two, three, four, five = omega
+    yield "axis 2", "square to axis 1", _from_square(one, two)
+    yield "axis 3", "parallel to axis 2", _from_parallel(two, three)
+    yield "axis 4", "parallel to axis 2", _from_parallel(two, four)
+    yield "axis 5", "square to axis 4", _from_square(four, five)
+
+
+def _from_square(a: FloatArray, b: FloatArray) -> float:
+    return abs(math.atan2(float(a @ b), float(np.linalg.norm(np.cross(a, b)))))
+
+
+def _from_parallel(a: FloatArray, b: FloatArray) -> float:
+    return math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
+
+
+def _canonical_frame(chain: Chain) -> FloatArray:
+    """T_C_S (4, 4)."""
+    one, two = chain.S[:3, 0], chain.S[:3, 1]
+    z = -one if one[2] < -tolerances.FAMILY_ANGLE else one
+    # What is off square or parallel within rounding is shared out among the three.
+    y = two + sum(math.copysign(1.0, two @ other) * other for other in chain.S[:3, 2:4].T)
+    y = y - (y @ z) * z
+    y = y / np.linalg.norm(y)
+    pan, *others = (screws.point_on(chain.S[:, i]) for i in range(4))
+    points = np.array(others) - pan
+    outward = points @ np.cross(y, z)
+    farthest = outward[np.abs(outward).argmax()]
+    if farthest < -tolerances.FAMILY_LENGTH:
+        y = -y
+    R_C_S = np.stack((np.cross(y, z), y, z))
+    origin = pan + (z @ points[0]) * z
+    return se3.from_rotation_translation(R_C_S, -R_C_S @ origin)
+
+
+def _link(v: FloatArray) -> tuple[float, float]:
+    """Length [m] of a link and its angle [rad] below the horizontal, in the arm's plane."""
+    return math.hypot(v[0], v[2]), math.atan2(-v[2], v[0])
+
+
+def _tidy(value: float) -> float:
+    return 0.0 if abs(value) <= tolerances.ROUNDING else float(value)
+
+
+def _tidied(T: FloatArray) -> FloatArray:
+    """`T` without the rounding next to 0 and 1, so that no frame is changed for nothing."""
+    whole = np.round(T)
+    return np.where(np.abs(T - whole) <= tolerances.ROUNDING, whole, T) + 0.0

@@ -1,0 +1,107 @@
+"""A serial arm as screw theory sees it: a home pose, its joint axes, their limits."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450 import tolerances
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.maths.geometry import screws, se3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A chain of revolute joints in the fixed frame {S}.
+
+    M: (4, 4) home configuration T_S_tool at q = 0. S: (6, n) screw axes (omega, v) in {S} at q = 0.
+    lower, upper: (n,) joint limits [rad]. speed: (n,) greatest joint speeds [rad/s]. names: n joint
+    names. Arrays are copied and read-only. Raises RobotDescriptionError when they make no chain.
+    """
+
+    M: FloatArray
+    S: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    speed: FloatArray
+    names: tuple[str, ...]
+    # exp(hat(S_i) q) = I + sin q * X_i + (1 - cos q) * X_i^2 for a pure rotation; (n, 4, 4) each.
+    generators: FloatArray = field(init=False, repr=False)
+    generators_squared: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        try:
+            self._set("M", se3.validated(self.M, "the home configuration M"))
+            self._set("S", finite_array(self.S, (6, n), "The screw axes S"))
+            for name in ("lower", "upper", "speed"):
+                self._set(name, finite_array(getattr(self, name), (n,), f"The array '{name}'"))
+        except InputError as error:
+            raise RobotDescriptionError(f"The arm is not described rightly. {error}") from error
+        if n == 0:
+            raise RobotDescriptionError("The arm has no joints; name at least one.")
+        object.__setattr__(self, "names", tuple(self.names))
+        for i, label in enumerate(self._labels()):
+            length = float(np.linalg.norm(self.S[:3, i]))
+            travel = screws.pitch(self.S[:, i])
+            if abs(length - 1.0) > tolerances.SCREW:
+                raise RobotDescriptionError(
+                    f"The direction of {label} has length {length:.9g}; it must be 1."
+                )
+            if abs(travel) > tolerances.SCREW:
+                raise RobotDescriptionError(
+                    f"The screw of {label} advances by {travel:.3g} m/rad; "
+                    "only turning joints are supported."
+                )
+            if not self.lower[i] < self.upper[i]:
+                raise RobotDescriptionError(
+                    f"The limits of {label} are {self.lower[i]:g} to {self.upper[i]:g} rad; "
+                    "the lower must be below the upper."
+                )
+            if not self.speed[i] > 0.0:
+                raise RobotDescriptionError(
+                    f"The speed limit of {label} is {self.speed[i]:g} rad/s; it must be above 0."
+                )
+        X = np.array([se3.hat(self.S[:, i]) for i in range(n)])
+        self._set("generators", X)
+        self._set("generators_squared", X @ X)
+
+    def _set(self, name: str, value: FloatArray) -> None:
+        value.setflags(write=False)
+        object.__setattr__(self, name, value)
+
+    def _labels(self) -> list[str]:
+        return [f"axis {i + 1} ({name})" for i, name in enumerate(self.names)]
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.names)
+
+    def with_tool(self, M: npt.ArrayLike) -> Chain:
+        """The same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""
+        return dataclasses.replace(self, M=np.asarray(M))
+
+    def check_q(self, q: npt.ArrayLike) -> FloatArray:
+        """A float copy (n,) of the joint vector `q` [rad]; InputError names the axis at fault."""
+        result = real_array(q, (self.n,), "The joint vector")
+        if not np.isfinite(result).all():
+            for label, angle in zip(self._labels(), result, strict=True):
+                if not np.isfinite(angle):
+                    raise InputError(
+                        f"The joint vector has {angle} for {label}; give a finite angle."
+                    )
+        return result
+
+    def within_limits(self, q: npt.ArrayLike, slack: float = tolerances.LIMIT_SLACK) -> bool:
+        """Whether every angle of `q` (n,) [rad] is inside its limits, or over by <= `slack`."""
+        q = self.check_q(q)
+        return bool(((q >= self.lower - slack) & (q <= self.upper + slack)).all())
+
+    def clamp(self, q: npt.ArrayLike) -> FloatArray:
+        """`q` (n,) [rad] with every angle set to the nearest one inside its limits."""
+        return np.minimum(np.maximum(self.check_q(q), self.lower), self.upper)

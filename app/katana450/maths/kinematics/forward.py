@@ -1,0 +1,55 @@
+"""Forward kinematics by the product of exponentials, and its Jacobians.
+
+Sources: the paper's eq. (1), (2), (11); Lynch & Park, Modern Robotics (2017), ch. 4.1 and 5.1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.maths.geometry import screws, se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+
+_IDENTITY = np.eye(4)
+
+
+def _exponentials(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """exp(hat(S_i) q_i) of every joint, (n, 4, 4)."""
+    q = chain.check_q(q)[:, None, None]
+    # 1 - cos q written so that it keeps its digits near 0.
+    versine = 2.0 * np.sin(0.5 * q) ** 2
+    E: FloatArray = np.sin(q) * chain.generators + versine * chain.generators_squared
+    E += _IDENTITY
+    return E
+
+
+def forward(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """T_S_tool (4, 4) at the joint angles `q` (n,) [rad]: exp(S1 q1) ... exp(Sn qn) M."""
+    T = chain.M
+    for E in _exponentials(chain, q)[::-1]:
+        T = E @ T
+    return T
+
+
+def joint_frames(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """exp(S1 q1) ... exp(Si qi) for i = 1 ... n, (n, 4, 4): how each link moved from home."""
+    products = _exponentials(chain, q)
+    for i in range(1, chain.n):
+        products[i] = products[i - 1] @ products[i]
+    return products
+
+
+def jacobian_space(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """(6, n) Jacobian: the tool's twist (omega, v) in {S} is J_space @ qd."""
+    before = joint_frames(chain, q)
+    J = np.array(chain.S)
+    for i in range(1, chain.n):
+        J[:, i] = screws.moved(before[i - 1], chain.S[:, i])
+    return J
+
+
+def jacobian_body(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """(6, n) Jacobian: the tool's twist (omega, v) in the tool frame is J_body @ qd."""
+    return se3.adjoint(se3.inverse(forward(chain, q))) @ jacobian_space(chain, q)

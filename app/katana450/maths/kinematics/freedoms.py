@@ -1,0 +1,33 @@
+"""The five freedoms of the tool as a person names them: its point, its pitch and its roll.
+
+Pitch is the angle of the roll axis below the horizontal of the canonical arm, roll the turn about
+it: for the Katana theta2 + theta3 + theta4 and theta5. Angles in rad.
+"""
+
+from __future__ import annotations
+
+import numpy.typing as npt
+
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.chain import Chain
+
+
+def pitch_and_roll(chain: Chain, q: npt.ArrayLike) -> tuple[float, float]:
+    """Pitch and roll at the joint angles `q` (5,)."""
+    arm = arm_of(chain)
+    alpha = arm.angles(chain.check_q(q))
+    return arm.pitch(alpha), alpha[4]
+
+
+def pitched_frame(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """Rotation (3, 3) in {S} of the frame that pan and pitch have turned but roll has not.
+
+    Its x axis is the roll axis, its y axis that of the pitch.
+    """
+    arm = arm_of(chain)
+    pitch, _ = pitch_and_roll(chain, q)
+    alpha1 = arm.signs[0] * float(chain.check_q(q)[0])
+    R: FloatArray = arm.T_C_S[:3, :3].T @ so3.rotation_z(alpha1) @ so3.rotation_y(pitch)
+    return R

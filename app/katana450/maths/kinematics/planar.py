@@ -1,0 +1,260 @@
+"""Axes 2, 3 and 4 as a limited planar 3R arm: where its tool point can be, and at which pitch.
+
+The plane is that of the canonical arm: its origin the shoulder, u outward from axis 1, v along it
+downward, so that theta2, theta3, theta4 (here the canonical angles) turn u towards v. phi = theta2
++ theta3 + theta4 is the angle of the last link below the horizontal. Lengths in m, angles in rad.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from katana450 import tolerances
+from katana450.maths.kinematics.turns import wrapped
+
+
+class Interval(NamedTuple):
+    """The angles a joint may take; infinite ends mean any angle."""
+
+    lower: float
+    upper: float
+
+    def fit(self, theta: float) -> float | None:
+        """`theta` in the turn inside the interval, set onto an end it misses by rounding."""
+        lower, upper = self
+        if lower <= theta <= upper:
+            return theta if lower > -math.inf else wrapped(theta)
+        middle = 0.5 * (lower + upper)
+        theta = middle + math.remainder(theta - middle, math.tau)
+        slack = tolerances.PLANAR_LIMIT_SLACK
+        if lower - slack <= theta <= upper + slack:
+            return min(max(theta, lower), upper)
+        return None
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        return () if self.lower == -math.inf else (self.lower, self.upper)
+
+
+ANY_ANGLE = Interval(-math.inf, math.inf)
+
+
+class Posture(NamedTuple):
+    """Angles of the planar arm. stretched: links in one line, not only limits, hold it there."""
+
+    theta2: float
+    theta3: float
+    theta4: float
+    stretched: bool = False
+
+    @property
+    def phi(self) -> float:
+        return self.theta2 + self.theta3 + self.theta4
+
+
+class _Shape(NamedTuple):
+    """Links beyond a joint as one rigid link: its length, and its angle to the first of them."""
+
+    length: float
+    bearing: float
+
+
+def _joined(first: float, second: float, bend: float) -> _Shape:
+    x, y = first + second * math.cos(bend), second * math.sin(bend)
+    return _Shape(math.hypot(x, y), math.atan2(y, x))
+
+
+def _meeting(
+    center1: tuple[float, float], radius1: float, center2: tuple[float, float], radius2: float
+) -> tuple[tuple[float, float], ...]:
+    """Where two circles meet: two points (they may coincide), or none; concentric ones: none."""
+    dx, dy = center2[0] - center1[0], center2[1] - center1[1]
+    d = math.hypot(dx, dy)
+    if d == 0.0:
+        return ()
+    along = 0.5 * (d + (radius1 - radius2) * (radius1 + radius2) / d)
+    radicand = (radius1 - along) * (radius1 + along)
+    if radicand < -tolerances.RADICAND * radius1 * radius1:
+        return ()
+    across = math.sqrt(max(radicand, 0.0))
+    ex, ey = dx / d, dy / d
+    foot = center1[0] + along * ex, center1[1] + along * ey
+    return (
+        (foot[0] - across * ey, foot[1] + across * ex),
+        (foot[0] + across * ey, foot[1] - across * ex),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarArm:
+    """A planar 3R arm on one branch.
+
+    l1, l2, l3: link lengths [m]. theta2, theta4: their limits. theta3: its limits cut to one side
+    of the stretched and of the folded arm; an end there is that singularity, not a limit. bend: +1
+    where that side is the elbow up, -1 where it is down. axis: u of axis 1 [m]. side: +1 where the
+    tool point must keep u >= axis, -1 where u <= axis.
+    """
+
+    l1: float
+    l2: float
+    l3: float
+    theta2: Interval
+    theta3: Interval
+    theta4: Interval
+    bend: int
+    axis: float
+    side: int
+
+    def behind(self, u: float) -> float:
+        """How far [m] a point lies across axis 1 from the arm's side; negative on its side."""
+        return (self.axis - u) * self.side
+
+    def tool(self, posture: Posture) -> tuple[float, float]:
+        """(u, v) [m] of the tool point."""
+        a = posture.theta2
+        b = a + posture.theta3
+        c = b + posture.theta4
+        return (
+            self.l1 * math.cos(a) + self.l2 * math.cos(b) + self.l3 * math.cos(c),
+            self.l1 * math.sin(a) + self.l2 * math.sin(b) + self.l3 * math.sin(c),
+        )
+
+    def at(self, u: float, v: float, phi: float) -> Posture | None:
+        """The posture with the tool point at (u, v) and pitch `phi`, if the limits allow it.
+
+        The wrist follows from the pitch; theta3 brings it to its distance from the shoulder
+        (subproblem 3, of whose two answers the branch is one), theta2 into place (subproblem 1).
+        """
+        wu, wv = u - self.l3 * math.cos(phi), v - self.l3 * math.sin(phi)
+        rho = math.hypot(wu, wv)
+        far, near = self.l1 + self.l2, abs(self.l1 - self.l2)
+        stretched, folded = (far - rho) * (far + rho), (rho - near) * (rho + near)
+        if min(stretched, folded) < -tolerances.RADICAND * far * far:
+            return None
+        bend = 2.0 * math.atan2(math.sqrt(max(stretched, 0.0)), math.sqrt(max(folded, 0.0)))
+        theta3 = self.bend * bend
+        theta2 = math.atan2(wv, wu) - _joined(self.l1, self.l2, theta3).bearing
+        return self._posture(theta2, theta3, phi - theta2 - theta3)
+
+    def pitch_ends(self, u: float, v: float) -> Iterator[Posture]:
+        """The postures at (u, v) with a joint at an end: between them the pitch is free to vary.
+
+        Each end fixes one joint, which leaves two circles that meet in the elbow or the wrist.
+        """
+        origin, tool = (0.0, 0.0), (u, v)
+        for theta3 in self.theta3.ends:
+            shape = _joined(self.l1, self.l2, theta3)
+            for wu, wv in _meeting(origin, shape.length, tool, self.l3):
+                theta2 = math.atan2(wv, wu) - shape.bearing
+                theta4 = math.atan2(v - wv, u - wu) - theta2 - theta3
+                yield from self._if_fits(theta2, theta3, theta4, self._singular(theta3))
+        for theta2 in self.theta2.ends:
+            elbow = self.l1 * math.cos(theta2), self.l1 * math.sin(theta2)
+            for wu, wv in _meeting(elbow, self.l2, tool, self.l3):
+                theta3 = math.atan2(wv - elbow[1], wu - elbow[0]) - theta2
+                theta4 = math.atan2(v - wv, u - wu) - theta2 - theta3
+                yield from self._if_fits(theta2, theta3, theta4)
+        for theta4 in self.theta4.ends:
+            shape = _joined(self.l2, self.l3, theta4)
+            for eu, ev in _meeting(origin, self.l1, tool, shape.length):
+                theta2 = math.atan2(ev, eu)
+                theta3 = math.atan2(v - ev, u - eu) - shape.bearing - theta2
+                yield from self._if_fits(theta2, theta3, theta4)
+
+    def nearest(self, u: float, v: float) -> Posture:
+        """The posture with the tool point nearest to a point (u, v) that has none of its own.
+
+        The nearest point of the joint box meets the Karush-Kuhn-Tucker conditions: each joint is at
+        an end, or on one line with tool point and target. All such postures are listed and the
+        nearest that the limits allow is taken. Where that lies across axis 1 the tool point may
+        also be on the axis instead. Limits that keep it off the arm's side altogether make that
+        side void.
+        """
+
+        def misplaced(posture: Posture) -> tuple[bool, float]:
+            pu, pv = self.tool(posture)
+            wrong_side = self.behind(pu) > tolerances.PLANAR_LIMIT_SLACK
+            return wrong_side, math.hypot(pu - u, pv - v)
+
+        best = min(self._stationary(u, v, on_axis=False), key=lambda p: misplaced(p)[1])
+        if not misplaced(best)[0]:
+            return best
+        return min(self._stationary(u, v, on_axis=True), key=misplaced)
+
+    def _stationary(self, u: float, v: float, *, on_axis: bool) -> Iterator[Posture]:
+        for theta3, theta4, stretched in self._shapes_beyond_shoulder():
+            if self.theta3.fit(theta3) is None or self.theta4.fit(theta4) is None:
+                continue
+            forearm = _joined(self.l2, self.l3, theta4)
+            arm = _joined(self.l1, forearm.length, theta3 + forearm.bearing)
+            for direction in self._directions((0.0, 0.0), arm.length, u, v, on_axis):
+                yield from self._if_fits(direction - arm.bearing, theta3, theta4, stretched)
+        for theta2 in self.theta2.ends:
+            elbow = self.l1 * math.cos(theta2), self.l1 * math.sin(theta2)
+            for theta4, stretched in self._shapes_beyond_elbow():
+                if self.theta4.fit(theta4) is None:
+                    continue
+                shape = _joined(self.l2, self.l3, theta4)
+                for direction in self._directions(elbow, shape.length, u, v, on_axis):
+                    theta3 = direction - shape.bearing - theta2
+                    yield from self._if_fits(theta2, theta3, theta4, stretched)
+            for theta3 in self.theta3.ends:
+                b = theta2 + theta3
+                wrist = elbow[0] + self.l2 * math.cos(b), elbow[1] + self.l2 * math.sin(b)
+                singular = self._singular(theta3)
+                for direction in self._directions(wrist, self.l3, u, v, on_axis):
+                    yield from self._if_fits(theta2, theta3, direction - b, singular)
+                for theta4 in self.theta4.ends:
+                    yield from self._if_fits(theta2, theta3, theta4, singular)
+
+    def _shapes_beyond_shoulder(self) -> Iterator[tuple[float, float, bool]]:
+        """(theta3, theta4, stretched) at which a turn about the shoulder may be nearest."""
+        for theta3 in self.theta3.ends:
+            for theta4 in self.theta4.ends:
+                yield theta3, theta4, self._singular(theta3)
+            bearing = _joined(self.l1, self.l2, theta3).bearing - theta3
+            yield theta3, bearing, True
+            yield theta3, bearing + math.pi, True
+        for theta4 in self.theta4.ends:
+            bearing = _joined(self.l2, self.l3, theta4).bearing
+            yield -bearing, theta4, True
+            yield math.pi - bearing, theta4, True
+
+    def _shapes_beyond_elbow(self) -> Iterator[tuple[float, bool]]:
+        """(theta4, stretched) at which a turn about the elbow may be nearest."""
+        for theta4 in self.theta4.ends:
+            yield theta4, False
+        yield 0.0, True
+        yield math.pi, True
+
+    def _directions(
+        self, center: tuple[float, float], radius: float, u: float, v: float, on_axis: bool
+    ) -> tuple[float, ...]:
+        """From `center`: towards (u, v), and if asked to where the circle crosses axis 1."""
+        towards = math.atan2(v - center[1], u - center[0])
+        out = self.axis - center[0]
+        if not on_axis or abs(out) > radius:
+            return (towards,)
+        across = math.sqrt((radius - out) * (radius + out))
+        return towards, math.atan2(across, out), math.atan2(-across, out)
+
+    def _singular(self, theta3: float) -> bool:
+        return abs(math.remainder(theta3, math.pi)) <= tolerances.ROUNDING
+
+    def _if_fits(
+        self, theta2: float, theta3: float, theta4: float, stretched: bool = False
+    ) -> Iterator[Posture]:
+        posture = self._posture(theta2, theta3, theta4, stretched)
+        if posture is not None:
+            yield posture
+
+    def _posture(
+        self, theta2: float, theta3: float, theta4: float, stretched: bool = False
+    ) -> Posture | None:
+        b = self.theta3.fit(theta3)
+        c = None if b is None else self.theta4.fit(theta4)
+        a = None if c is None else self.theta2.fit(theta2)
+        return None if a is None or b is None or c is None else Posture(a, b, c, stretched)

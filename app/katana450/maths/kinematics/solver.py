@@ -1,0 +1,191 @@
+"""The closed form for one pose at a time, on plain floats: microseconds for every branch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.maths.geometry.se3 import Rows
+from katana450.maths.kinematics.arm import Five, FiveAxisArm, arm_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.closed_form import Functions, closed_form
+from katana450.maths.kinematics.turns import in_turn, wrapped
+
+FourBranches = tuple[Five, Five, Five, Five]
+
+
+def _root(x: float) -> float:
+    return math.sqrt(x) if x > 0.0 else 0.0
+
+
+def _direction(y: float, x: float) -> tuple[float, float, float]:
+    angle = math.atan2(y, x)
+    return angle, math.cos(angle), math.sin(angle)
+
+
+_FLOATS: Final = Functions(math.atan2, math.sqrt, _root, _direction)
+
+
+class Solver(NamedTuple):
+    """Inverse kinematics of one chain without checks, for loops over many poses.
+
+    arm: the canonical arm. solve(rows, theta1=0.0): `rows` are those of a pose T_S_tool (4, 4) [m],
+    T.tolist(), its rotation orthonormal; theta1 [rad] is taken where the pose leaves it free. The
+    joint angles [rad] come back in the order of BRANCHES, each in the turn inside its limits if
+    there is one, else in [-pi, pi]. inside(q): whether every angle is inside its limits.
+    """
+
+    arm: FiveAxisArm
+    solve: Callable[..., FourBranches]
+    inside: Callable[[Five], bool]
+
+    @staticmethod
+    @lru_cache(maxsize=64)
+    def of(chain: Chain) -> Solver:
+        """That of `chain`, made once a chain; RobotDescriptionError as `arm_of`."""
+        arm = arm_of(chain)
+        return Solver(arm, _solve(chain, arm), _inside(chain))
+
+
+Facing = tuple[float, float, float, float, float, float, float, float]
+
+
+def facing_near_axis_1(
+    arm: FiveAxisArm, x: float, y: float, r11: float, r21: float, free: float
+) -> Facing:
+    """(alpha1, cos, sin, u) facing the tool point at (x, y), and with the back to it.
+
+    Sound everywhere, but meant for a tool point near axis 1 (or near the cylinder of radius d about
+    it, which no tool point enters), where its place tells little of alpha1: the direction of the
+    tool's x axis (r11, r21) tells more, where it agrees or is the longer of the two. Neither tells
+    anything with the tool upright on axis 1: alpha1 is then `free`.
+    """
+    d, rounding = arm.d, 2.0 * tolerances.ROUNDING * arm.reach
+    rho, flat = math.hypot(x, y), math.hypot(r11, r21)
+    if flat > tolerances.UPRIGHT:
+        c, s = r11 / flat, r21 / flat
+        if abs(c * y - s * x + d) < abs(c * y - s * x - d):
+            c, s = -c, -s
+        trusted = rho <= min(tolerances.ON_AXIS, flat * arm.reach)
+        if trusted or abs(c * y - s * x - d) <= rounding:
+            u = c * x + s * y
+            front, back = (c, s, u), _opposite(d, x, y, rho, c, s, u)
+            if u < -rounding:
+                front, back = back, front
+            return _with_angle(*front) + _with_angle(*back)
+    elif rho <= 0.5 * rounding:
+        free = wrapped(free)
+        c, s = math.cos(free), math.sin(free)
+        return free, c, s, 0.0, wrapped(free + math.pi), -c, -s, 0.0
+    sine = min(max(d / rho, -1.0), 1.0)
+    cosine = math.sqrt((1.0 - sine) * (1.0 + sine))
+    x, y = x / rho, y / rho
+    return _with_angle(x * cosine + y * sine, y * cosine - x * sine, rho * cosine) + _with_angle(
+        y * sine - x * cosine, -y * cosine - x * sine, -rho * cosine
+    )
+
+
+def _opposite(
+    d: float, x: float, y: float, rho: float, c: float, s: float, u: float
+) -> tuple[float, float, float]:
+    """The other plane at the distance d from axis 1 that holds the tool point."""
+    if d == 0.0 or rho <= tolerances.ON_AXIS:
+        return -c, -s, -u
+    c, s = d * y - u * x, -d * x - u * y
+    scale = 1.0 / math.hypot(c, s)
+    return c * scale, s * scale, -u
+
+
+def _with_angle(c: float, s: float, u: float) -> tuple[float, float, float, float]:
+    return math.atan2(s, c), c, s, u
+
+
+def _solve(chain: Chain, arm: FiveAxisArm) -> Callable[..., FourBranches]:
+    posture = closed_form(arm, _FLOATS)
+    in_line = arm.d == 0.0
+    near = tolerances.NEAR_AXIS_1 * arm.reach
+    atan2, hypot, remainder = math.atan2, math.hypot, math.remainder
+    pi, start, tau = math.pi, -math.pi, math.tau
+    turned = _turned(chain, arm)
+    is_canonical, is_mirrored, pose = arm.is_canonical, arm.is_mirrored, arm.pose
+
+    def solve(rows: Rows, theta1: float = 0.0) -> FourBranches:
+        if not is_canonical:
+            rows = pose(np.array(rows)).tolist()
+            theta1 *= arm.signs[0]
+        x, y = rows[0][3], rows[1][3]
+        u = hypot(x, y)
+        if in_line and u > near:
+            one, c, s = atan2(y, x), x / u, y / u
+            other = one - pi if one > 0.0 else one + pi
+        else:
+            r11, r21 = rows[0][0], rows[1][0]
+            one, c, s, u, other, c2, s2, u2 = facing_near_axis_1(arm, x, y, r11, r21, theta1)
+        phi, up, down, bend, five = posture(c, s, u, rows)
+        if up < start:
+            up += tau
+        if down > pi:
+            down -= tau
+        a4, b4 = phi - up - bend, phi - down + bend
+        if not start <= a4 <= pi:
+            a4 = remainder(a4, tau)
+        if not start <= b4 <= pi:
+            b4 = remainder(b4, tau)
+        if is_mirrored:
+            up2 = pi - down if down > 0.0 else start - down
+            down2 = pi - up if up > 0.0 else start - up
+            bend2, c4, d4 = bend, -b4, -a4
+            five2 = five - pi if five > 0.0 else five + pi
+        else:
+            if in_line:
+                c2, s2, u2 = -c, -s, -u
+            phi2, up2, down2, bend2, five2 = posture(c2, s2, u2, rows)
+            up2, down2 = remainder(up2, tau), remainder(down2, tau)
+            c4, d4 = remainder(phi2 - up2 - bend2, tau), remainder(phi2 - down2 + bend2, tau)
+        front_up, front_down = (one, up, bend, a4, five), (one, down, -bend, b4, five)
+        back_up, back_down = (other, up2, bend2, c4, five2), (other, down2, -bend2, d4, five2)
+        if turned is None:
+            return front_up, front_down, back_up, back_down
+        return turned(front_up), turned(front_down), turned(back_up), turned(back_down)
+
+    return solve
+
+
+def _turned(chain: Chain, arm: FiveAxisArm) -> Callable[[Five], Five] | None:
+    """From canonical angles within a turn to joint angles in theirs; None where they are equal."""
+    lower, upper = chain.lower.tolist(), chain.upper.tolist()
+    limits = tuple(zip(arm.signs, arm.shifts, lower, upper, strict=True))
+    if all(limit[:2] == (1.0, 0.0) and max(-limit[2], limit[3]) <= math.pi for limit in limits):
+        return None
+
+    def turned(alpha: Five) -> Five:
+        one, two, three, four, five = (
+            in_turn(sign * (angle - shift), a, b)
+            for angle, (sign, shift, a, b) in zip(alpha, limits, strict=True)
+        )
+        return one, two, three, four, five
+
+    return turned
+
+
+def _inside(chain: Chain) -> Callable[[Five], bool]:
+    slack = tolerances.LIMIT_SLACK
+    a1, a2, a3, a4, a5 = (chain.lower - slack).tolist()
+    b1, b2, b3, b4, b5 = (chain.upper + slack).tolist()
+
+    def inside(q: Five) -> bool:
+        q1, q2, q3, q4, q5 = q
+        return bool(
+            a1 <= q1 <= b1
+            and a2 <= q2 <= b2
+            and a3 <= q3 <= b3
+            and a4 <= q4 <= b4
+            and a5 <= q5 <= b5
+        )
+
+    return inside

@@ -1,0 +1,165 @@
+"""The Paden-Kahan subproblems: a rotation about one or two axes, solved by geometry.
+
+Axes are given by a unit direction `omega` and a point `r` [m] on them, of any orientation. Angles
+are in rad, in (-pi, pi]. Where no exact angle exists, the angle of least misfit comes back with
+`exact` False. Every angle is an atan2: an arccos loses half its digits where its argument nears 1.
+
+Sources: Paden (1986); Murray, Li & Sastry (1994), ch. 3.2.2 (subproblems 1 to 3). Subproblem 4 is
+what remains of the second for an arm whose first joint is alone in turning its plane.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from katana450 import tolerances
+from katana450.maths.geometry.vectors import (
+    Vector,
+    add,
+    cross,
+    dot,
+    norm,
+    perpendicular,
+    scale,
+    sub,
+)
+from katana450.maths.kinematics.turns import wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class Rotations:
+    """All angles [rad] that solve a subproblem in one angle.
+
+    exact: the equation holds, to rounding; otherwise the angles are those of least misfit. free:
+    the ill-posed case, every angle serves as well as the one given.
+    """
+
+    angles: tuple[float, ...]
+    exact: bool
+    free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RotationPairs:
+    """All pairs (theta1, theta2) [rad] that solve a subproblem in two angles; flags as above."""
+
+    pairs: tuple[tuple[float, float], ...]
+    exact: bool
+    free: bool = False
+
+
+def _sqrt(radicand: float) -> float:
+    return math.sqrt(radicand) if radicand > 0.0 else 0.0
+
+
+def subproblem1(omega: Vector, r: Vector, p: Vector, q: Vector) -> Rotations:
+    """Turn p onto q:  exp(omega theta) p = q.
+
+    One solution. Without an exact one (p and q at different heights along or distances from the
+    axis) the angle that brings p nearest to q. Ill-posed with p or q on the axis: every angle
+    serves, 0 is given. Murray, Li & Sastry, subproblem 1.
+    """
+    u, v = sub(p, r), sub(q, r)
+    height = dot(omega, sub(u, v))
+    u, v = perpendicular(u, omega), perpendicular(v, omega)
+    radius_u, radius_v = norm(u), norm(v)
+    misfit = math.hypot(height, radius_u - radius_v)
+    exact = misfit <= tolerances.SUBPROBLEM_EXACT
+    if min(radius_u, radius_v) <= tolerances.ON_AXIS:
+        return Rotations((0.0,), exact, free=True)
+    return Rotations((wrapped(math.atan2(dot(omega, cross(u, v)), dot(u, v))),), exact)
+
+
+def subproblem2(omega1: Vector, omega2: Vector, r: Vector, p: Vector, q: Vector) -> RotationPairs:
+    """Turn p about axis 2, then about axis 1, onto q; the axes cross in r.
+
+    exp(omega1 theta1) exp(omega2 theta2) p = q. Two solutions, which coincide where the circles of
+    p and q touch. Without an exact one, the single pair that brings p nearest to q. Ill-posed with
+    parallel axes (only the sum counts: theta2 is 0) and with p or q in r or on the axis it turns
+    about first or last (that angle is 0). Murray, Li & Sastry, subproblem 2.
+    """
+    u, v = sub(p, r), sub(q, r)
+    length_u, length_v = norm(u), norm(v)
+    normal = cross(omega1, omega2)
+    sine = norm(normal)
+    if sine <= tolerances.PARALLEL:
+        single = subproblem1(omega1, r, p, q)
+        return RotationPairs(((single.angles[0], 0.0),), single.exact, free=True)
+    if min(length_u, length_v) <= tolerances.ON_AXIS:
+        misfit = abs(length_u - length_v)
+        exact = misfit <= tolerances.SUBPROBLEM_EXACT
+        return RotationPairs(((0.0, 0.0),), exact, free=True)
+
+    # On the unit sphere the misfit is least for the same angles, whatever the two lengths are.
+    u, v = scale(1.0 / length_u, u), scale(1.0 / length_v, v)
+    cosine = dot(omega1, omega2)
+    on1, on2 = dot(omega1, v), dot(omega2, u)
+    alpha = (on1 - cosine * on2) / (sine * sine)
+    beta = (on2 - cosine * on1) / (sine * sine)
+    in_plane = add(scale(alpha, omega1), scale(beta, omega2))
+    reach = norm(in_plane)
+    radicand = (1.0 - reach) * (1.0 + reach)
+    meets = radicand >= -tolerances.RADICAND
+    gamma = _sqrt(radicand) / sine
+    origin = (0.0, 0.0, 0.0)
+    pairs: list[tuple[float, float]] = []
+    free = False
+    for side in (gamma, -gamma) if meets else (0.0,):
+        c = add(in_plane, scale(side, normal))
+        theta2 = subproblem1(omega2, origin, u, c)
+        theta1 = subproblem1(omega1, origin, c, v)
+        free = free or theta1.free or theta2.free
+        pairs.append((theta1.angles[0], theta2.angles[0]))
+    exact = meets and abs(length_u - length_v) <= tolerances.SUBPROBLEM_EXACT
+    return RotationPairs(tuple(pairs), exact, free)
+
+
+def subproblem3(omega: Vector, r: Vector, p: Vector, q: Vector, delta: float) -> Rotations:
+    """Turn p to the distance `delta` [m] from q:  |q - exp(omega theta) p| = delta.
+
+    Two solutions, which coincide where the circle of p touches the sphere round q. Without an exact
+    one, the single angle of the nearest distance. Ill-posed with p or q on the axis: the distance
+    is the same at every angle, 0 is given. Murray, Li & Sastry, subproblem 3; the angle between the
+    two arms u, v of the triangle is  2 atan2(sqrt(delta^2 - (u-v)^2), sqrt((u+v)^2 - delta^2)),
+    its differences of squares factored so that digits survive stretched and folded.
+    """
+    u, v = sub(p, r), sub(q, r)
+    height = dot(omega, sub(u, v))
+    u, v = perpendicular(u, omega), perpendicular(v, omega)
+    radius_u, radius_v = norm(u), norm(v)
+    in_plane = _sqrt((delta - height) * (delta + height))
+    near, far = abs(radius_u - radius_v), radius_u + radius_v
+    if min(radius_u, radius_v) <= tolerances.ON_AXIS:
+        misfit = abs(math.hypot(height, far) - delta)
+        return Rotations((0.0,), misfit <= tolerances.SUBPROBLEM_EXACT, free=True)
+    middle = math.atan2(dot(omega, cross(u, v)), dot(u, v))
+    folded = (in_plane - near) * (in_plane + near)
+    stretched = (far - in_plane) * (far + in_plane)
+    opening = 2.0 * math.atan2(_sqrt(folded), _sqrt(stretched))
+    rounding = -tolerances.RADICAND * far * far
+    if abs(height) > delta + tolerances.SUBPROBLEM_EXACT or min(folded, stretched) < rounding:
+        return Rotations((wrapped(middle + opening),), exact=False)
+    return Rotations((wrapped(middle + opening), wrapped(middle - opening)), exact=True)
+
+
+def subproblem4(omega: Vector, r: Vector, p: Vector, h: Vector, d: float) -> Rotations:
+    """Turn p into the plane with unit normal h at the offset d [m]:  h . exp(omega theta) p = d.
+
+    Two solutions, which coincide where the circle of p touches the plane. Without an exact one, the
+    single angle that brings p nearest to the plane. Ill-posed with p on the axis or the plane
+    square to it: the offset is the same at every angle, 0 is given. With u = p - r the condition is
+    a sin(theta) + b cos(theta) = c,  a = h . (omega x u),  b = h . u_perpendicular.
+    """
+    u = sub(p, r)
+    c = d - dot(h, r) - dot(omega, u) * dot(omega, h)
+    u = perpendicular(u, omega)
+    a, b = dot(h, cross(omega, u)), dot(h, u)
+    amplitude = math.hypot(a, b)
+    if amplitude <= tolerances.ON_AXIS:
+        return Rotations((0.0,), abs(c) <= tolerances.SUBPROBLEM_EXACT, free=True)
+    middle = math.atan2(a, b)
+    opening = 2.0 * math.atan2(_sqrt(amplitude - c), _sqrt(amplitude + c))
+    if abs(c) > amplitude * (1.0 + tolerances.RADICAND):
+        return Rotations((wrapped(middle + opening),), exact=False)
+    return Rotations((wrapped(middle + opening), wrapped(middle - opening)), exact=True)

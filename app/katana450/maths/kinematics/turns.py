@@ -1,0 +1,48 @@
+"""Which of the angles that differ by whole turns to take. Angles in rad."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+
+
+def wrapped(theta: float) -> float:
+    """`theta` in (-pi, pi]."""
+    theta = math.remainder(theta, math.tau)
+    return math.pi if theta == -math.pi else theta
+
+
+def in_turn(theta: float, lower: float, upper: float) -> float:
+    """`theta` in the turn between the limits if there is one, else in (-pi, pi]."""
+    theta = wrapped(theta)
+    lower, upper = lower - tolerances.LIMIT_SLACK, upper + tolerances.LIMIT_SLACK
+    if lower <= theta <= upper:
+        return theta
+    # The first turn past the limit that it misses.
+    turns = math.ceil((lower - theta) / math.tau)
+    if theta > upper:
+        turns = math.floor((upper - theta) / math.tau)
+    turned = theta + math.tau * turns
+    return turned if lower <= turned <= upper else theta
+
+
+def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:
+    """`q` (n,), each angle in the turn inside its limits if there is one, else wrapped."""
+    limits = zip(q.tolist(), chain.lower.tolist(), chain.upper.tolist(), strict=True)
+    return np.array([in_turn(theta, lower, upper) for theta, lower, upper in limits])
+
+
+def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatArray:
+    """`q` (n,), each angle in that turn nearest to `hint` (n,) which is inside its limits.
+
+    Only limits wider than a turn leave this choice.
+    """
+    if hint is None or not (chain.upper - chain.lower > math.tau).any():
+        return q
+    other = q + math.tau * np.round((hint - q) / math.tau)
+    return np.where((other >= chain.lower) & (other <= chain.upper), other, q)

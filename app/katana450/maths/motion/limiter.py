@@ -1,0 +1,335 @@
+"""From goals to setpoints that a real arm can follow: bounded speed, acceleration and jerk.
+
+Each step is planned anew from where the motion is to rest at the goal (Berscheid and Kroeger,
+"Jerk-limited real-time trajectory generation with arbitrary target states", RSS 2021, as the
+library ruckig does it) and its first ``dt`` is taken. So a goal may change at any tick, and from
+any state there is a way to stop. Angles in rad, times in s, arrays of one value a joint.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from ruckig import (
+    ControlInterface,
+    InputParameter,
+    Result,
+    Ruckig,
+    RuckigError,
+    Synchronization,
+    Trajectory,
+)
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+
+STRAIGHT = 1e-6
+"""Of the limits: a motion this little beside the line to its goal is on it."""
+
+SLACK = 1e-9
+"""[rad] A plan that ends at a limit may miss it by rounding."""
+
+DONE = (Result.Working, Result.Finished)
+
+CALM = 0.7
+"""Of acceleration and jerk, what a joint that is led along a bound brakes with."""
+
+LEAST_SHARE = 1e-3
+"""Of the speed; slower than that takes ages and is a hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Of each joint: (n,) lower, upper [rad], speed [rad/s], acceleration, jerk [rad/s^3]."""
+
+    lower: FloatArray
+    upper: FloatArray
+    speed: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+
+    def __post_init__(self) -> None:
+        n = np.size(self.lower)
+        for name in ("lower", "upper", "speed", "acceleration", "jerk"):
+            value = frozen(finite_array(getattr(self, name), (n,), f"The limit {name!r}"))
+            object.__setattr__(self, name, value)
+        if not (self.lower < self.upper).all():
+            raise InputError("Every lower limit must be below the upper one.")
+        for name in ("speed", "acceleration", "jerk"):
+            if not (getattr(self, name) > 0.0).all():
+                raise InputError(f"Every limit of {name} must be above 0.")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Where the joints are and how they move: q, qd, qdd, (n,) each [rad, rad/s, rad/s^2]."""
+
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+
+    @staticmethod
+    def rest(q: FloatArray) -> Motion:
+        """Standing still at ``q`` (n,)."""
+        zero = frozen(np.zeros(len(q)))
+        return Motion(frozen(q), zero, zero)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves, or is about to."""
+        return not (self.qd.any() or self.qdd.any())
+
+
+class Limiter:
+    """Steps of one arm's motion. Its methods are pure; it is for one thread."""
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        n = len(limits.lower)
+        self._ruckig = Ruckig(n)
+        self._trajectory = Trajectory(n)
+        self._input = InputParameter(n)
+        self._line_ruckig = Ruckig(1)
+        self._line_trajectory = Trajectory(1)
+        self._line = InputParameter(1)
+        self._line.target_velocity = self._line.target_acceleration = [0.0]
+        self._input.target_acceleration = [0.0] * n
+        self._input.max_acceleration = limits.acceleration.tolist()
+        self._input.max_jerk = limits.jerk.tolist()
+
+    def towards(self, now: Motion, goal: FloatArray, dt: float, share: float = 1.0) -> Motion:
+        """The motion ``dt`` [s] on, on its way to rest at ``goal`` (n,) inside the limits.
+
+        All joints arrive together. A motion that heads straight for the goal, as one from rest
+        does, stays on the straight line to it; one under way to another goal bends over to it.
+        share: of the greatest speed, above 0 and up to 1. From rest inside the limits no step
+        leaves them, however often the goal changes.
+        """
+        if dt <= 0.0 or (now.at_rest and (now.q == goal).all()):
+            return now
+        along = self._along(now, goal, dt, share)
+        if along is not None:
+            return along
+        self._start(now, ControlInterface.Position, share)
+        self._input.target_position = goal.tolist()
+        self._input.target_velocity = [0.0] * len(goal)
+        for synchronization in (Synchronization.Time, Synchronization.No):
+            self._input.synchronization = synchronization
+            if self._planned() and self._inside():
+                return self._at(dt, goal)
+        # Each joint alone would still leave its limits, so it came too fast: stop first.
+        return self.stop(now, dt)
+
+    def at_rate(self, now: Motion, qd: FloatArray, dt: float, share: float = 1.0) -> Motion:
+        """The motion ``dt`` [s] on, on its way to the joint rates ``qd`` (n,) [rad/s].
+
+        The joints get to them in step, so that the direction stays what it is. Where one could then
+        not stop before its limit it brakes as hard as it may, and the others go on by themselves.
+        """
+        if dt <= 0.0:
+            return now
+        wanted = np.clip(qd, -share * self.limits.speed, share * self.limits.speed)
+        synchronization = Synchronization.Phase
+        for _ in range(len(wanted) + 1):
+            ahead = self._rates(now, wanted, dt, share, synchronization)
+            halt = self.halt(ahead)
+            beyond = (halt < self.limits.lower) | (halt > self.limits.upper)
+            if not beyond.any():
+                return ahead
+            wanted = np.where(beyond, 0.0, wanted)
+            synchronization = Synchronization.No
+        return self.stop(now, dt)
+
+    def stoppable(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The least and the most rates (n,) [rad/s] that joints at ``q`` (n,) can lose in time.
+
+        Braking takes v^2 / 2a + v a / 2j, or v^(3/2) / j^(1/2) where the jerk alone bounds it.
+        """
+        a, j = CALM * self.limits.acceleration, CALM * self.limits.jerk
+        rooms = np.maximum((q - self.limits.lower, self.limits.upper - q), 0.0)
+        soft = a * a / (2.0 * j)
+        long = np.sqrt(soft * soft + 2.0 * a * rooms) - soft
+        least, most = np.where(rooms > 4.0 * soft * soft / a, long, np.cbrt(j * rooms * rooms))
+        return -least, most
+
+    def pause(self, now: Motion, goal: FloatArray, dt: float) -> Motion:
+        """The motion ``dt`` [s] on when it brakes on its way to ``goal``, so that it can go on."""
+        if dt <= 0.0 or now.at_rest:
+            return now
+        line = self._line_to(now, goal, 1.0)
+        if line is not None:
+            self._line.control_interface = ControlInterface.Velocity
+            if _planned(self._line_ruckig, self._line, self._line_trajectory):
+                return self._on_line(now, line, dt)
+        return self.stop(now, dt)
+
+    def stop(self, now: Motion, dt: float) -> Motion:
+        """The motion ``dt`` [s] on when every joint brakes as hard as it may."""
+        if dt <= 0.0 or now.at_rest:
+            return now
+        return self._rates(now, np.zeros(len(now.q)), dt, 1.0, Synchronization.No)
+
+    def halt(self, now: Motion) -> FloatArray:
+        """(n,) where the joints come to rest when they brake now [rad]."""
+        if now.at_rest:
+            return now.q
+        self._brake(now)
+        q, _, _ = self._trajectory.at_time(self._trajectory.duration)
+        return np.array(q)
+
+    def way_to_halt(self, now: Motion, longest: float) -> list[FloatArray]:
+        """Where the joints pass when they brake now, (n,) each, the present place first.
+
+        longest: [rad] all joints together move no farther from one to the next.
+        """
+        if now.at_rest:
+            return [now.q]
+        self._brake(now)
+        trajectory = self._trajectory
+        end, _, _ = trajectory.at_time(trajectory.duration)
+        # Each joint only goes on as it goes, or back from where it was about to: twice is enough.
+        pieces = max(1, math.ceil(2.0 * float(np.abs(np.array(end) - now.q).sum()) / longest))
+        times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
+        return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
+
+    def braking(self, now: Motion) -> tuple[Callable[[float], Motion], float]:
+        """The motion by time from now on [s] when every joint brakes, and how long that takes [s].
+
+        To be used before anything else is asked of this limiter.
+        """
+        self._brake(now)
+        at = self._trajectory.at_time
+        return lambda t: Motion(*map(np.array, at(t))), self._trajectory.duration
+
+    def fastest(self, now: Motion) -> FloatArray:
+        """(n,) the greatest rates while they brake from now on [rad/s]: they may still rise."""
+        rise = now.qdd * np.abs(now.qdd) / (2.0 * self.limits.jerk)
+        return np.maximum(np.abs(now.qd), np.abs(now.qd + rise))
+
+    def time_to_halt(self, now: Motion) -> float:
+        """[s] until then."""
+        if now.at_rest:
+            return 0.0
+        self._brake(now)
+        return float(self._trajectory.duration)
+
+    def _along(self, now: Motion, goal: FloatArray, dt: float, share: float) -> Motion | None:
+        """The step on the straight line to ``goal``, or None when the motion is not on it."""
+        line = self._line_to(now, goal, share)
+        if line is None:
+            return None
+        self._line.control_interface = ControlInterface.Position
+        if not _planned(self._line_ruckig, self._line, self._line_trajectory):
+            return None
+        (extrema,) = self._line_trajectory.position_extrema
+        if not all(self._holds(now.q + end * line) for end in (extrema.min, extrema.max)):
+            return None
+        if self._line_trajectory.duration <= dt:
+            return Motion.rest(goal)
+        return self._on_line(now, line, dt)
+
+    def _line_to(self, now: Motion, goal: FloatArray, share: float) -> FloatArray | None:
+        """The direction (n,) to ``goal``, the plan along it prepared; None when not on the way."""
+        way = goal - now.q
+        length = float(np.linalg.norm(way))
+        if length == 0.0:
+            return None
+        d = way / length
+        limits, line = self.limits, self._line
+        v, a = float(now.qd @ d), float(now.qdd @ d)
+        beside = max(
+            float(np.max(np.abs(now.qd - v * d) / limits.speed)),
+            float(np.max(np.abs(now.qdd - a * d) / limits.acceleration)),
+        )
+        if beside > STRAIGHT:
+            return None
+        # A joint that hardly takes part bounds nothing.
+        with np.errstate(divide="ignore", over="ignore"):
+            of_axis = 1.0 / np.abs(d)
+            speed, acceleration, jerk = (
+                float(np.min(each * of_axis))
+                for each in (limits.speed, limits.acceleration, limits.jerk)
+            )
+        line.current_position, line.target_position = [0.0], [length]
+        line.current_velocity, line.current_acceleration = [v], [a]
+        line.max_velocity = [max(share, LEAST_SHARE) * speed]
+        line.max_acceleration, line.max_jerk = [acceleration], [jerk]
+        return np.asarray(d)
+
+    def _on_line(self, now: Motion, line: FloatArray, dt: float) -> Motion:
+        (s,), (v,), (a,) = self._line_trajectory.at_time(dt)
+        q = np.clip(now.q + s * line, self.limits.lower, self.limits.upper)
+        if self._line_trajectory.duration <= dt:
+            return Motion.rest(q)
+        return Motion(frozen(q), frozen(v * line), frozen(a * line))
+
+    def _holds(self, q: FloatArray) -> bool:
+        limits = self.limits
+        return bool((q >= limits.lower - SLACK).all() and (q <= limits.upper + SLACK).all())
+
+    def _brake(self, now: Motion) -> None:
+        self._aim_at_rates(now, [0.0] * len(now.q), 1.0, Synchronization.No)
+
+    def _rates(
+        self,
+        now: Motion,
+        qd: FloatArray,
+        dt: float,
+        share: float,
+        synchronization: Synchronization,
+    ) -> Motion:
+        self._aim_at_rates(now, qd.tolist(), share, synchronization)
+        return self._at(dt, None, to_rest=not qd.any())
+
+    def _aim_at_rates(
+        self, now: Motion, qd: list[float], share: float, synchronization: Synchronization
+    ) -> None:
+        self._start(now, ControlInterface.Velocity, share)
+        self._input.target_velocity = qd
+        for way in (synchronization, Synchronization.No):
+            self._input.synchronization = way
+            if self._planned():
+                return
+        raise ArithmeticError("No way to brake was found, which is a fault of the limiter.")
+
+    def _start(self, now: Motion, interface: ControlInterface, share: float) -> None:
+        self._input.control_interface = interface
+        self._input.current_position = now.q.tolist()
+        self._input.current_velocity = now.qd.tolist()
+        self._input.current_acceleration = now.qdd.tolist()
+        self._input.max_velocity = (max(share, LEAST_SHARE) * self.limits.speed).tolist()
+
+    def _planned(self) -> bool:
+        return _planned(self._ruckig, self._input, self._trajectory)
+
+    def _inside(self) -> bool:
+        extrema = self._trajectory.position_extrema
+        return all(
+            lower - SLACK <= each.min and each.max <= upper + SLACK
+            for each, lower, upper in zip(
+                extrema, self.limits.lower.tolist(), self.limits.upper.tolist(), strict=True
+            )
+        )
+
+    def _at(self, dt: float, goal: FloatArray | None, *, to_rest: bool = False) -> Motion:
+        ends = self._trajectory.duration <= dt
+        q, qd, qdd = (np.array(each) for each in self._trajectory.at_time(dt))
+        if goal is not None and ends:
+            return Motion.rest(goal)
+        np.clip(q, self.limits.lower, self.limits.upper, out=q)
+        if ends and to_rest:
+            return Motion.rest(q)
+        if ends:
+            qdd[:] = 0.0
+        return Motion(frozen(q), frozen(qd), frozen(qdd))
+
+
+def _planned(ruckig: Ruckig, wanted: InputParameter, trajectory: Trajectory) -> bool:
+    """Whether ``trajectory`` now leads where ``wanted`` says; there may be another way."""
+    try:
+        return ruckig.calculate(wanted, trajectory) in DONE
+    except RuckigError:
+        return False

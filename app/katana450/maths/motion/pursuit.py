@@ -1,0 +1,156 @@
+"""A motion follows another under limits of speed, acceleration and jerk, and passes no bound.
+
+Near what it follows it is a linear controller with the rates and accelerations fed forward; far
+from it, it approaches no faster than it can brake. Each step keeps one promise: braking from its
+end, every joint comes to rest within bounds. So an error of the controller can cost accuracy, and
+never leads anywhere the bounds exclude.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.motion.limiter import LEAST_SHARE, Limiter, Limits, Motion
+from katana450.maths.motion.stream import Stream
+
+BoolArray = npt.NDArray[np.bool_]
+
+POSITION_GAIN, RATE_GAIN, ACCELERATION_GAIN = 8.0, 16.0, 48.0
+"""[1/s] Of errors of position, rate and acceleration."""
+
+APPROACH = 0.6
+"""[1] Of the acceleration that the motion followed leaves over, what brakes an approach."""
+
+LEAST_LEFT = 0.15
+"""[1] Of all acceleration, what an approach may count on in any case."""
+
+HALVINGS = 12
+"""Of the range of the jerk, when not all of it keeps the bounds."""
+
+
+def stream_step(
+    limiter: Limiter, now: Motion, stream: Stream, t: float, dt: float, share: float = 1.0
+) -> Motion:
+    """The motion ``dt`` [s] on from ``now``, at the time ``t`` [s], that follows ``stream``.
+
+    A stream inside the limits is reproduced with a short lag; for another one the motion stays
+    inside its extremes, as far as these can be foreseen. share: of the greatest speed.
+    """
+    bounds = _intended(stream, t, limiter.limits)
+    return pursued(limiter, now, stream.at(t), bounds, dt, share)
+
+
+def pursued(
+    limiter: Limiter,
+    now: Motion,
+    wanted: Motion,
+    bounds: tuple[FloatArray, FloatArray],
+    dt: float,
+    share: float = 1.0,
+) -> Motion:
+    """The motion ``dt`` [s] on from ``now``, following ``wanted``, which is where to be by then.
+
+    bounds: the least and the most (n,) [rad] between which every joint could come to rest, wherever
+    the limits are wider; one that could not from ``now`` already gets no farther beyond them.
+    share: of the greatest speed.
+    """
+    if dt <= 0.0:
+        return now
+    limits = limiter.limits
+    A, J, V = limits.acceleration, limits.jerk, max(share, LEAST_SHARE) * limits.speed
+    qd, qdd = np.clip(wanted.qd, -V, V), np.clip(wanted.qdd, -A, A)
+    here = braked(now.q, now.qd, now.qdd, A, J)
+    low = np.minimum(np.maximum(bounds[0], limits.lower), here)
+    high = np.maximum(np.minimum(bounds[1], limits.upper), here)
+    dip, peak = _rates_ahead(now.qd, now.qdd, J)
+    slowest, fastest = np.minimum(-V, dip), np.maximum(V, peak)
+
+    def stepped(jerk: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        a = now.qdd + jerk * dt
+        v = now.qd + dt * (now.qdd + jerk * (dt / 2.0))
+        return now.q + dt * (now.qd + dt * (now.qdd / 2.0 + jerk * (dt / 6.0))), v, a
+
+    def beyond(jerk: FloatArray) -> tuple[BoolArray, BoolArray]:
+        """Which joints would go too far or too fast, downwards and upwards."""
+        q, v, a = stepped(jerk)
+        rest, (dip, peak) = braked(q, v, a, A, J), _rates_ahead(v, a, J)
+        return (rest < low) | (dip < slowest), (rest > high) | (peak > fastest)
+
+    least, most = np.maximum(-J, (-A - now.qdd) / dt), np.minimum(J, (A - now.qdd) / dt)
+    jerk = np.clip(_wished_jerk(now, wanted.q, qd, qdd, A, V, dt), least, most)
+    down, up = beyond(jerk)
+    if (down | up).any():
+        good, bad = np.where(up, least, np.where(down, most, jerk)), jerk
+        for _ in range(HALVINGS):
+            middle = 0.5 * (good + bad)
+            too_low, too_high = beyond(middle)
+            wrong = np.where(up, too_high, too_low)
+            good, bad = np.where(wrong, good, middle), np.where(wrong, middle, bad)
+        jerk = good
+        down, up = beyond(jerk)
+    q, v, a = stepped(jerk)
+    if (down | up).any():
+        # A jerk that lasts for all of dt is too coarse: brake exactly.
+        stop, brakes = limiter.stop(now, dt), down | up
+        q, v, a = (np.where(brakes, x, y) for x, y in ((stop.q, q), (stop.qd, v), (stop.qdd, a)))
+    return Motion(frozen(np.clip(q, limits.lower, limits.upper)), frozen(v), frozen(a))
+
+
+def _rates_ahead(v: FloatArray, a: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) the least and the greatest rate until the acceleration can be 0 [rad/s]."""
+    return v - np.minimum(a, 0.0) ** 2 / (2.0 * J), v + np.maximum(a, 0.0) ** 2 / (2.0 * J)
+
+
+def _wished_jerk(
+    now: Motion,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    A: FloatArray,
+    V: FloatArray,
+    dt: float,
+) -> FloatArray:
+    """(n,) what leads to ``q``, ``qd`` and ``qdd`` in ``dt`` [s] and on with them."""
+    error = q - dt * qd + 0.5 * dt * dt * qdd - now.q
+    drift = qd - dt * qdd - now.qd
+    left = APPROACH * np.maximum(A + np.sign(error) * qdd, LEAST_LEFT * A)
+    # Linear near by; beyond, the speed that the acceleration left over can lose on the way.
+    near = left / POSITION_GAIN**2
+    root = np.sqrt(2.0 * left * np.maximum(np.abs(error) - 0.5 * near, 0.5 * near))
+    far = np.abs(error) > near
+    approach = np.where(far, np.sign(error) * root, POSITION_GAIN * error)
+    slope = np.where(far, left / root, POSITION_GAIN)
+    rate = np.clip(qd + approach, -V, V)
+    acceleration = np.clip(qdd + slope * drift + RATE_GAIN * (rate - now.qd), -A, A)
+    return np.asarray((acceleration - now.qdd) / max(1.0 / ACCELERATION_GAIN, dt))
+
+
+def braked(
+    q: FloatArray, qd: FloatArray, qdd: FloatArray, A: FloatArray, J: FloatArray
+) -> FloatArray:
+    """(n,) where joints come to rest that brake as hard as they may [rad]; as ``Limiter.halt``."""
+    sign = np.where(qd + qdd * np.abs(qdd) / (2.0 * J) < 0.0, -1.0, 1.0)
+    v, a = sign * qd, sign * qdd
+    # The jerk leads to the deceleration p, which lasts a while where it is all there is.
+    p = np.minimum(np.sqrt(np.maximum(J * v + 0.5 * a * a, 0.0)), A)
+    t1, t3 = (a + p) / J, p / J
+    v1 = v + t1 * (a - 0.5 * J * t1)
+    t2 = np.maximum(v1 - 0.5 * p * t3, 0.0) / np.maximum(p, 1e-12)
+    way = t1 * (v + t1 * (0.5 * a - J * t1 / 6.0)) + t2 * (v1 - 0.5 * p * t2)
+    # The last stretch, seen from its end, is one of jerk alone.
+    return np.asarray(q + sign * (way + J * t3**3 / 6.0))
+
+
+def _intended(stream: Stream, t: float, limits: Limits) -> tuple[FloatArray, FloatArray]:
+    """The bounds (n,) [rad] within which ``stream`` is taken to stay at ``t`` [s].
+
+    They hold all its samples, and the way that it would take to brake, as hard as the joints can or
+    as it was seen to: what turns too hard to be followed is left on the inside of the turn.
+    """
+    wanted = stream.at(min(t, stream.sure_until))
+    A, J = limits.acceleration, limits.jerk
+    qd, qdd = np.clip(wanted.qd, -limits.speed, limits.speed), np.clip(wanted.qdd, -A, A)
+    rest = wanted.q + braked(0.0 * qd, qd, qdd, A, J) / stream.caution
+    return np.minimum(stream.lower, rest), np.maximum(stream.upper, rest)

@@ -1,0 +1,83 @@
+"""Straight ways of the joints from via to via, their corners rounded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.polyline import Polyline
+from katana450.maths.planning.posture import FiveJets, ThreeJets, tool_point
+
+SAME = 1e-9
+"""[rad] Vias nearer to each other are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointPath:
+    """From via to via on straight lines in joint space, its corners rounded as those of `Polyline`.
+
+    With its vias inside the limits the path is.
+
+    chain: the arm with its tool. vias: (m, 5) [rad], the first and last are start and end. blend:
+    (m - 2,) how much of half of its shorter leg each corner cuts off, above 0 up to 1.
+    """
+
+    chain: Chain
+    vias: FloatArray
+    blend: FloatArray = field(default_factory=lambda: np.empty(0))
+    _line: Polyline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        vias = np.array([self.chain.check_q(q) for q in self.vias])
+        if len(vias) < 2 or (np.abs(np.diff(vias, axis=0)).max(axis=1) <= SAME).any():
+            raise InputError("A path needs two vias at least, each of them elsewhere.")
+        for number, q in enumerate(vias):
+            if not self.chain.within_limits(q):
+                beyond = np.maximum(self.chain.lower - q, q - self.chain.upper)
+                axis = int(beyond.argmax())
+                raise InputError(
+                    f"Via {number + 1} has axis {axis + 1} at {math.degrees(q[axis]):.1f} deg, "
+                    f"{math.degrees(beyond[axis]):.2g} deg beyond its limit."
+                )
+        # As long as a leg takes at full speed, so that none is run through in no time.
+        lengths = (np.abs(np.diff(vias, axis=0)) / self.chain.speed).max(axis=1)
+        line = Polyline(frozen(vias), lengths, self.blend)
+        object.__setattr__(self, "vias", line.vias)
+        object.__setattr__(self, "blend", line.blend)
+        object.__setattr__(self, "_line", line)
+
+    @property
+    def start(self) -> FloatArray:
+        """(5,) where it begins [rad]."""
+        return frozen(self.vias[0])
+
+    @property
+    def end(self) -> FloatArray:
+        """(5,) where it ends [rad]."""
+        return frozen(self.vias[-1])
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """Where legs and corners meet."""
+        return self._line.joins
+
+    def joints(self, sigma: Jet) -> FiveJets:
+        """The joint angles [rad] at `sigma`, one place or many (N,)."""
+        one, two, three, four, five = self._line.at(sigma)
+        return one, two, three, four, five
+
+    def point(self, sigma: Jet) -> ThreeJets:
+        """The tool point [m], in {C}."""
+        arm = arm_of(self.chain)
+        one, two, three, four, five = (
+            sign * q + shift
+            for q, sign, shift in zip(self.joints(sigma), arm.signs, arm.shifts, strict=True)
+        )
+        return tool_point(arm, (one, two, three, four, five))

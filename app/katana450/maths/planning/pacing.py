@@ -1,0 +1,189 @@
+"""The search for the scaling of a path that runs through it in the least time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.planning.checkpoint import checkpoint
+from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
+from katana450.maths.planning.scaling import CUBIC, Bounds, Scaling, rest_to_rest
+
+KNOTS: Final = 20
+"""Pieces of the slowness, and half as many more for each join of the path."""
+
+LOOKS: Final = 16
+"""Places looked at in each of them; what lies between is covered by SPARE."""
+
+SPARE: Final = 0.995
+"""[1] Of every limit."""
+
+ROUNDS: Final = 50
+"""Of making a path slower where it is too fast and faster where it is not."""
+
+TRIED: Final = 8
+"""Of the same, to tell whether other a and j are better."""
+
+PRESS: Final = 0.6
+"""[1] Power of what a place is too fast by, by which it is slowed in one round."""
+
+RELAX: Final = 0.1
+"""[1] The same where it is too slow: less, or the rounds would chase each other."""
+
+TINY: Final = 1e-300
+"""Keeps nothing by nothing from being no number."""
+
+NARROWINGS: Final = (2.0, 1.4, 1.18, 1.08)
+"""[1] By which a and j are varied, ever less, as long as it saves time."""
+
+
+def fastest(path: Path, bounds: Bounds) -> Scaling:
+    """The scaling of `path` that keeps to `bounds` and takes the least time found.
+
+    For given a and j each coefficient of the slowness is pressed up while a limit is exceeded near
+    it and relaxed while none is met, and all are made slower together by what is left over; a and j
+    are then sought on a pattern that narrows. Not the optimum, but near: tests say how near.
+    """
+    sampled = _Sampled.of(path, bounds)
+    joints = bounds.joints
+    a = float((joints.acceleration / joints.speed).min())
+    j = float((joints.jerk / joints.speed).min())
+    even = np.ones(len(sampled.first) + 3)
+    # As slow everywhere, or as slow as each place by itself has to be: either may end up better.
+    starts = even, sampled.near(sampled.excess(even, a, j))
+    best = min((sampled.fitted(a, j, each, ROUNDS) for each in starts), key=lambda f: f.time)
+    for factor in NARROWINGS:
+        improved = True
+        while improved:
+            improved = False
+            for x, y in ((1, 1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1)):
+                fa, fj = factor**x, factor**y
+                a, j = best.acceleration * fa, best.jerk * fj
+                other = sampled.fitted(a, j, best.coefficients, TRIED)
+                if other.time < (1.0 - 1e-3) * best.time:
+                    best, improved = other, True
+    best = sampled.fitted(best.acceleration, best.jerk, best.coefficients, ROUNDS)
+    return Scaling(best.coefficients, best.acceleration, best.jerk)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    coefficients: FloatArray
+    acceleration: float
+    jerk: float
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Sampled:
+    """A path at many places.
+
+    q: (3, N, 5) derivatives of the joints by sigma, over their speed; p: (2, N, 3) of the tool
+    point. piece: (N,) of the slowness that each is in. weights: (3, N, 4) of its four coefficients
+    for the slowness and its first two derivatives. first: (K,) index of the first place in each.
+    """
+
+    q: FloatArray
+    p: FloatArray
+    piece: npt.NDArray[np.int64]
+    weights: FloatArray
+    first: npt.NDArray[np.int64]
+    bounds: Bounds
+
+    @staticmethod
+    def of(path: Path, bounds: Bounds) -> _Sampled:
+        count = KNOTS + (KNOTS // 2) * len(path.joins)
+        even = np.linspace(0.0, 1.0, count * LOOKS + 1)
+        # Either side of a join, where the third derivative leaps.
+        joins = np.array(path.joins)
+        sigma = np.unique(np.concatenate((even, joins - 1e-12, joins + 1e-12)))
+        piece = np.minimum((sigma * count).astype(np.int64), count - 1)
+        share = sigma * count - piece
+        powers = np.stack((np.ones_like(share), share, share**2, share**3))
+        zero = np.zeros_like(share)
+        slopes = np.stack((zero, zero + count, 2.0 * count * share, 3.0 * count * share**2))
+        bends = np.stack((zero, zero, zero + 2.0 * count**2, 6.0 * count**2 * share))
+        weights = np.stack([each.T @ CUBIC for each in (powers, slopes, bends)])
+        return _Sampled(
+            joint_derivatives(path, sigma)[1:],
+            point_derivatives(path, sigma)[1:3],
+            piece,
+            weights,
+            np.searchsorted(piece, np.arange(count)),
+            bounds,
+        )
+
+    def fitted(self, a: float, j: float, start: FloatArray, rounds: int) -> _Fitted:
+        """The least slowness found for the bounds `a` and `j` of tau(t), from `start` (K + 3,)."""
+        c = start * self.excess(start, a, j).max()
+        best, least = c, np.inf
+        for _ in range(rounds):
+            checkpoint()
+            excess = self.excess(c, a, j)
+            most = float(excess.max())
+            # tau at the end, were all made slower until nothing is too fast.
+            time = rest_to_rest(most * self._span(c), a, j)
+            if time < least:
+                best, least = most * c, time
+            near = self.near(excess)
+            c = c * np.where(near > 1.0, near**PRESS, near**RELAX)
+        return _Fitted(best, a, j, least)
+
+    def near(self, excess: FloatArray) -> FloatArray:
+        """(K + 3,) the greatest of `excess` (N,) that each coefficient has a part in."""
+        worst = np.maximum.reduceat(excess, self.first)
+        padded = np.concatenate((np.zeros(3), worst, np.zeros(3)))
+        return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
+
+    @staticmethod
+    def _span(c: FloatArray) -> float:
+        total = c.sum() - (23.0 * (c[0] + c[-1]) + 12.0 * (c[1] + c[-2]) + c[2] + c[-3]) / 24.0
+        return float(total) / (len(c) - 3)
+
+    def excess(self, c: FloatArray, a: float, j: float) -> FloatArray:
+        """(N,) how many times slower each place must be run through to keep every limit."""
+        limits, bounds = self.bounds.joints, self.bounds
+        fours = np.stack([c[self.piece + k] for k in range(4)], axis=1)
+        w, w1, w2 = (np.einsum("nk,nk->n", fours, each) for each in self.weights)
+        first = 1.0 / w
+        second = -w1 * first**3
+        third = (3.0 * w1 * w1 * first - w2) * first**4
+        f, s, t = first[:, None], second[:, None], third[:, None]
+        q1, q2, q3 = self.q
+        speed = np.abs(q1) * f
+        bend = np.abs(q2 * f * f + q1 * s)
+        jerk = np.abs(q3 * f**3 + 3.0 * q2 * f * s + q1 * t)
+        spare = SPARE
+        found = (speed / (spare * limits.speed)).max(axis=1)
+        A, J = spare * limits.acceleration, spare * limits.jerk
+        np.maximum(found, _quadratic(bend / A, a * speed / A).max(axis=1), out=found)
+        cubic = _cubic(jerk / J, 3.0 * a * bend / J, j * speed / J)
+        np.maximum(found, cubic.max(axis=1), out=found)
+        p1, p2 = self.p
+        moved = np.sqrt(np.einsum("nk,nk->n", p1, p1)) * first
+        np.maximum(found, moved / (spare * bounds.tool_speed), out=found)
+        if bounds.tool_acceleration is not None:
+            pushed = p2 * f * f + p1 * s
+            push = np.sqrt(np.einsum("nk,nk->n", pushed, pushed)) / bounds.tool_acceleration
+            pull = a * moved / bounds.tool_acceleration
+            np.maximum(found, _quadratic(push / spare, pull / spare), out=found)
+        return np.asarray(found)
+
+
+def _quadratic(x: FloatArray, y: FloatArray) -> FloatArray:
+    """The r > 0 with x / r^2 + y / r = 1."""
+    return np.asarray(0.5 * (y + np.sqrt(y * y + 4.0 * x)))
+
+
+def _cubic(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
+    """The r > 0 with x / r^3 + y / r^2 + z / r = 1, from above so that no limit is passed."""
+    # r^3 - z r^2 - y r - x is convex and rises beyond its root, and this is beyond it.
+    r = np.cbrt(x) + np.sqrt(y) + z
+    for _ in range(3):
+        value = ((r - z) * r - y) * r - x
+        r = r - value / ((3.0 * r - 2.0 * z) * r - y + TINY)
+    return r

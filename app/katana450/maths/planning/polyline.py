@@ -1,0 +1,111 @@
+"""Straight legs from via to via in any coordinates, each corner rounded by a quintic."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.planning.jet import Jet
+
+QUINTIC = np.array(
+    [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [-5.0, 5.0, 0.0, 0.0, 0.0, 0.0],
+        [10.0, -20.0, 10.0, 0.0, 0.0, 0.0],
+        [-10.0, 30.0, -30.0, 10.0, 0.0, 0.0],
+        [5.0, -20.0, 30.0, -20.0, 5.0, 0.0],
+        [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0],
+    ]
+)
+"""From the control points of a Bezier curve of degree 5 to its coefficients, lowest power first."""
+
+STRETCH = 2.5
+"""[1] How much of sigma a corner takes, to its reach along either leg, for its ends to be passed as
+quickly as the legs are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polyline:
+    """From via to via on straight legs, round each corner on a quintic.
+
+    A corner is a Bezier curve of degree 5 whose control points lie on the two legs, three evenly
+    spaced on each, the last of the one and the first of the other in the via: so it leaves and
+    meets the legs with their rates and without acceleration, and stays in the triangle that it cuts
+    off (Farin, Curves and Surfaces for CAGD, 2002, ch. 5). Inner vias are passed by, the nearer
+    the smaller the blend.
+
+    vias: (m, n), the first and last are start and end. lengths: (m - 1,) how much of sigma each leg
+    takes, to the others. blend: (m - 2,) how much of half of its shorter leg each corner cuts off,
+    above 0 up to 1.
+    """
+
+    vias: FloatArray
+    lengths: FloatArray
+    blend: FloatArray
+    _starts: list[float] = field(init=False, repr=False)
+    _terms: FloatArray = field(init=False, repr=False)
+    _total: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        blend = finite_array(self.blend, (len(self.vias) - 2,), "The blend of the corners")
+        if not ((blend > 0.0) & (blend <= 1.0)).all():
+            raise InputError(f"A blend is above 0 and up to 1, not {blend.tolist()}.")
+        object.__setattr__(self, "blend", frozen(blend))
+        self._lay()
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """Where legs and corners meet."""
+        return tuple(start / self._total for start in self._starts[1:])
+
+    def at(self, sigma: Jet) -> tuple[Jet, ...]:
+        """The n coordinates at `sigma`, one place or many (N,)."""
+        t = self._total * sigma
+        if isinstance(t.c0, float):
+            piece = max(bisect_right(self._starts, t.c0) - 1, 0)
+            local, terms = t - self._starts[piece], self._terms[piece].T.tolist()
+        else:
+            pieces = np.maximum(np.searchsorted(self._starts, t.c0, side="right") - 1, 0)
+            local = t - np.array(self._starts)[pieces]
+            terms = self._terms[pieces].transpose(2, 1, 0)
+        return tuple(_polynomial(row, local) for row in terms)
+
+    def _lay(self) -> None:
+        """Legs and corners as polynomials, each from 0 of its own share of sigma."""
+        vias, lengths = self.vias, self.lengths
+        rates = np.diff(vias, axis=0) / lengths[:, None]
+        cut = np.zeros(len(vias))
+        cut[1:-1] = 0.5 * self.blend * np.minimum(lengths[:-1], lengths[1:])
+        starts, terms, at = [], [], 0.0
+        for leg, (rate, length) in enumerate(zip(rates, lengths.tolist(), strict=True)):
+            straight = length - cut[leg] - cut[leg + 1]
+            if straight > tolerances.ROUNDING * length:
+                line = np.zeros((6, len(rate)))
+                line[0], line[1] = vias[leg] + cut[leg] * rate, rate
+                starts.append(at)
+                terms.append(line)
+                at += float(straight)
+            if leg + 1 < len(rates):
+                reach, via = cut[leg + 1], vias[leg + 1]
+                before, after = via - reach * rate, via + reach * rates[leg + 1]
+                points = (before, 0.5 * (before + via), via, via, 0.5 * (via + after), after)
+                lasts = STRETCH * float(reach)
+                starts.append(at)
+                terms.append((QUINTIC @ np.array(points)) / lasts ** np.arange(6.0)[:, None])
+                at += lasts
+        object.__setattr__(self, "_starts", starts)
+        object.__setattr__(self, "_terms", frozen(terms))
+        object.__setattr__(self, "_total", at)
+
+
+def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
+    """By Horner's rule; `terms` of the lowest power first, floats or (6, N)."""
+    found = Jet.constant(terms[5])
+    for term in (terms[4], terms[3], terms[2], terms[1], terms[0]):
+        found = found * t + term
+    return found

@@ -1,0 +1,188 @@
+"""How a path is run through in time: as fast as the limits allow, and slower wherever asked.
+
+Two steps lead from time to the path. sigma = g(tau) is fixed when a path is planned; tau(t) is left
+to whoever runs it, as long as |tau'| <= 1, |tau''| <= a and |tau'''| <= j. With subscripts for
+derivatives by tau the joints then have
+
+    qd = q_tau tau',   qdd = q_tautau tau'^2 + q_tau tau'',
+    qddd = q_tautautau tau'^3 + 3 q_tautau tau' tau'' + q_tau tau'''
+
+so that speed, acceleration and jerk keep their limits v, A, J for every such tau(t) if everywhere
+
+    |q_tau| <= v,   |q_tautau| + |q_tau| a <= A,   |q_tautautau| + 3 |q_tautau| a + |q_tau| j <= J.
+
+To pause, reverse or slow down is then a matter of tau alone and keeps the shape of the path. g is
+given by its slowness w = d tau / d sigma, a uniform cubic B-spline with coefficients above 0.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.motion.limiter import Limits
+
+CUBIC: Final = (
+    np.array(
+        [[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]
+    )
+    / 6.0
+)
+"""From four coefficients of a uniform cubic B-spline to the polynomial between two knots."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What a motion keeps to.
+
+    joints: of speed, acceleration and jerk. tool_speed: the most of the tool point [m/s].
+    tool_acceleration: the same [m/s^2], as for a full cup; None for any.
+    """
+
+    joints: Limits
+    tool_speed: float
+    tool_acceleration: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("speed", self.tool_speed),
+            ("acceleration", self.tool_acceleration),
+        ):
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"The tool's {name} has to be a number above 0, not {value!r}.")
+
+
+@dataclass(frozen=True)
+class Pace:
+    """sigma at some tau, and its first three derivatives by tau."""
+
+    sigma: float
+    first: float
+    second: float
+    third: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """sigma = g(tau) from 0 to `span` [s], and what tau(t) may do.
+
+    coefficients: (K + 3,) [s] of the slowness over K equal pieces of sigma. acceleration, jerk: a
+    and j, the most of tau'' [1/s] and tau''' [1/s^2].
+    """
+
+    coefficients: FloatArray
+    acceleration: float
+    jerk: float
+
+    def __post_init__(self) -> None:
+        c = finite_array(self.coefficients, (np.size(self.coefficients),), "The coefficients")
+        if len(c) < 4 or not (c > 0.0).all() or not min(self.acceleration, self.jerk) > 0.0:
+            raise InputError("A scaling needs four or more coefficients, all its numbers above 0.")
+        object.__setattr__(self, "coefficients", frozen(c))
+
+    @property
+    def span(self) -> float:
+        """tau at the end of the path [s]."""
+        return self._starts[-1]
+
+    @property
+    def duration(self) -> float:
+        """[s] from rest to rest at full speed."""
+        return rest_to_rest(self.span, self.acceleration, self.jerk)
+
+    def tau_after(self, t: float) -> float:
+        """tau [s] ``t`` [s] after the start at full speed, from 0 to `duration`."""
+        return gone_after(t, self.span, self.acceleration, self.jerk)
+
+    @cached_property
+    def _pieces(self) -> list[list[float]]:
+        """Of each piece the slowness as a polynomial of its own share."""
+        c = self.coefficients
+        fours = np.stack([c[k : len(c) - 3 + k] for k in range(4)], axis=1)
+        pieces: list[list[float]] = (fours @ CUBIC.T).tolist()
+        return pieces
+
+    @cached_property
+    def _starts(self) -> list[float]:
+        """tau where each piece begins, and that at the end."""
+        shares = np.array([1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0]) / len(self._pieces)
+        passed = np.cumsum(np.array(self._pieces) @ shares)
+        return [0.0, *passed.tolist()]
+
+    def pace(self, tau: float) -> Pace:
+        """sigma at `tau`, from 0 to `span`."""
+        starts, count = self._starts, len(self._pieces)
+        piece = min(max(bisect_right(starts, tau) - 1, 0), count - 1)
+        a, b, c, d = self._pieces[piece]
+        passed = (tau - starts[piece]) * count
+        # tau grows with the share and is nearly straight over a piece: Newton is there in no time.
+        share = passed / ((starts[piece + 1] - starts[piece]) * count)
+        for _ in range(8):
+            gone = share * (a + share * (b / 2.0 + share * (c / 3.0 + share * d / 4.0)))
+            step = (passed - gone) / (a + share * (b + share * (c + share * d)))
+            share = min(max(share + step, 0.0), 1.0)
+            if abs(step) < 1e-15:
+                break
+        w = a + share * (b + share * (c + share * d))
+        w1 = count * (b + share * (2.0 * c + share * 3.0 * d))
+        w2 = count * count * (2.0 * c + share * 6.0 * d)
+        return Pace((piece + share) / count, *_inverted(w, w1, w2))
+
+    def tau(self, sigma: float) -> float:
+        """[s] at the place `sigma` of the path, from 0 to 1."""
+        count = len(self._pieces)
+        piece = min(max(int(sigma * count), 0), count - 1)
+        a, b, c, d = self._pieces[piece]
+        share = sigma * count - piece
+        gone = share * (a + share * (b / 2.0 + share * (c / 3.0 + share * d / 4.0)))
+        return self._starts[piece] + gone / count
+
+
+def rest_to_rest(way: float, a: float, j: float) -> float:
+    """[s] that `way` takes from rest to rest under a speed of 1, acceleration `a`, jerk `j`.
+
+    Source: Biagiotti and Melchiorri, Trajectory Planning (2008), ch. 3.4.
+    """
+    if a * a >= j:
+        # Full speed is reached without full acceleration.
+        up = 2.0 / math.sqrt(j)
+        return way + up if way >= up else 4.0 * (way / (2.0 * j)) ** (1.0 / 3.0)
+    up = 1.0 / a + a / j
+    if way >= up:
+        return way + up
+    if way >= 2.0 * a**3 / j**2:
+        return a / j + math.sqrt((a / j) ** 2 + 4.0 * way / a)
+    return float(4.0 * (way / (2.0 * j)) ** (1.0 / 3.0))
+
+
+def gone_after(t: float, way: float, a: float, j: float) -> float:
+    """How much of ``way`` is behind ``t`` [s] after the start of the motion of `rest_to_rest`."""
+    total = rest_to_rest(way, a, j)
+    t = min(max(t, 0.0), total)
+    if t > 0.5 * total:
+        return way - gone_after(total - t, way, a, j)
+    # The jerk lasts for `ramp`, and the speed grows until `up`.
+    ramp = min(a / j, 1.0 / math.sqrt(j), math.cbrt(way / (2.0 * j)))
+    up = min(1.0 / (j * ramp) + ramp, 0.5 * total)
+    speed = j * ramp * (up - ramp)
+    if t <= ramp:
+        return j * t**3 / 6.0
+    if t <= up - ramp:
+        since = t - ramp
+        return j * ramp * (ramp**2 / 6.0 + 0.5 * ramp * since + 0.5 * since**2)
+    left = max(up - t, 0.0)
+    return speed * (t - 0.5 * up) + j * left**3 / 6.0
+
+
+def _inverted(w: float, w1: float, w2: float) -> tuple[float, float, float]:
+    """sigma_tau, sigma_tautau, sigma_tautautau from the slowness and its derivatives by sigma."""
+    first = 1.0 / w
+    cube = first**3
+    return first, -w1 * cube, (3.0 * w1 * w1 * first - w2) * cube * first

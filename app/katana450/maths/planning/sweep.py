@@ -1,0 +1,63 @@
+"""What a path sweeps: where the arm is along it, and how far its joints turn between two places."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.planning.clearance import FINE, Clearance, Room
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.path import Path, joint_derivatives
+
+PLACES = 512
+"""Pieces in each of which the rates of the joints are bounded."""
+
+LOOSE = 2.0
+"""[1] The third derivative changes by no more than this within a piece."""
+
+
+class Sweep:
+    """Along one path. Its methods are pure."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        even = np.linspace(0.0, 1.0, PLACES + 1)
+        self._sigma = np.unique(np.concatenate((even, np.array(path.joins))))
+        d = np.abs(joint_derivatives(path, self._sigma))
+        h = np.diff(self._sigma)[:, None]
+        rate, jerk = (np.maximum(each[:-1], each[1:]) for each in (d[1], d[3]))
+        # Between its ends a function is above its chord by no more than h^2 / 8 of its bend.
+        turns = h * (rate + LOOSE * h * h / 8.0 * jerk)
+        self._turned = np.vstack((np.zeros(turns.shape[1]), np.cumsum(turns, axis=0)))
+
+    def at(self, sigma: float, fingers: float) -> FloatArray:
+        """(6,) the joints at `sigma`, and the `fingers` as they are held [rad]."""
+        joints = self._path.joints(Jet.variable(sigma))
+        return np.array([*(each.c0 for each in joints), fingers])
+
+    def nearest(self, room: Room, fingers: float) -> Clearance | None:
+        """Where on the whole path parts come nearest."""
+        return room.nearest(lambda sigma: self.at(sigma, fingers), self.turned)
+
+    def blocked(
+        self,
+        room: Room,
+        fingers: float,
+        low: float = 0.0,
+        high: float = 1.0,
+        fine: float = FINE,
+    ) -> Clearance | None:
+        """A place between two that is too near, or None; as `Room.blocked`."""
+        return room.blocked(lambda sigma: self.at(sigma, fingers), self.turned, low, high, fine)
+
+    def turned(self, low: float, high: float) -> FloatArray:
+        """(6,) at most how far each turns between two places [rad]."""
+        return np.append(self._passed(high) - self._passed(low), 0.0)
+
+    def _passed(self, sigma: float) -> FloatArray:
+        piece = int(np.searchsorted(self._sigma, sigma, side="right")) - 1
+        piece = min(max(piece, 0), len(self._sigma) - 2)
+        low, high = self._sigma[piece], self._sigma[piece + 1]
+        share = (sigma - low) / (high - low)
+        before, after = self._turned[piece], self._turned[piece + 1]
+        return np.asarray(before + share * (after - before))

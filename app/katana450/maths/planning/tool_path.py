@@ -1,0 +1,218 @@
+"""Joints that take the tool along a curve, solved anew at every place: nothing is interpolated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.limited import LimitedArm
+from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.stance import nearest_stance
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.curve import Curve, Tool
+from katana450.maths.planning.jet import Coefficient, Jet
+from katana450.maths.planning.posture import FiveJets, ThreeJets, posture
+
+KNOTS = 400
+"""Places at which a path is looked at when it is built."""
+
+LEAST = 16
+"""The same on each piece of its curve."""
+
+APART = 1e-9
+"""[1] No two of them are nearer."""
+
+KINK = 1e-4
+"""[rad] Between two of them no axis is farther from the cubic through both, unless the path meets
+the end of the branch in between."""
+
+HALVINGS = 40
+"""Until the place where a path fails is known to rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPath:
+    """The joints on `branch` that have the tool on `curve`.
+
+    chain: the arm with its tool. near: (5,) [rad] of the turns an angle may be in, that nearest to
+    this is taken at the start. Raises InputError where the curve leaves the branch's reach or the
+    limits, or meets the end of the branch: where on the way, what binds, what to do.
+    """
+
+    chain: Chain
+    curve: Curve
+    branch: Branch
+    near: FloatArray
+    _turns: FloatArray = field(init=False, repr=False)
+    _sigma: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        near = frozen(self.chain.check_q(self.near))
+        object.__setattr__(self, "near", near)
+        sigma = frozen(self._looks())
+        q, qd = self._loose(sigma)
+        bad = np.flatnonzero(~np.isfinite(qd).all(axis=1))
+        if bad.size:
+            self._refuse_reach(sigma, int(bad[0]))
+        q[0] += np.round((near - q[0]) / (2.0 * np.pi)) * (2.0 * np.pi)
+        q = np.unwrap(q, axis=0)
+        object.__setattr__(self, "_sigma", sigma)
+        even = np.searchsorted(sigma, np.linspace(0.0, 1.0, KNOTS + 1) - 0.5 * APART)
+        object.__setattr__(self, "_turns", frozen(q[even]))
+        self._refuse_kinks(q, qd)
+        self._refuse_limits(q, qd)
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """Those of the curve."""
+        return self.curve.joins
+
+    def joints(self, sigma: Jet) -> FiveJets:
+        """The joint angles [rad] at `sigma`, one place or many (N,)."""
+        arm = arm_of(self.chain)
+        alpha = posture(arm, self.branch, *self.curve.at(sigma))
+        found = []
+        for axis, (angle, sign, shift) in enumerate(zip(alpha, arm.signs, arm.shifts, strict=True)):
+            q = sign * (angle - shift) if sign != 1.0 or shift else angle
+            turns = self._turn(axis, sigma.c0, q.c0)
+            found.append(q + turns * math.tau if np.any(turns) else q)
+        one, two, three, four, five = found
+        return one, two, three, four, five
+
+    def point(self, sigma: Jet) -> ThreeJets:
+        """The tool point in {S} [m]."""
+        x, y, z, _, _ = self.curve.at(sigma)
+        return x, y, z
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """(5,) where it begins [rad]."""
+        return frozen([each.c0 for each in self.joints(Jet.variable(0.0))])
+
+    @cached_property
+    def end(self) -> FloatArray:
+        """(5,) where it ends [rad]."""
+        return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
+
+    def _turn(self, axis: int, sigma: Coefficient, angle: Coefficient) -> Coefficient:
+        """How many turns `angle` is short: they go on from place to place."""
+        knots = self._turns[:, axis]
+        if isinstance(sigma, float):
+            place = min(max(round(sigma * KNOTS), 0), KNOTS)
+            return round((float(knots[place]) - angle) / math.tau)
+        place = np.clip(np.rint(sigma * KNOTS), 0, KNOTS).astype(np.int64)
+        return np.rint((knots[place] - angle) / math.tau)
+
+    def _looks(self) -> FloatArray:
+        """Where it is looked at: evenly, and often enough on each piece of the curve."""
+        even = np.linspace(0.0, 1.0, KNOTS + 1)
+        ends = (0.0, *self.joins, 1.0)
+        if len(ends) == 2:
+            return even
+        pieces = [np.linspace(low, high, LEAST + 1) for low, high in pairwise(ends)]
+        inner = np.unique(np.concatenate(pieces))
+        near = even[np.clip(np.rint(inner * KNOTS), 0, KNOTS).astype(np.int64)]
+        return np.unique(np.concatenate((even, inner[np.abs(inner - near) > APART])))
+
+    def _loose(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angles and their rates (N, 5) whatever turn they are in; not finite out of reach."""
+        arm = arm_of(self.chain)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            alpha = posture(arm, self.branch, *self.curve.at(Jet.variable(sigma)))
+            q = np.stack([np.broadcast_to(each.c0, sigma.shape) for each in alpha], axis=1)
+            qd = np.stack([np.broadcast_to(each.c1, sigma.shape) for each in alpha], axis=1)
+        return (q - arm.shifts) * arm.signs, qd * arm.signs
+
+    def _target(self, sigma: float) -> ToolTarget:
+        tool = Tool(*(float(each.c0) for each in self.curve.at(Jet.variable(sigma))))  # type: ignore[arg-type]
+        return ToolTarget(np.array(tool[:3]), float(tool.pitch), float(tool.roll))  # type: ignore[arg-type]
+
+    def _refuse_reach(self, sigma: FloatArray, bad: int) -> None:
+        good, failing = float(sigma[max(bad - 1, 0)]), float(sigma[bad])
+        for _ in range(HALVINGS if bad else 0):
+            middle = 0.5 * (good + failing)
+            _, qd = self._loose(np.array([middle]))
+            good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
+        target = self._target(failing)
+        limited = LimitedArm.of(self.chain, within_limits=False)
+        asked = target.asked(limited.arm, Reading.PITCH)
+        best = nearest_stance(limited, asked, self.branch, limited.arm.angles(self.near))
+        short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
+        raise InputError(
+            f"The path leaves what the arm reaches on the branch {self.branch} "
+            f"{_at(failing, target)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}: "
+            "links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
+            "arm, or give it another pitch."
+        )
+
+    def _refuse_kinks(self, q: FloatArray, qd: FloatArray) -> None:
+        """Where a branch ends the angles leap or turn back at once, maybe between two places."""
+        h = np.diff(self._sigma)[:, None]
+        middle, _ = self._loose(self._sigma[:-1] + 0.5 * h[:, 0])
+        smooth = 0.5 * (q[:-1] + q[1:]) + 0.125 * h * (qd[:-1] - qd[1:])
+        gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
+        kinked = ~(gap <= KINK)
+        if kinked.any():
+            place, axis = (int(each) for each in np.argwhere(kinked)[0])
+            sigma = float(self._sigma[place])
+            raise InputError(
+                f"Axis {axis + 1} would have to leap or turn at once "
+                f"{_at(sigma, self._target(sigma))}: links come in line there, or the tool passes "
+                "over axis 1. Lead the path around that place."
+            )
+
+    def _refuse_limits(self, q: FloatArray, qd: FloatArray) -> None:
+        """Extremes between two places are those of the cubic through their angles and rates."""
+        slack, lower, upper = tolerances.LIMIT_SLACK, self.chain.lower, self.chain.upper
+        beyond = np.maximum(lower - q, q - upper)
+        peaks = _peaks(q, qd, np.diff(self._sigma)[:, None])
+        over = np.maximum(beyond[:-1], np.maximum(lower - peaks, peaks - upper))
+        over[-1] = np.maximum(over[-1], beyond[-1])
+        if over.max() <= slack:
+            return
+        place = int(np.flatnonzero((over > slack).any(axis=1))[0])
+        axis = int(over[place].argmax())
+        worst = float(np.maximum(beyond, 0.0)[:, axis].max(initial=float(over[:, axis].max())))
+        limit = lower[axis] if q[place, axis] < 0.5 * (lower + upper)[axis] else upper[axis]
+        sigma = float(self._sigma[place])
+        if place > 0 and beyond[place, axis] > slack:
+            passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
+            sigma -= float(passed) * (sigma - float(self._sigma[place - 1]))
+        raise InputError(
+            f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
+            f"{_at(sigma, self._target(sigma))}, by up to {np.degrees(worst):.2g} deg later on. "
+            "Shift the path, or give it another pitch or roll."
+        )
+
+
+def _at(sigma: float, target: ToolTarget) -> str:
+    x, y, z = (1e3 * target.position).tolist()
+    return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
+def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
+    """(N, n) the extreme inside each piece of length `h` (N, 1), or its start where it has none."""
+    a, b = q[:-1], q[1:]
+    da, db = h * qd[:-1], h * qd[1:]
+    turns = da * db < 0.0
+    # The cubic of Hermite, a + da t + e t^2 + f t^3, where its rate is 0 between the ends.
+    e, f = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+    root = np.sqrt(np.maximum(e * e - 3.0 * f * da, 0.0))
+    divisor = -e - np.copysign(root, e)
+    found = a
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for t in (da / divisor, divisor / (3.0 * f)):
+            inside = turns & (t > 0.0) & (t < 1.0)
+            t_in = np.where(inside, t, 0.0)
+            found = np.where(inside, a + t_in * (da + t_in * (e + t_in * f)), found)
+    return found

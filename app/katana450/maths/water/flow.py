@@ -1,0 +1,264 @@
+"""Where the water is, and where it is a moment later.
+
+What a cup cannot hold at its tilt leaves over the lip as over a weir, flies in parcels and comes
+down in the basin, in the cup again, on the table or on the floor. Volumes are whole femtolitres
+that are only ever moved, so their sum stays what it is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.errors import InputError
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.geometry.vectors import Vector, add, norm, scale, sub, vector
+from katana450.maths.water.around import Around
+from katana450.maths.water.parcel import Ground, Parcel, landing
+from katana450.maths.water.puddle import Puddle, spill
+from katana450.maths.water.slosh import Slosh, frequency
+from katana450.maths.water.units import FEMTOLITRE, GRAVITY, MILLILITRE, counted
+
+DISCHARGE = 0.61
+"""[1] The share of Poleni's rule that a sharp edge lets pass: Kirchhoff's pi / (pi + 2)."""
+
+FILM = 0.25
+"""[s] In which what is left over the lip thins to a third. Of so thin a film a weir's rule would
+make a trickle without end."""
+
+DROP = MILLILITRE // 20
+"""[fl] So little over the lip falls at once."""
+
+LEVEL = 1e-9
+"""Sine of a tilt below which no side of the rim is the lower one."""
+
+WEIGHTLESS = 1e-3
+"""[g] Water that weighs less stays where it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Water:
+    """All of it. Volumes in femtolitres.
+
+    cup, basin: what is in them. parcels: in the air, the oldest first. puddles: spilled. slosh: how
+    the surface in the cup leans. T_base_cup: where the cup is, (4, 4) [m].
+    """
+
+    cup: int
+    basin: int
+    parcels: tuple[Parcel, ...]
+    puddles: tuple[Puddle, ...]
+    slosh: Slosh
+    T_base_cup: FloatArray
+
+    @property
+    def air(self) -> int:
+        """What flies."""
+        return sum(parcel.volume for parcel in self.parcels)
+
+    @property
+    def spilled(self) -> int:
+        """What lies on table and floor."""
+        return sum(puddle.volume for puddle in self.puddles)
+
+    @property
+    def total(self) -> int:
+        """What there is; a step never changes it."""
+        return self.cup + self.basin + self.air + self.spilled
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The surface in the cup, as a plane of `Cylinder`: tilt [rad] and level [m].
+
+    downhill: unit vector, in the cup's frame and square to its axis, to the lowest side of the rim.
+    """
+
+    tilt: float
+    level: float
+    downhill: Vector
+
+
+class Flow:
+    """Steps of the water in one surrounding. Its methods are pure."""
+
+    def __init__(self, around: Around) -> None:
+        self.around = around
+        self._cup_holds = counted(around.cup.inside.capacity)
+        self._basin_holds = counted(around.basin.capacity)
+
+    def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
+        """``volume`` [m^3] at rest in the cup, and nothing elsewhere.
+
+        Raises InputError when the cup does not hold it upright, or the pose is none.
+        """
+        if not 0.0 <= volume <= self.around.cup.inside.capacity:
+            most = self.around.cup.inside.capacity * 1e6
+            raise InputError(f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {most:.1f} ml.")
+        T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
+        return Water(counted(volume), 0, (), (), Slosh(), T)
+
+    def step(
+        self, water: Water, T_base_cup: npt.ArrayLike, acceleration: npt.ArrayLike, dt: float
+    ) -> Water:
+        """The water ``dt`` [s] on, when the cup has come to ``T_base_cup`` (4, 4) meanwhile.
+
+        acceleration: (3,) [m/s^2] of the middle of the cup, in the base frame. Raises InputError
+        for a pose that is none and for numbers that are not finite.
+        """
+        T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
+        pull = vector(finite_array(acceleration, (3,), "The acceleration of the cup"))
+        if not 0.0 <= dt < math.inf:
+            raise InputError(f"The time step is {dt} s; give 0 or more seconds.")
+        if dt == 0.0:
+            return replace(water, T_base_cup=T)
+        omega = frequency(self.around.cup.inside, water.cup * FEMTOLITRE)
+        slosh = water.slosh.after(pull, omega, dt)
+        flown = self._fly(replace(water, slosh=slosh), T, dt)
+        return self._pour(flown, T, dt)
+
+    def surface(self, water: Water) -> Surface:
+        """The surface in the cup."""
+        tilt, downhill = _lean(water.slosh, water.T_base_cup)
+        level = self.around.cup.inside.level(tilt, water.cup * FEMTOLITRE)
+        return Surface(tilt, level, downhill)
+
+    def margin_to_rim(self, water: Water) -> float:
+        """How far [m] the lip is above the surface; negative while water flows over it."""
+        surface = self.surface(water)
+        return self.around.cup.inside.margin(surface.tilt, surface.level)
+
+    def _pour(self, water: Water, T: FloatArray, dt: float) -> Water:
+        """Let flow over the lip what the cup cannot hold."""
+        cup = self.around.cup.inside
+        tilt, downhill = _lean(water.slosh, T)
+        weight = norm(water.slosh.up)
+        over = water.cup - counted(cup.holds(tilt))
+        if over <= 0 or weight < WEIGHTLESS:
+            return replace(water, T_base_cup=T)
+        head = max(-cup.margin(tilt, cup.level(tilt, water.cup * FEMTOLITRE)), 0.0)
+        g = GRAVITY * weight
+        left = _left_over(over, _discharge(cup.radius, tilt, head, g), dt)
+        gone = over - left
+        point = (
+            cup.radius * downhill[0],
+            cup.radius * downhill[1],
+            self.around.cup.floor + cup.depth,
+        )
+        lip = _moved(T, point)
+        carried = scale(1.0 / dt, sub(lip, _moved(water.T_base_cup, point)))
+        speed = 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head)
+        velocity = add(carried, scale(speed, _outwards(T, tilt, downhill)))
+        return replace(
+            water,
+            cup=water.cup - gone,
+            parcels=(*water.parcels, Parcel(gone, lip, velocity, 0.0, dt)),
+            T_base_cup=T,
+        )
+
+    def _fly(self, water: Water, T: FloatArray, dt: float) -> Water:
+        """Let the parcels fly, and those come down that do."""
+        if not water.parcels:
+            return water
+        cup, basin, puddles = water.cup, water.basin, water.puddles
+        level = self.around.basin.level(basin * FEMTOLITRE)
+        before, after = water.T_base_cup.tolist(), T.tolist()
+        catches = after[2][2] > 0.0
+        flying = []
+        for parcel in water.parcels:
+            room = self._cup_holds - cup
+            if catches and parcel.volume <= room and self._caught(parcel, before, after, dt):
+                cup += parcel.volume
+                continue
+            aged = parcel._replace(age=parcel.age + dt)
+            end = landing(aged, self.around, level)
+            if end.age > aged.age:
+                flying.append(aged)
+            elif end.ground is Ground.BASIN:
+                stays = min(parcel.volume, self._basin_holds - basin)
+                basin += stays
+                if stays < parcel.volume:
+                    puddles = spill(puddles, self._beside_basin(end.point), parcel.volume - stays)
+            else:
+                puddles = spill(puddles, end.point, parcel.volume)
+        return replace(water, cup=cup, basin=basin, parcels=tuple(flying), puddles=puddles)
+
+    def _caught(self, parcel: Parcel, before: se3.Rows, after: se3.Rows, dt: float) -> bool:
+        """Whether it comes into the cup through its mouth in the next ``dt`` [s]."""
+        mouth = self.around.cup.floor + self.around.cup.inside.depth
+        q = _seen_from(after, parcel.at(parcel.age + dt))
+        if q[2] > mouth:
+            return False
+        p = _seen_from(before, parcel.at(parcel.age))
+        if p[2] <= mouth:
+            return False
+        share = (p[2] - mouth) / (p[2] - q[2])
+        x, y, _ = add(p, scale(share, sub(q, p)))
+        return math.hypot(x, y) < self.around.cup.inside.radius
+
+    def _beside_basin(self, point: Vector) -> Vector:
+        """Where on the table what the basin cannot hold comes down."""
+        x, y, z = self.around.basin.at
+        away = math.hypot(point[0] - x, point[1] - y)
+        out = self.around.basin.outer_radius / away if away > 0.0 else 0.0
+        return x + out * (point[0] - x), y + out * (point[1] - y), z
+
+
+def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
+    """Tilt [rad] between the cup's axis and the surface's normal, and downhill as in `Surface`."""
+    R = T[:3, :3]
+    weight = norm(slosh.up)
+    if weight < WEIGHTLESS:
+        return 0.0, (1.0, 0.0, 0.0)
+    x, y, z = (np.asarray(slosh.up) @ R / weight).tolist()
+    sine = math.hypot(x, y)
+    if sine < LEVEL:
+        return (0.0 if z > 0.0 else math.pi), (1.0, 0.0, 0.0)
+    return math.atan2(sine, z), (-x / sine, -y / sine, 0.0)
+
+
+def _discharge(radius: float, tilt: float, head: float, g: float) -> float:
+    """What flows over the lip [m^3/s] when the surface is ``head`` [m] above it.
+
+    Poleni's rule, (2/3) C sqrt(2 g) head^(3/2) a metre of edge (Chow, Open-Channel Hydraulics,
+    1959), summed over the part of the rim below the surface: near its lowest point that is a
+    parabola. No more than over the whole rim at that head.
+    """
+    rule = 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head) * head
+    whole = math.tau * radius
+    sine = math.sin(tilt)
+    wet = 0.375 * math.pi * math.sqrt(2.0 * radius * head / sine) if sine > 0.0 else whole
+    return rule * min(wet, whole)
+
+
+def _left_over(over: int, discharge: float, dt: float) -> int:
+    """What of ``over`` [fl] is still above the lip after ``dt`` [s].
+
+    The discharge falls with the square of what is over; the film of it that is left, exponentially.
+    The equation of both, E' = -k E^2 - E / FILM, is Bernoulli's, and this its solution.
+    """
+    decay = math.exp(-dt / FILM)
+    left = over * decay / (1.0 + discharge / FEMTOLITRE / over * FILM * (1.0 - decay))
+    return int(left) if left > DROP else 0
+
+
+def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
+    """Unit vector in the base frame along which water leaves: level, then out of the mouth."""
+    steep = min(tilt, 0.5 * math.pi)
+    local = (math.cos(steep) * downhill[0], math.cos(steep) * downhill[1], math.sin(steep))
+    return vector(T[:3, :3] @ local)
+
+
+def _moved(T: FloatArray, point: Vector) -> Vector:
+    return vector(T[:3, :3] @ point + T[:3, 3])
+
+
+def _seen_from(T: se3.Rows, point: Vector) -> Vector:
+    """``point`` in the frame of T, on plain floats because every parcel is asked."""
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = T
+    u, v, w = point[0] - x, point[1] - y, point[2] - z
+    return a * u + d * v + g * w, b * u + e * v + h * w, c * u + f * v + i * w

@@ -1,0 +1,60 @@
+"""How well water was carried and emptied."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from katana450.maths.geometry.vectors import Vector, norm, scale, sub
+from katana450.maths.water.flow import Water
+from katana450.maths.water.units import MILLILITRE
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the cup went through: duration [s] and its greatest jerk [m/s^3].
+
+    acceleration: the last one [m/s^2]; None before the first.
+    """
+
+    duration: float = 0.0
+    peak_jerk: float = 0.0
+    acceleration: Vector | None = None
+
+    def after(self, acceleration: Vector, dt: float) -> Course:
+        """``dt`` [s] on, the cup's acceleration now ``acceleration`` [m/s^2]."""
+        if dt <= 0.0:
+            return self
+        jerk = 0.0
+        if self.acceleration is not None:
+            jerk = norm(scale(1.0 / dt, sub(acceleration, self.acceleration)))
+        return Course(self.duration + dt, max(self.peak_jerk, jerk), acceleration)
+
+
+@dataclass(frozen=True)
+class Score:
+    """emptied_percent: of all the water, what is in the basin. The volumes in ml; duration in s,
+    peak_jerk in m/s^3.
+    """
+
+    emptied_percent: float
+    in_cup_ml: float
+    in_basin_ml: float
+    in_air_ml: float
+    spilled_ml: float
+    duration: float
+    peak_jerk: float
+
+
+def score(water: Water, course: Course) -> Score:
+    """Of ``water`` as it is now, after ``course``."""
+    total = water.total
+    return Score(
+        emptied_percent=100.0 * water.basin / total if total else math.nan,
+        in_cup_ml=water.cup / MILLILITRE,
+        in_basin_ml=water.basin / MILLILITRE,
+        in_air_ml=water.air / MILLILITRE,
+        spilled_ml=water.spilled / MILLILITRE,
+        duration=course.duration,
+        peak_jerk=course.peak_jerk,
+    )

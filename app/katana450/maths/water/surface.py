@@ -1,0 +1,207 @@
+"""Water as meshes: triangles with their corners in m, wound to be seen from outside.
+
+Faces are the same for every shape of a kind, so that only corners change while water moves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.flow import Surface
+from katana450.maths.water.parcel import Parcel
+from katana450.maths.water.puddle import THICKNESS
+from katana450.maths.water.units import FEMTOLITRE, GRAVITY
+
+Faces = npt.NDArray[np.uint32]
+
+RUNGS = 20
+"""Steps from the lowest to the highest side of the water in a cup."""
+
+SECTIONS, SIDES = 20, 8
+"""Of the stream."""
+
+THICKEST = 0.3
+"""[cup radius] The stream at the lip: there it is slow, and a sheet rather than a jet."""
+
+SHEET, GATHERED = 0.9, 0.03
+"""How much wider than a jet the sheet is at the lip, less 1; and in how far [m] it gathers."""
+
+SPOKES = 40
+"""Of a disc."""
+
+DOME = ((0.55, 1.0), (0.82, 0.94), (0.95, 0.62), (1.0, 0.0))
+"""(out, up) from the middle of a puddle to its edge, of radius and thickness."""
+
+ROUND = 1e-9
+"""Cosine of a tilt nearer to 0 than which the surface is drawn along the axis."""
+
+
+def body(cylinder: Cylinder, surface: Surface) -> FloatArray:
+    """Corners (2 (4 RUNGS + 2), 3) of the water in a cylinder that stands on z = 0.
+
+    Wall, underside and upper side, each with corners of its own so that only the wall is shaded
+    round. They are laid as the rungs of a ladder are from the lowest side to the highest, one of
+    them where the plane meets floor or rim: so the shape is right for every tilt.
+    """
+    low, high = sorted(cylinder.arcs(surface.tilt, surface.level))
+    first = min(max(round(RUNGS * low / high), 1), RUNGS - 1) if high > 0.0 else 1
+    psi = (low / first) * np.minimum(_STEPS, first)
+    psi += ((high - low) / (RUNGS - first)) * np.maximum(_STEPS - first, 0)
+    near, aside = cylinder.radius * np.cos(psi), cylinder.radius * np.sin(psi)
+    cosine = math.cos(surface.tilt)
+    cosine = math.copysign(max(abs(cosine), ROUND), cosine)
+    cut = (surface.level + math.sin(surface.tilt) * near) / cosine
+    cut = np.minimum(np.maximum(cut, 0.0), cylinder.depth)
+    if low > 0.0:
+        # Wet from floor to rim; told by number, because with the plane along the axis all the other
+        # columns stand where the last of these does, and are nothing.
+        cut[: first + 1] = cylinder.depth if cosine > 0.0 else 0.0
+    x, y, _ = surface.downhill
+    # Wall, and once more for the faces: bottom and top of each.
+    corners = np.empty((2, 2, 2 * RUNGS + 1, 3))
+    for side, columns in ((-aside[::-1], slice(0, RUNGS + 1)), (aside, slice(RUNGS, None))):
+        ahead = near if columns.start else near[::-1]
+        height = cut if columns.start else cut[::-1]
+        corners[:, :, columns, 0] = ahead * x - side * y
+        corners[:, :, columns, 1] = ahead * y + side * x
+        corners[:, 0, columns, 2] = 0.0 if cosine > 0.0 else height
+        corners[:, 1, columns, 2] = height if cosine > 0.0 else cylinder.depth
+    return corners.reshape(-1, 3)
+
+
+_STEPS = np.arange(RUNGS + 1)
+
+
+def _ladder() -> Faces:
+    columns = 2 * RUNGS + 1
+    a = np.arange(columns - 1)
+    wall = [(a, a + 1, a + 1 + columns), (a, a + 1 + columns, a + columns)]
+    k = np.arange(RUNGS)
+    right, left = RUNGS + k, RUNGS - k
+    side = [(left, right, right + 1), (left, right + 1, left - 1)]
+    under = [tuple(reversed([corner + 2 * columns for corner in three])) for three in side]
+    over = [tuple(corner + 3 * columns for corner in three) for three in side]
+    return _stacked([*wall, *under, *over])
+
+
+def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
+    """Corners (SECTIONS SIDES, 3) of the water that flies, in the base frame; parcels: at least 1.
+
+    A tube along where water of every age is now, as wide as what left then is at its speed; closed
+    at its ends, and drawn to a thread where nothing flies. radius: of the cup. end: the age [s] at
+    which the oldest parcel comes down.
+    """
+    left = np.array(
+        [(p.age, p.span, p.volume * FEMTOLITRE / p.span, *p.start, *p.velocity) for p in parcels]
+    )[::-1]
+    ages = left[:, 0]
+    last = max(min(float(ages[-1] + left[-1, 1]), end), float(ages[-1]))
+    age = ages[0] + (last - ages[0]) * _SPOTS
+    behind = np.maximum(np.searchsorted(ages, age, side="right") - 1, 0)
+    before = np.minimum(behind + 1, len(ages) - 1)
+    between = np.maximum(ages[before] - ages[behind], MOMENT)
+    share = np.minimum((age - ages[behind]) / between, 1.0)
+    here = left[behind] + share[:, None] * (left[before] - left[behind])
+    p, v, fall = here[:, 3:6], here[:, 6:9], GRAVITY * age
+    p += v * age[:, None]
+    p[:, 2] -= 0.5 * fall * age
+    v[:, 2] -= fall
+
+    speed = np.maximum(np.sqrt((v * v).sum(axis=1)), SLOWEST)
+    jet = np.minimum(np.sqrt(here[:, 2] / (math.pi * speed)), THICKEST * radius)
+    jet[age > ages[behind] + left[behind, 1] + MOMENT] = 0.0
+    jet[0] = jet[-1] = 0.0
+
+    level = v[:, :2].sum(axis=0).tolist()
+    long = math.hypot(*level)
+    across = np.array((-level[1], level[0], 0.0)) / long if long > 0.0 else _X
+    # Square to both, and across is level.
+    under = v[:, (2, 2, 1)] * (across[1], -across[0], across[0])
+    under[:, 2] -= across[1] * v[:, 0]
+    under /= speed[:, None]
+    away = p - p[0]
+    near = np.exp(-np.sqrt((away * away).sum(axis=1)) / GATHERED)
+    spread = 1.0 + SHEET * near
+    wide, thin = jet * spread, jet / spread
+    aside = wide[:, None] * _ROUND_COS
+    # At the lip the sheet lies on the rim, and is as hollow.
+    lift = near[:, None] * (aside**2 / (2.0 * radius) + thin[:, None])
+    down = thin[:, None] * _ROUND_SIN - lift
+    corners = p[:, None] + aside[..., None] * across + down[..., None] * under[:, None]
+    return np.asarray(corners.reshape(-1, 3))
+
+
+SLOWEST = 0.02
+"""[m/s]"""
+
+MOMENT = 1e-6
+"""[s] Rounding of ages."""
+
+
+_SPOTS = np.clip(np.arange(-1, SECTIONS - 1) / (SECTIONS - 3.0), 0.0, 1.0)
+"""Along the stream, of its length in time; both ends twice, to be closed."""
+
+_X = np.array((1.0, 0.0, 0.0))
+_TURN = np.arange(SIDES) * (math.tau / SIDES)
+_ROUND_COS, _ROUND_SIN = np.cos(_TURN), np.sin(_TURN)
+
+
+def _tube() -> Faces:
+    a = np.arange(SIDES)
+    b = (a + 1) % SIDES
+    quads = []
+    for row in range(SECTIONS - 1):
+        here, ahead = row * SIDES, (row + 1) * SIDES
+        quads += [(a + here, a + ahead, b + ahead), (a + here, b + ahead, b + here)]
+    return _stacked(quads)
+
+
+def disc() -> tuple[FloatArray, Faces]:
+    """Corners and faces of a level disc of radius 1 about z, at z = 1.
+
+    So its scale alone says how wide it is and how high it stands.
+    """
+    turn = np.arange(SPOKES) * (math.tau / SPOKES)
+    rim = np.stack((np.cos(turn), np.sin(turn), np.ones(SPOKES)), axis=1)
+    k = np.arange(SPOKES)
+    fan = (np.zeros_like(k), 1 + k, 1 + (k + 1) % SPOKES)
+    return np.concatenate(([[0.0, 0.0, 1.0]], rim)), _stacked([fan])
+
+
+def blob() -> tuple[FloatArray, Faces]:
+    """Corners and faces of a puddle on z = 0: as large as a disc of radius 1, but not as round."""
+    turn = np.arange(SPOKES) * (math.tau / SPOKES)
+    edge = 1.0 + 0.07 * np.cos(2 * turn + 1.0) + 0.05 * np.cos(3 * turn + 2.1)
+    edge += 0.03 * np.cos(5 * turn)
+    edge /= math.sqrt(float(np.mean(edge**2)))
+    rings = [
+        np.stack(
+            (out * edge * np.cos(turn), out * edge * np.sin(turn), np.full(SPOKES, up * THICKNESS)),
+            axis=1,
+        )
+        for out, up in DOME
+    ]
+    k = np.arange(SPOKES)
+    after = (k + 1) % SPOKES
+    faces = [(np.zeros_like(k), 1 + k, 1 + after)]
+    for row in range(len(DOME) - 1):
+        inner, outer = 1 + row * SPOKES, 1 + (row + 1) * SPOKES
+        faces += [
+            (inner + k, outer + k, outer + after),
+            (inner + k, outer + after, inner + after),
+        ]
+    return np.concatenate((np.array([[0.0, 0.0, THICKNESS]]), *rings)), _stacked(faces)
+
+
+def _stacked(threes: Sequence[Sequence[npt.NDArray[np.intp]]]) -> Faces:
+    return np.concatenate([np.stack(three, axis=1) for three in threes]).astype(np.uint32)
+
+
+BODY_FACES = _ladder()
+STREAM_FACES = _tube()

@@ -1,0 +1,114 @@
+"""The requests about what there is to be seen: things, water, and nodes of the VRML world."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from katana450.server.api.fields import (
+    FieldValue,
+    Form,
+    Frame,
+    Key,
+    Matrix4,
+    Mount,
+    Name,
+    NodeName,
+    Request,
+)
+
+
+class Place(Request, frozen=True, kw_only=True):
+    """Put a thing somewhere: a new one, or one that is there, of which what is not given stays.
+
+    ``form`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
+    cylinder (radius, height) or sphere (radius); of a mesh ``mesh`` is its key, as the upload told
+    it, and the size is the file's. Its frame is in the middle of its underside. A new thing without
+    ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may touch it,
+    and hold it when both do. Such a thing, cup and basin are refused where nothing carries them:
+    they stand on the table or on another thing. ``colour``: as "#94a3b8", or "own" for that of the
+    file. ``hidden``: it is not drawn, and counts for contacts even so.
+    """
+
+    name: Name
+    T: Matrix4 | None = None
+    frame: Frame = Frame.BASE
+    form: Form | None = None
+    size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
+    mesh: Key | None = None
+    can_be_held: bool | None = None
+    scale: Annotated[float, Meta(ge=1e-3, le=1e3)] | None = None
+    colour: Annotated[str, Meta(pattern="^(own|#[0-9a-f]{6})$")] | None = None
+    opacity: Annotated[float, Meta(ge=0.05, le=1.0)] | None = None
+    hidden: bool | None = None
+
+
+class Attach(Request, frozen=True, kw_only=True):
+    """Fix a thing to the hand, as a camera or another tool, or to the world again.
+
+    ``T``: where on the hand, in the frame of the arm's default tool; without it, it stays where it
+    is.
+    """
+
+    name: Name
+    to: Mount
+    T: Matrix4 | None = None
+
+
+class Load(Request, frozen=True, kw_only=True):
+    """Have the things of a scene that was uploaded, in place of all there are, and its water.
+
+    The arm stays where it is.
+    """
+
+    scene: Key
+
+
+class Remove(Request, frozen=True, kw_only=True):
+    """Take a thing away."""
+
+    name: Name
+
+
+class Fill(Request, frozen=True, kw_only=True):
+    """Fill the cup with so many ml of water, and wipe up what is elsewhere."""
+
+    ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
+
+
+class Named(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A field of a node of the VRML world, by its DEF name."""
+
+    node: NodeName
+    field: NodeName
+
+
+class Setting(Named, frozen=True, kw_only=True):
+    """What such a field is to be; null for how it is made."""
+
+    value: FieldValue
+
+
+class Set(Request, frozen=True, kw_only=True):
+    """Set a field of the VRML world by the DEF name of its node, as VR Sink does; ``more`` at once.
+
+    Either all are set or, where one cannot be, none. The names are those of `katana450 export
+    vrml`; ``look`` at ``world`` lists them. A joint is never put anywhere: its ``rotation`` is an
+    order to go there, by the rules of ``joints``. ``value`` null: a colour, a transparency or a
+    choice as it is made.
+    """
+
+    node: NodeName
+    field: NodeName
+    value: FieldValue
+    more: tuple[Setting, ...] = ()
+
+
+class Get(Request, frozen=True, kw_only=True):
+    """Tell what a field of the VRML world is now, as VR Source does, and ``more`` of them."""
+
+    node: NodeName
+    field: NodeName
+    more: tuple[Named, ...] = ()

@@ -1,0 +1,192 @@
+"""The arm as the gateway sees it: what it asks of it, and what it can tell of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.joint_session import JointSession
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.margins import Margins, margins
+from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Surroundings
+from katana450.arm.robot.machine import Machine
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.weight import loads_of
+from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.lateness import Lateness
+from katana450.arm.runtime.link import FrontEnd
+from katana450.arm.runtime.mailbox import CommandSink
+from katana450.arm.runtime.navigator import Navigator
+from katana450.errors import InputError
+from katana450.extensions.programs.bench import Rig
+from katana450.maths.collision.world import World
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.statics import holding_torques
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.server.api.fields import Rates
+from katana450.server.service.vrml_nodes import Nodes
+
+
+class Motion:
+    """One arm."""
+
+    def __init__(
+        self,
+        model: RobotModel | Machine,
+        session: Session | JointSession,
+        link: FrontEnd,
+        navigator: Navigator | None,
+        nodes: Nodes,
+        let_go: Callable[[], None],
+    ) -> None:
+        """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
+        has a name in its VRML world. ``let_go`` takes the handles of the view out of every hand."""
+        self.model = model
+        self.nodes = nodes
+        self._session = session
+        self._link = link
+        self._board = link.board
+        self._navigator = navigator
+        self._sink: CommandSink = link if navigator is None else navigator
+        self._let_go = let_go
+        self._loads = () if isinstance(model, Machine) else loads_of(model)
+        self._measured: (
+            tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
+        ) = None
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest."""
+        return self._board.snapshot
+
+    @property
+    def ready(self) -> FloatArray:
+        """(n,) the posture that Home drives to [rad]."""
+        return self._session.ready
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Knows where things are."""
+        return self._session.surroundings
+
+    @property
+    def pouring(self) -> Pouring | None:
+        """Knows where water is."""
+        return self._session.pouring
+
+    @property
+    def rig(self) -> Rig:
+        """What programs are planned for. Raises InputError where there are only joints."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
+        return Rig(self._session, self.robot.T_base_shoulder)
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm. Raises InputError, and says why, where there are only joints."""
+        if isinstance(self.model, Machine):
+            raise InputError(f"Only its joints can be driven. {self.model.joints.why}")
+        return self.model
+
+    @property
+    def lateness(self) -> Lateness:
+        """How well the control loop keeps its period."""
+        return self._board.lateness
+
+    @property
+    def holding(self) -> FloatArray | None:
+        """(n,) torques that hold it still [N m]; None where nobody knows what it weighs."""
+        return self._posture()[1] if self._loads else None
+
+    @property
+    def margins(self) -> Margins:
+        """How near it is to what it cannot pass. Raises InputError where there are only joints."""
+        return self._posture()[0]
+
+    def _posture(self) -> tuple[Margins, FloatArray | None]:
+        """Worked out once for everybody who asks, and anew when something has changed."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
+        state = self.state
+        world, x = self._session.world_at(state), state.x
+        key = (state.tool, world, x.tobytes())
+        if self._measured is None or self._measured[0] != key:
+            chain = self.robot.arm.chain_to(state.tool)
+            holding = holding_torques(chain, state.q, self._loads) if self._loads else None
+            self._measured = (key, (margins(chain, world, x), holding))
+        return self._measured[1]
+
+    def choices(self) -> tuple[Choice, ...]:
+        """The branches there are to choose from. Raises InputError where there are none."""
+        return self._session.choices(self.state)
+
+    def put(self, command: cmd.Command) -> int:
+        """Any command; its ticket. Raises InputError for one that cannot be."""
+        return self._sink.put(command)
+
+    @property
+    def state(self) -> State:
+        """The newest."""
+        return self._board.snapshot.state
+
+    @property
+    def ledger(self) -> tuple[Entry, ...]:
+        """What held it back of late, oldest first."""
+        return self._board.ledger
+
+    @property
+    def caught_up(self) -> bool:
+        """Whether the newest state has every command in it."""
+        return self.snapshot.ticket == self._link.last_ticket
+
+    @property
+    def busy(self) -> bool:
+        """Whether a way is being worked out that the arm will then go."""
+        return self._navigator is not None and self._navigator.busy
+
+    def beat(self) -> None:
+        """Tell the arm that somebody watches over it."""
+        self._link.beat()
+
+    @property
+    def age(self) -> float:
+        """Time since the arm's process last proved that its control loop runs [s]."""
+        return self._link.age
+
+    def stop(self) -> int:
+        """Rest as fast as the arm can, and obey nothing until it is released; its ticket."""
+        ticket = self._sink.put(cmd.Stop())
+        self._let_go()
+        return ticket
+
+    def release(self) -> None:
+        """After a stop: obey again. Nothing moves by this. Raises InputError when it cannot be."""
+        self._sink.put(cmd.Release())
+
+    def hold(self) -> None:
+        """Come to rest and forget every target; no hand holds a handle any more."""
+        self._let_go()
+        self._put(cmd.Reset())
+
+    def jog(self, rates: Rates, frame: JogFrame) -> None:
+        """Go with these rates for a moment. Raises InputError where there are only joints."""
+        if isinstance(self._session, JointSession):
+            self._session.refuse()
+        self._put(cmd.Jog(np.array(rates), frame))
+
+    def limit(self, share: float) -> None:
+        """No motion is faster than this share of the most."""
+        self._put(cmd.SpeedScale(share))
+
+    def _put(self, command: cmd.Command) -> None:
+        try:
+            self._sink.put(command)
+        except InputError:
+            # The mailbox is full: what is asked again and again is, and a stop always has room.
+            return

@@ -1,0 +1,193 @@
+"""Where requests are done, whichever way they come."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+
+import msgspec
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
+from katana450.server.api import answers, requests
+from katana450.server.service import serialize as tell
+from katana450.server.service.budget import Budget
+from katana450.server.service.derived import once
+from katana450.server.service.hub import Hub, Window
+from katana450.server.service.interfaces import Arm
+from katana450.server.service.object_requests import Placing
+
+BARE: dict[type[requests.AnyRequest], cmd.Command] = {
+    requests.Settle: cmd.Settle(),
+    requests.Home: cmd.Home(),
+    requests.Stretch: cmd.Stretch(),
+    requests.Hold: cmd.Reset(),
+    requests.Pause: cmd.Pause(),
+    requests.Resume: cmd.Resume(),
+}
+"""What says all there is to say by its name."""
+
+FREE = (
+    requests.Stop,
+    requests.Reset,
+    requests.Beat,
+    requests.Acquire,
+    requests.Take,
+    requests.Ask,
+    requests.Withdraw,
+    requests.Give,
+    requests.Release,
+)
+"""Requests that cost nothing, however much else was asked: STOP, signs of life, and who drives."""
+
+QUESTIONS = (requests.Look, requests.Get, requests.Watch)
+"""Requests that change nothing."""
+
+
+def driver_key(hub: Hub, window: Window) -> str:
+    """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
+    actor = hub.performer.actor(window)
+    return window.person.key if hub.lease.holder == actor.person else ""
+
+
+class Desk:
+    """Does what a window asks, or raises the LeaseError or InputError that says why not."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._placing = Placing(hub)
+
+    def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
+        """The answer, once it is done. Whatever is asked is a sign of life.
+
+        What it costs is taken from ``budget``; raises BusyError when that is used up. FREE requests
+        cost nothing, nor does what steers the arm for whoever holds it.
+        """
+        question, driver = isinstance(request, QUESTIONS), driver_key(self._hub, window)
+        free = isinstance(request, FREE) or (driver and not question)
+        with nullcontext() if free else budget.charged(driver, question=question):
+            return msgspec.structs.replace(self._done(window, request), id=request.id)
+
+    def _done(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
+        hub = self._hub
+        hub.beat(window)
+        match request:
+            case requests.Beat(n=n):
+                return answers.Echo(n=n)
+            case requests.Look(at=at):
+                return self.look(at)
+            case requests.Get(node=node, field=field, more=more):
+                arm, first = hub.present(), requests.Named(node=node, field=field)
+                return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
+        if isinstance(request, requests.Set):
+            return answers.Done(ticket=hub.move(window, self._setting(request)))
+        if isinstance(request, requests.Pause | requests.Resume | requests.Speed):
+            window = hub.performer.actor(window)
+        command = self._command(request)
+        if command is None:
+            self._arrange(window, request)
+            return answers.Done()
+        return answers.Done(ticket=hub.move(window, command), rotation_misfit=_misfit(request))
+
+    def _arrange(self, window: Window, request: requests.AnyRequest) -> None:
+        """What is about who drives, and how."""
+        hub = self._hub
+        match request:
+            case requests.Stop(press=press):
+                hub.stop(window.person.name, press)
+            case requests.Reset():
+                hub.reset(window)
+            case requests.Acquire():
+                hub.acquire(window)
+            case requests.Take():
+                hub.take(window)
+            case requests.Ask():
+                hub.request(window)
+            case requests.Withdraw():
+                hub.withdraw(window)
+            case requests.Release():
+                hub.give_up(window)
+            case requests.Give(to=number):
+                hub.hand_over(window, number)
+            case requests.Jog(rates=rates, frame=frame):
+                hub.jog(window, rates, frame)
+            case requests.Speed(value=value):
+                hub.set_speed(window, value)
+            case requests.Program(text=text, more=more, speed=speed):
+                hub.performer.script(window, text, more=more, speed=speed)
+            case requests.Steer(order=order):
+                hub.performer.steer(window, order)
+
+    def _command(self, request: requests.AnyRequest) -> cmd.Command | None:
+        """What the arm is told, where the request is one for the arm."""
+        if type(request) in BARE:
+            return BARE[type(request)]
+        match request:
+            case requests.Joint(axis=axis, value=value):
+                return cmd.SetJoint(axis - 1, value)
+            case requests.Joints(q=q):
+                return cmd.SetJoints(np.array(q))
+            case requests.Servo(q=q, qd=qd):
+                return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
+            case requests.Pose(T=T, frame=frame):
+                return cmd.SetPose(self._in_shoulder(frame) @ se3.printed(T))
+            case requests.Position(p=p, frame=frame):
+                return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
+            case requests.Turn(pitch=pitch, roll=roll):
+                return cmd.TurnTool(pitch, roll)
+            case requests.Gripper(angle=angle):
+                return cmd.SetGripper(angle)
+            case requests.Tool(name=name):
+                return cmd.SetTool(name)
+            case requests.Read(reading=reading):
+                return cmd.SetReading(reading)
+            case requests.Branch(shoulder=shoulder, elbow=elbow):
+                return cmd.TakeBranch(Branch(shoulder, elbow))
+        return self._placing.command(request)
+
+    def _setting(self, asked: requests.Set) -> cmd.Command:
+        """What sets fields of the VRML world, all at once."""
+        arm = self._hub.present()
+        first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
+        return arm.nodes.command(arm.state, (first, *asked.more))
+
+    def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
+        """(4, 4) from ``frame`` into {S}."""
+        if frame is requests.Frame.SHOULDER:
+            return np.eye(4)
+        return se3.inverse(self._hub.present().robot.T_base_shoulder)
+
+    def look(self, at: str) -> answers.Answer:
+        """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
+        hub = self._hub
+        match at:
+            case "ledger":
+                return tell.ledger(hub.journal.lines)
+            case "state":
+                return tell.state(hub)
+        arm = hub.present()
+        if at == "loop":
+            return tell.loop(arm.lateness)
+        return once(arm.snapshot, at, lambda: self._derived(arm, at))
+
+    def _derived(self, arm: Arm, at: str) -> answers.Answer:
+        """What follows from the newest snapshot alone."""
+        match at:
+            case "arm":
+                return tell.arm(arm.model, arm.ready.tolist())
+            case "links":
+                return arm.nodes.links(arm.state)
+            case "branches":
+                return answers.Branches(choices=[tell.choice(each) for each in arm.choices()])
+            case "world":
+                return arm.nodes.world(arm.state)
+        return tell.things(arm)
+
+
+def _misfit(request: requests.AnyRequest) -> float | None:
+    """Return `so3.misfit` of the pose in ``request``; None where it has none."""
+    if isinstance(request, requests.Pose | requests.Place | requests.Attach) and request.T:
+        return so3.misfit(np.array(request.T)[:3, :3])
+    return None

@@ -1,0 +1,78 @@
+"""Why the arm did not do what was wished, and who drove it then: for programs, and for the log."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.state import Reason
+from katana450.arm.runtime.board import KEPT
+from katana450.server.view.texts import told
+
+log = logging.getLogger(__name__)
+
+UNITS = {
+    Reason.HALTED: "m",
+    Reason.CONTACT: "m",
+    Reason.ACROSS_GAP: "rad",
+    Reason.OUT_OF_REACH: "m",
+    Reason.POSITION_CHANGED: "m",
+    Reason.AXIS_LIMIT: "rad",
+    Reason.SLIDE_LIMIT: "m",
+    Reason.GRIPPER_LIMIT: "rad",
+    Reason.GRIPPER_SLIDE_LIMIT: "m",
+    Reason.YAW_FIXED: "rad",
+    Reason.PITCH_CHANGED: "rad",
+    Reason.ROLL_CHANGED: "rad",
+    Reason.LOPSIDED: "m",
+    Reason.NOT_AT_START: "rad",
+}
+"""Of the amounts; the other reasons have none."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """An entry of the ledger. who: drove then, or stopped the arm, if anybody did. when: in UTC."""
+
+    entry: Entry
+    who: str | None
+    when: datetime
+
+
+class Journal:
+    """The newest lines."""
+
+    def __init__(self) -> None:
+        self._lines: deque[Line] = deque(maxlen=KEPT)
+        self._seen: Entry | None = None
+        # Entries are on the loop's clock; people have another.
+        self._epoch = time.time() - time.perf_counter()
+
+    def follow(self, ledger: Sequence[Entry], who: str | None) -> None:
+        """Take down what ``ledger`` has that it had not before; ``who`` had a hand in it."""
+        for entry in _newer(ledger, self._seen):
+            when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
+            self._lines.append(Line(entry, who, when))
+            if entry.began:
+                log.info("%s%s", "" if who is None else f"{who}: ", told(entry.finding))
+        if ledger:
+            self._seen = ledger[-1]
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """The oldest first."""
+        return tuple(self._lines)
+
+
+def _newer(ledger: Sequence[Entry], seen: Entry | None) -> list[Entry]:
+    newer: list[Entry] = []
+    for entry in reversed(ledger):
+        if entry is seen:
+            break
+        newer.append(entry)
+    return newer[::-1]

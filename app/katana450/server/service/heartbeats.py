@@ -1,0 +1,64 @@
+"""When each participant last gave a sign of life, by the time its message was received."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+from katana450.arm.runtime.readiness import Line, data_age, readable
+
+KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
+"""[s, s, probes] A host that is gone without a word is noticed within 11 s."""
+
+
+class Heartbeat:
+    """The newest sign of life of one participant, stamped as it is handled."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """``clock``: in seconds; the participant is alive now."""
+        self._clock = clock
+        self._newest = clock()
+
+    def note(self) -> None:
+        """A message of the participant is being handled."""
+        self._newest = max(self._newest, self._clock() - self._age())
+
+    @property
+    def newest(self) -> float:
+        """Time of the newest sign of life [s], on the clock."""
+        return self._newest
+
+    def _age(self) -> float:
+        """Age of the newest message [s]."""
+        return 0.0
+
+
+class Arrival(Heartbeat):
+    """The newest sign of life on one TCP connection, stamped by the kernel on arrival.
+
+    A message counts from when it arrived: one that is handled late is no later sign of life, and
+    one that waits because the server is late is no silence.
+    """
+
+    def __init__(self, line: Line | None, clock: Callable[[], float] = time.monotonic) -> None:
+        """``line``: the socket; None where there is none, so that handling counts."""
+        self._line = line
+        super().__init__(clock)
+
+    @property
+    def newest(self) -> float:
+        if self._line is not None and readable(self._line.fileno()):
+            self.note()
+        return self._newest
+
+    def _age(self) -> float:
+        return 0.0 if self._line is None else data_age(self._line)
+
+
+def keep_alive(listening: socket.socket) -> None:
+    """Have the kernel probe idle connections that ``listening`` accepts from now on."""
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in KEEPALIVE.items():
+        if hasattr(socket, name):
+            listening.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)

@@ -1,0 +1,97 @@
+"""The arm and the pictures, as the hub asks of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.margins import Margins
+from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Surroundings
+from katana450.arm.robot.machine import Machine
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.lateness import Lateness
+from katana450.extensions.programs.bench import Rig
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.server.api.fields import Rates
+from katana450.server.service.vrml_nodes import Nodes
+
+
+class Arm(Protocol):
+    """What the gateway asks of the arm; ``Motion`` is one."""
+
+    @property
+    def model(self) -> RobotModel | Machine: ...
+
+    @property
+    def robot(self) -> RobotModel: ...
+
+    @property
+    def nodes(self) -> Nodes: ...
+
+    @property
+    def snapshot(self) -> Snapshot: ...
+
+    @property
+    def state(self) -> State: ...
+
+    @property
+    def ready(self) -> FloatArray: ...
+
+    @property
+    def rig(self) -> Rig: ...
+
+    @property
+    def lateness(self) -> Lateness: ...
+
+    @property
+    def surroundings(self) -> Surroundings: ...
+
+    @property
+    def pouring(self) -> Pouring | None: ...
+
+    @property
+    def holding(self) -> FloatArray | None: ...
+
+    @property
+    def margins(self) -> Margins: ...
+
+    @property
+    def ledger(self) -> Sequence[Entry]: ...
+
+    @property
+    def caught_up(self) -> bool: ...
+
+    @property
+    def busy(self) -> bool: ...
+
+    @property
+    def age(self) -> float: ...
+
+    def beat(self) -> None: ...
+
+    def stop(self) -> int: ...
+
+    def release(self) -> None: ...
+
+    def hold(self) -> None: ...
+
+    def jog(self, rates: Rates, frame: JogFrame) -> None: ...
+
+    def limit(self, share: float) -> None: ...
+
+    def put(self, command: cmd.Command) -> int: ...
+
+    def choices(self) -> tuple[Choice, ...]: ...
+
+
+class Behind(Protocol):
+    """How far a window's picture is behind; ``Flow`` is one."""
+
+    def age(self, t: float) -> float: ...

@@ -1,0 +1,150 @@
+"""A script that is planned in a thread of its own, and the program that is kept of it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from enum import Enum
+
+from katana450.arm.control.state import State
+from katana450.errors import CancelledError, KatanaError
+from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.layout import PlanningStage
+from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.situation import Situation
+from katana450.maths.planning.checkpoint import checked_by
+from katana450.server.api import answers
+
+log = logging.getLogger(__name__)
+
+LONGEST_PLANNING = 120.0
+"""[s]"""
+
+
+class Stage(Enum):
+    """How far a program is that has not begun."""
+
+    PLANNING = "planning"
+    REFUSED = "refused"
+    CANCELLED = "cancelled"
+    READY = "ready"
+
+
+class Planning:
+    """One script with one speed, planned from one situation of the arm.
+
+    Attributes:
+        text, speed: the script, and the fraction of its own speed.
+        situation: what it is planned from.
+        name: of the script; empty until it is read.
+        stage: how far the planning is; None before its first step.
+        refused: why it cannot be run, else None.
+        cancelled: why the planning was ended, else None.
+        note: for people: why it was planned anew, or not run.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        speed: float,
+        rig: Rig,
+        state: State,
+        clock: Callable[[], float],
+        note: str = "",
+    ) -> None:
+        """Start the thread. ``clock``: in seconds."""
+        self.text = text
+        self.speed = speed
+        self.situation = Situation.of(state)
+        self.name = ""
+        self.stage: PlanningStage | None = None
+        self.refused: str | None = None
+        self.cancelled: str | None = None
+        self.note = note
+        self._clock = clock
+        self._began = clock()
+        self._program: Program | None = None
+        self.thread = threading.Thread(
+            target=self._plan, args=(rig, state), name="planner", daemon=True
+        )
+        self.thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is still planned."""
+        return self._program is None and self.refused is None and self.cancelled is None
+
+    @property
+    def program(self) -> Program | None:
+        """The result; None before it is there, and where there is none."""
+        return None if self.cancelled is not None else self._program
+
+    def cancel(self, why: str) -> None:
+        """End the planning. The thread ends at its next checkpoint, some milliseconds later."""
+        if self.busy:
+            self.cancelled = why
+
+    def fits(self, text: str, speed: float, state: State) -> bool:
+        """Whether this program is what planning ``text`` from ``state`` would give."""
+        same = self.program is not None and (self.text, self.speed) == (text, speed)
+        return same and not self.changed_to(state)
+
+    def changed_to(self, state: State) -> str:
+        """Return a clause that names what is no longer as it was planned for, else ""."""
+        return self.situation.changed_to(Situation.of(state))
+
+    def told(self, by: str) -> answers.Progress:
+        """How a program stands that has not begun; ``by``: its owner's name."""
+        program, now = self.program, self.stage
+        if self.cancelled is not None or self.refused is not None:
+            stage = Stage.REFUSED if self.cancelled is None else Stage.CANCELLED
+            why = self.cancelled or self.refused or ""
+            return answers.Progress(name=self.name, by=by, status=stage.value, why=why)
+        if program is None:
+            return answers.Progress(
+                name=self.name,
+                by=by,
+                status=Stage.PLANNING.value,
+                step=0 if now is None else now.step,
+                steps=0 if now is None else now.steps,
+                task="" if now is None else now.phase,
+                share=0.0 if now is None else now.share,
+                why=self.note,
+            )
+        return answers.Progress(
+            name=program.name,
+            by=by,
+            status=Stage.READY.value,
+            steps=program.steps,
+            seconds=program.duration,
+            why=self.note,
+        )
+
+    def _plan(self, rig: Rig, state: State) -> None:
+        try:
+            script = parse(self.text)
+            self.name = script.name
+            with checked_by(self._check):
+                self._program = compiled(script, rig, state, self.speed, self._report)
+        except CancelledError as error:
+            if self.cancelled is None:
+                self.refused = str(error)
+        except KatanaError as error:
+            self.refused = str(error)
+        except Exception:
+            log.exception("Planning met an error.")
+            self.refused = "Planning met an error; see the server's log."
+
+    def _report(self, stage: PlanningStage) -> None:
+        self.stage = stage
+
+    def _check(self) -> None:
+        if self.cancelled is not None:
+            raise CancelledError(self.cancelled)
+        if self._clock() - self._began > LONGEST_PLANNING:
+            at = "" if self.stage is None else f" (it is at step {self.stage.step})"
+            raise CancelledError(
+                f"Planning takes longer than {LONGEST_PLANNING:g} s{at}. Make the script shorter."
+            )

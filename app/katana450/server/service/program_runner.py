@@ -1,0 +1,386 @@
+"""A person's program, run where the people are: a participant of its own that holds the arm.
+
+Planning takes long and happens in a thread (`Planning`); all else lives in the gateway's one
+thread.
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
+from katana450.errors import InputError, LeaseError
+from katana450.extensions.programs import runner
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.source import LARGEST
+from katana450.server.api import answers
+from katana450.server.api.fields import Order
+from katana450.server.service.heartbeats import Heartbeat
+from katana450.server.service.program_planning import Planning
+from katana450.server.web.authenticator import Visitor
+
+if TYPE_CHECKING:
+    from katana450.server.service.hub import Hub, Window
+
+log = logging.getLogger(__name__)
+
+
+class _Here(Heartbeat):
+    """A program runs in this thread and so is always there; its owner is watched instead."""
+
+    @property
+    def newest(self) -> float:
+        return self._clock()
+
+
+class Performer:
+    """At most one program at a time."""
+
+    def __init__(self, hub: Hub, owner_silence: float) -> None:
+        """``owner_silence``: time without a heartbeat of its owner after which a program ends [s];
+        a page that reloads is back sooner."""
+        self._hub = hub
+        self._owner_silence = owner_silence
+        self._parts: dict[str, str] = {}
+        self._planning: Planning | None = None
+        self._owner: Window | None = None
+        self._hand: Window | None = None
+        self._then: Order | None = None
+        self._seen = 0.0
+        self._self: Window | None = None
+        self._run: Run | None = None
+        # The speed to restore at the end, the greatest a person allows, and the last one commanded.
+        self._speed = self._allowed = self._commanded = 1.0
+
+    @property
+    def running(self) -> bool:
+        """Whether a program has the arm."""
+        return self._self is not None
+
+    @property
+    def program(self) -> Program | None:
+        """The one that is planned."""
+        return None if self._planning is None else self._planning.program
+
+    @property
+    def waits(self) -> bool:
+        """Whether the program that is planned runs as soon as it is."""
+        return self._then is not None
+
+    def owns(self, window: Window) -> bool:
+        """Whether ``window`` is the page or API program that the present program is of."""
+        return self._owner is not None and self._owner.person.key == window.person.key
+
+    def actor(self, window: Window) -> Window:
+        """The window in whose name ``window`` pauses, resumes and slows down the arm.
+
+        For the owner of the program that runs it is the program's own, which holds the arm.
+        """
+        joined = self._self
+        return joined if joined is not None and self.owns(window) else window
+
+    def touch(self, window: Window) -> None:
+        """``window`` touches the panel of programs. Raises LeaseError if it must not."""
+        self._check_may_drive(window)
+        if self.running:
+            self._check_owns(window)
+        self._hand = window
+
+    def plan(self, text: str, then: Order | None) -> None:
+        """Plan ``text`` for who touched the panel last, and do ``then`` once it is planned."""
+        if self._hand is None:
+            raise LeaseError("Open the front page to run programs.")
+        if then is not None:
+            self._check_not_stopped()
+        self.script(self._hand, text, more=False, speed=1.0)
+        self._then = then
+
+    def order(self, order: Order) -> None:
+        """`steer` for the window that touched the panel last."""
+        if self._hand is None:
+            raise LeaseError("Open the front page to run programs.")
+        self.steer(self._hand, order)
+
+    def script(self, window: Window, text: str, *, more: bool, speed: float) -> None:
+        """Take a part of a script; after the last it is planned, from where the arm stands then.
+
+        The last plan is kept if it is of the same script and nothing has changed since. Raises
+        LeaseError while another runs or is planned, InputError for one that is too long.
+        """
+        key = window.person.key
+        text = self._parts.pop(key, "") + text
+        if len(text.encode()) > LARGEST:
+            raise InputError(f"A script has at most {LARGEST // 1024} KB.")
+        if more:
+            self._parts[key] = text
+            return
+        self._check_free()
+        arm = self._hub.present()
+        if arm.state.moving:
+            raise LeaseError("The arm moves: a program is planned from where it stands.")
+        self._check_may_drive(window)
+        before = self._planning
+        if before is not None and before.fits(text, speed, arm.state):
+            before.refused, before.note = None, ""
+            self._own(window)
+            return
+        changed = ""
+        if before is not None and (before.text, before.speed) == (text, speed) and before.program:
+            changed = before.changed_to(arm.state)
+        self._plan(window, text, speed, changed)
+
+    def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
+        """Plan ``text`` from the present state; ``changed`` is why an earlier plan is not kept."""
+        arm = self._hub.present()
+        note = f"Planned anew: {changed}." if changed else ""
+        self._planning = Planning(text, speed, arm.rig, arm.state, self._hub.clock, note)
+        self._own(window)
+
+    def _own(self, window: Window) -> None:
+        self._owner, self._run, self._then = window, None, None
+        self._seen = self._hub.clock()
+
+    def steer(self, window: Window, order: Order) -> None:
+        """Run, step, pause, resume or halt it. Raises LeaseError with the reason why not.
+
+        While it is planned, RUN and STEP are done as soon as it is, PAUSE and RESUME decide whether
+        it then starts paused, and HALT cancels the planning.
+        """
+        self._check_may_drive(window)
+        planning = self._planning
+        if planning is not None and planning.busy:
+            self._check_owns(window)
+            self._steer_planning(planning, window, order)
+            return
+        if order in (Order.RUN, Order.STEP) and not self.running:
+            self._begin(window, order)
+            return
+        if not self.running or self._run is None:
+            raise LeaseError("No program runs.")
+        self._check_owns(window)
+        match order:
+            case Order.RUN | Order.RESUME:
+                self._tell(cmd.Resume())
+            case Order.STEP:
+                self._run, commands = runner.stepping(self._run)
+                self._tell(*commands)
+            case Order.PAUSE:
+                self._tell(cmd.Pause())
+            case Order.HALT:
+                self._end(f"{window.person.name} ended it.")
+
+    def _steer_planning(self, planning: Planning, window: Window, order: Order) -> None:
+        match order:
+            case Order.RUN | Order.STEP:
+                self._check_not_stopped()
+                self._then, planning.note = order, ""
+            case Order.PAUSE:
+                self._hub.move(window, cmd.Pause())
+            case Order.RESUME:
+                self._hub.move(window, cmd.Resume())
+            case Order.HALT:
+                self._then = None
+                planning.cancel(f"{window.person.name} cancelled the planning.")
+
+    def stopped(self) -> None:
+        """The arm was stopped: what was asked for before that is not done after it."""
+        self._forget_run("STOP was pressed while it was planned")
+
+    def redirected(self) -> None:
+        """The arm was told something else: a run that was asked for before is not done after it."""
+        self._forget_run("the arm was told something else while it was planned")
+
+    def _forget_run(self, why: str) -> None:
+        planning = self._planning
+        if self._then is not None and planning is not None:
+            self._then, planning.note = None, f"Not run: {why}."
+
+    def leave(self, window: Window) -> None:
+        """Somebody is gone for good."""
+        self._parts.pop(window.person.key, None)
+        if not self.owns(window):
+            return
+        self._forget_run(f"{window.person.name} left")
+        if self.running:
+            self._end(f"{window.person.name} left.")
+
+    def tick(self) -> None:
+        """Look at the arm, and go on; to be called often."""
+        hub, t = self._hub, self._hub.clock()
+        if self._then is not None and self._owner_is_silent(t):
+            self._forget_run("whoever asked for it is gone")
+        if self.program is not None and self._then is not None:
+            self._go_on()
+        program = self.program
+        if self._self is None or self._run is None or program is None:
+            return
+        if hub.lease.holder != self._self.person:
+            # The next who holds the arm finds one that stands, so nothing is left to be told.
+            self._leave_with(Phase.STOPPED, "The arm was taken from it.")
+            return
+        owner = self._owner
+        if hub.stopped is not None:
+            self._leave_with(Phase.STOPPED, hub.stopped.why)
+            return
+        if owner is not None and self._owner_is_silent(t):
+            why = "fell silent" if self._owner_is_here() else "left"
+            self._end(f"{owner.person.name} {why}: a program ends with its owner's heartbeats.")
+            return
+        arm = hub.arm
+        if arm is not None and arm.caught_up:
+            if arm.state.speed != self._commanded:
+                # A person's speed holds to the end of the program, and after it.
+                self._speed = self._allowed = self._commanded = arm.state.speed
+            self._run, commands = runner.step(program, self._run, arm.state, t)
+            try:
+                self._tell(*commands)
+            except InputError as error:
+                self._leave_with(Phase.FAILED, str(error))
+                return
+            if self._run.phase is not Phase.RUNNING:
+                self._leave_with(self._run.phase, self._run.why)
+
+    def told(self) -> answers.Progress | None:
+        """How it stands; None when there is none."""
+        planning, owner = self._planning, self._owner
+        if planning is None or owner is None:
+            return None
+        program, run, arm = planning.program, self._run, self._hub.arm
+        if program is None or run is None or arm is None or planning.refused is not None:
+            return planning.told(owner.person.name)
+        now = runner.progress(program, run, arm.state)
+        return answers.Progress(
+            name=program.name,
+            by=owner.person.name,
+            status=now.status,
+            step=now.step,
+            steps=now.steps,
+            line=now.line,
+            task=now.name,
+            share=now.share,
+            seconds=program.duration,
+            why=now.why,
+        )
+
+    def _go_on(self) -> None:
+        """Do what was to be done once a program is planned."""
+        then, self._then = self._then, None
+        if then is None or self._owner is None:
+            # It was forgotten meanwhile, in another thread.
+            return
+        try:
+            self.steer(self._owner, then)
+        except LeaseError as error:
+            assert self._planning is not None
+            self._planning.refused = str(error)
+
+    def _begin(self, window: Window, order: Order) -> None:
+        """Run the program that is planned; where the arm or the scene is not as it was planned for,
+        plan it anew first."""
+        planning, hub = self._planning, self._hub
+        if planning is None or planning.program is None:
+            raise LeaseError("There is no program that is planned; send one first.")
+        arm = hub.present()
+        changed = planning.changed_to(arm.state)
+        if changed:
+            self._check_not_stopped()
+            if arm.state.moving:
+                raise LeaseError("The arm moves: a program is planned from where it stands.")
+            if hub.lease.holder != window.person:
+                # It refuses the same at the end of the planning, which takes long.
+                hub.lease.acquire(window.person, hub.clock())
+            self._plan(window, planning.text, planning.speed, changed)
+            self._then = order
+            return
+        if hub.lease.holder == window.person:
+            hub.give_up(window)
+        planning.refused, planning.note = None, ""
+        program = planning.program
+        visitor = Visitor(f"program of {window.person.key}", program.name, Role.OPERATOR)
+        joined = hub.join(visitor, "program", lambda _notice: None, _Here(hub.clock))
+        try:
+            hub.acquire(joined)
+            # What was wanted before is over; a pause lasts until somebody resumes. This also finds
+            # out whether the arm is stopped.
+            hub.move(joined, cmd.Reset())
+        except LeaseError:
+            hub.leave(joined, for_good=True)
+            raise
+        self._self, self._owner, self._seen = joined, window, hub.clock()
+        self._speed = self._commanded = arm.state.speed
+        self._allowed = 1.0
+        self._run = Run(self._seen, single=order is Order.STEP)
+        log.info("%s runs the program %s.", window.person.name, program.name)
+
+    def _tell(self, *commands: cmd.Command) -> None:
+        assert self._self is not None
+        for command in commands:
+            self._hub.move(self._self, self._as_allowed(command))
+
+    def _as_allowed(self, command: cmd.Command) -> cmd.Command:
+        """``command``, no faster than a person has allowed since the program began."""
+        if not isinstance(command, cmd.SpeedScale):
+            return command
+        self._commanded = min(command.value, self._allowed)
+        return cmd.SpeedScale(self._commanded)
+
+    def _end(self, why: str) -> None:
+        assert self._run is not None
+        self._run, commands = runner.halted(self._run, why)
+        # A stopped arm takes no commands, nor does one that does not answer.
+        with suppress(LeaseError, InputError):
+            self._tell(*commands)
+        self._leave_with(Phase.STOPPED, why)
+
+    def _leave_with(self, phase: Phase, why: str) -> None:
+        """Give up the arm, which is at rest or comes to it."""
+        assert self._self is not None
+        assert self._run is not None
+        joined, self._self = self._self, None
+        self._run = runner.ended(self._run, phase, why)
+        if self._hub.arm is not None:
+            # A program's speed is its own.
+            self._hub.arm.limit(self._speed)
+        if self._hub.lease.holder == joined.person:
+            self._hub.give_up(joined)
+        self._hub.leave(joined, for_good=True)
+        log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
+
+    def _check_free(self) -> None:
+        if self.running:
+            raise LeaseError("A program runs: end it first.")
+        planning = self._planning
+        if planning is None or not planning.busy:
+            return
+        if not self._owner_is_silent(self._hub.clock()):
+            raise LeaseError("Another program is being planned: cancel that first, or wait for it.")
+        planning.cancel("Whoever asked for it is gone.")
+
+    def _owner_is_here(self) -> bool:
+        owner = self._owner
+        return owner is not None and self._hub.window(owner.person.key) is not None
+
+    def _owner_is_silent(self, t: float) -> bool:
+        """Return whether no heartbeat of the owner was received for the heartbeat timeout."""
+        window = None if self._owner is None else self._hub.window(self._owner.person.key)
+        if window is not None:
+            self._seen = max(self._seen, window.heartbeat.newest)
+        return t - self._seen > self._owner_silence
+
+    def _check_not_stopped(self) -> None:
+        """A run that is asked for during a stop must not begin after the reset."""
+        if self._hub.stopped is not None:
+            raise LeaseError("The arm is stopped: reset it first.")
+
+    def _check_may_drive(self, window: Window) -> None:
+        if not window.person.role.may_drive:
+            raise LeaseError("You may watch, not drive.")
+
+    def _check_owns(self, window: Window) -> None:
+        owner = self._owner
+        if owner is not None and not self.owns(window) and not window.person.role.may_take:
+            raise LeaseError(f"The program is {owner.person.name}'s.")

@@ -1,0 +1,265 @@
+"""What programs are told of the arm: its state, what it is, what held it back, its branches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+
+from katana450.arm.control import state as control
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.grip import touching
+from katana450.arm.control.margins import Margins
+from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.solid import Colour
+from katana450.arm.robot.machine import Machine
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.lateness import Lateness
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.velocity import tool_speed
+from katana450.maths.motion.limiter import Limits
+from katana450.maths.water.units import MILLILITRE
+from katana450.server.api import answers
+from katana450.server.service.derived import once
+from katana450.server.service.event_log import UNITS, Line
+from katana450.server.service.hub import Hub
+from katana450.server.service.interfaces import Arm
+from katana450.server.view.texts import sentence, told
+
+
+def finding(found: control.Finding) -> answers.Finding:
+    """A reason with its number, in SI units."""
+    unit = UNITS.get(found.reason)
+    return answers.Finding(
+        reason=found.reason.value,
+        said=told(found),
+        amount=None if unit is None else found.amount,
+        unit=unit,
+        axis=None if found.axis is None else found.axis + 1,
+        parts=found.parts,
+        seconds=found.time if found.reason is control.Reason.HALTED else None,
+    )
+
+
+def state(hub: Hub) -> answers.State:
+    """The newest. Raises LeaseError while there is no arm yet."""
+    arm = hub.present()
+    snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
+    return msgspec.structs.replace(
+        once(snapshot, "state", lambda: _state(arm, snapshot)),
+        told=hub.clock(),
+        moving=snapshot.state.moving or arm.busy,
+        holder=None if holder is None else holder.name,
+        stopped=None if stopped is None else stopped.why,
+        stop=None if stopped is None else stopped.stage,
+        age=arm.age,
+        windows=len(hub.windows),
+        program=hub.performer.told(),
+    )
+
+
+def _state(arm: Arm, snapshot: Snapshot) -> answers.State:
+    """What follows from ``snapshot`` alone; the rest is filled in for each answer."""
+    now = snapshot.state
+    tool = None if isinstance(arm.model, Machine) else _Tool.of(arm.model, now)
+    return answers.State(
+        t=now.t,
+        told=now.t,
+        ticket=snapshot.ticket,
+        q=now.q.tolist(),
+        setpoint=now.setpoint.tolist(),
+        qd=now.motion.qd.tolist(),
+        goal=now.goal.tolist(),
+        gripper=now.gripper,
+        gripper_goal=now.gripper_goal,
+        tool=None if tool is None else now.tool,
+        T=None if tool is None else tool.T,
+        pitch=None if tool is None else tool.pitch,
+        roll=None if tool is None else tool.roll,
+        tool_speed=None if tool is None else tool.speed,
+        margins=None if tool is None else margins(arm.margins),
+        holding=None if arm.holding is None else arm.holding.tolist(),
+        touching=list(touching(arm.surroundings.hand, now)),
+        held=None if now.held is None else now.held.name,
+        branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
+        reading=None if tool is None else now.reading.value,
+        status=now.status.value,
+        moving=now.moving,
+        why=sentence(now),
+        findings=[finding(each) for each in now.findings],
+        speed=now.speed,
+        holder=None,
+        stopped=None,
+        stop=None,
+        age=0.0,
+        windows=0,
+        water=water(arm.pouring, now),
+        program=None,
+    )
+
+
+def margins(found: Margins) -> answers.Margins:
+    """How near the arm is to what it cannot pass."""
+    nearest = found.nearest
+    return answers.Margins(
+        limit=found.limit,
+        axis=found.axis + 1,
+        smallest_singular_value=found.smallest_singular_value,
+        clearance=None if nearest is None else nearest.distance,
+        parts=None if nearest is None else nearest.parts,
+    )
+
+
+class _Tool(NamedTuple):
+    """Where the tool of an arm is: T (4, 4) in {S}, pitch and roll [rad]; and how fast [m/s]."""
+
+    T: list[answers.Numbers]
+    pitch: float
+    roll: float
+    speed: float
+
+    @classmethod
+    def of(cls, model: RobotModel, now: control.State) -> _Tool:
+        chain = model.arm.chain_to(now.tool)
+        five = ToolTarget.at(chain, now.q)
+        speed = tool_speed(chain, now.setpoint, now.motion.qd)
+        return cls(forward(chain, now.q).tolist(), five.pitch, five.roll, speed)
+
+
+def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
+    """Where it is."""
+    if pouring is None or now.poured is None:
+        return None
+    water = now.poured.water
+    return answers.Water(
+        cup_ml=water.cup / MILLILITRE,
+        basin_ml=water.basin / MILLILITRE,
+        air_ml=water.air / MILLILITRE,
+        spilled_ml=water.spilled / MILLILITRE,
+        margin_to_rim=pouring.margin_to_rim(now.poured, now.things),
+    )
+
+
+def arm(model: RobotModel | Machine, ready: list[float]) -> answers.Arm:
+    """``ready``: the posture that Home drives to."""
+    if isinstance(model, Machine):
+        joints = model.joints
+        jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
+        return jointed.told(model.mechanism.name, ready)
+    names, gripper = model.arm.chain.names, model.arm.gripper
+    jointed = _Jointed(names, (False,) * len(names), model.arm.limits)
+    return msgspec.structs.replace(
+        jointed.told(model.name, ready),
+        tools={name: M.tolist() for name, M in model.arm.tools.items()},
+        default_tool=model.arm.default_tool,
+        gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
+        gripper_slides=gripper.slides,
+        T_base_shoulder=model.T_base_shoulder.tolist(),
+    )
+
+
+class _Jointed(NamedTuple):
+    """What every mechanism has. why: no tool of it can be brought to a pose."""
+
+    names: tuple[str, ...]
+    slides: tuple[bool, ...]
+    limits: Limits
+    why: str = ""
+
+    def told(self, name: str, ready: list[float]) -> answers.Arm:
+        """Without tools."""
+        return answers.Arm(
+            name=name,
+            joints=list(self.names),
+            lower=self.limits.lower.tolist(),
+            upper=self.limits.upper.tolist(),
+            speed=self.limits.speed.tolist(),
+            acceleration=self.limits.acceleration.tolist(),
+            jerk=self.limits.jerk.tolist(),
+            ready=ready,
+            tools={},
+            default_tool=None,
+            gripper=None,
+            gripper_slides=False,
+            T_base_shoulder=None,
+            slides=list(self.slides),
+            joints_only=self.why,
+        )
+
+
+def ledger(lines: Sequence[Line]) -> answers.Ledger:
+    """What held the arm back of late."""
+    return answers.Ledger(lines=[line(each) for each in lines])
+
+
+def line(line: Line) -> answers.Line:
+    """One of the journal's."""
+    return answers.Line(
+        when=line.when.isoformat(timespec="milliseconds"),
+        who=line.who,
+        began=line.entry.began,
+        finding=finding(line.entry.finding),
+    )
+
+
+def choice(choice: Choice) -> answers.Choice:
+    """One that a person could take."""
+    badge, contact = choice.badge, choice.contact
+    return answers.Choice(
+        shoulder=badge.branch.shoulder,
+        elbow=badge.branch.elbow,
+        q=badge.q.tolist(),
+        within_limits=badge.within_limits,
+        position_error=badge.position_error,
+        rotation_error=badge.rotation_error,
+        distance=badge.distance,
+        time=badge.time,
+        smallest_singular_value=badge.smallest_singular_value,
+        contact=None if contact is None else contact.parts,
+    )
+
+
+def things(arm: Arm) -> answers.Things:
+    """What stands around or is held."""
+    now = arm.state
+    x = now.x
+    return answers.Things(
+        things=[
+            answers.Thing(
+                name=each.name,
+                form=each.form.value,
+                size=list(each.size),
+                T=arm.surroundings.pose(each, x).tolist(),
+                can_be_held=each.can_be_held,
+                held=each.held,
+                mesh=None if each.solid is None else each.solid.key,
+                scale=each.scale,
+                colour=None if each.look.colour is None else hexadecimal(each.look.colour),
+                opacity=each.look.opacity,
+                hidden=each.look.hidden,
+                fixed=each.fixed,
+            )
+            for each in now.things
+        ]
+    )
+
+
+def hexadecimal(colour: Colour) -> str:
+    """As "#94a3b8"."""
+    red, green, blue = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+def loop(lateness: Lateness) -> answers.Loop:
+    """How well the loop keeps its period."""
+    return answers.Loop(
+        period=lateness.period,
+        ticks=lateness.count,
+        late_p50=lateness.p50,
+        late_p99=lateness.p99,
+        late_most=lateness.most,
+        lost=lateness.lost,
+    )

@@ -1,0 +1,68 @@
+"""The programs' panel and whoever runs them: across the threads of viser and of the gateway."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Future
+
+from katana450.errors import LeaseError
+from katana450.extensions.programs.program import Program
+from katana450.server.api import answers
+from katana450.server.api.fields import Order
+from katana450.server.service.program_runner import Performer
+
+PATIENCE = 2.0
+"""[s] Until the panel gives up on an answer."""
+
+
+class Steering:
+    """What the panel may ask; done in the gateway's one thread."""
+
+    def __init__(
+        self, performer: Performer, loop: Callable[[], asyncio.AbstractEventLoop | None]
+    ) -> None:
+        """``loop``: the gateway's, once it runs."""
+        self._performer = performer
+        self._loop = loop
+
+    @property
+    def told(self) -> answers.Progress | None:
+        """How the program stands."""
+        return self._performer.told()
+
+    @property
+    def program(self) -> Program | None:
+        """The one that is planned."""
+        return self._performer.program
+
+    def redirected(self) -> None:
+        """The arm is told something else: a program that waits for its plan does not run."""
+        self._performer.redirected()
+
+    def plan(self, text: str, then: Order | None) -> None:
+        """Plan a script, and do ``then``. Raises KatanaError with the reason why not."""
+        self._do(lambda: self._performer.plan(text, then))
+
+    def steer(self, order: Order) -> None:
+        """Tell the program that runs. Raises LeaseError with the reason why not."""
+        self._do(lambda: self._performer.order(order))
+
+    def _do(self, act: Callable[[], None]) -> None:
+        loop, future = self._loop(), Future[None]()
+        if loop is None:
+            raise LeaseError("The server is not there yet.")
+
+        def done() -> None:
+            try:
+                act()
+            except Exception as error:
+                future.set_exception(error)
+            else:
+                future.set_result(None)
+
+        loop.call_soon_threadsafe(done)
+        try:
+            future.result(PATIENCE)
+        except TimeoutError as error:
+            raise LeaseError("The server does not answer. See how the program stands.") from error

@@ -1,0 +1,108 @@
+"""Where to look from: named views for one browser at a time."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import viser
+
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+
+FOV = np.deg2rad(40.0)
+"""[rad] Vertical; that of a lens which does not bend the arm."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """A camera at ``position``, turned to ``target``; both [m] in the base frame."""
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+class Preset(Enum):
+    """The views a person can ask for; only the last one follows the arm."""
+
+    FREE = "3D"
+    FRONT = "Front"
+    SIDE = "Side"
+    TOP = "Top"
+    TOOL = "Tool"
+
+
+LOOKS = {
+    Preset.FREE: Look((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
+    Preset.FRONT: Look((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
+    Preset.SIDE: Look((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
+    # Not from straight above: a camera that looks along up has no up.
+    Preset.TOP: Look((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
+}
+"""As near as all of the arm is in the picture, however it is posed; cup and basin in the first."""
+
+BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
+"""[m] Where the camera rides on the tool, and how far ahead of the tool point it looks."""
+
+
+class Cameras:
+    """Turns cameras; a browser that rides on the tool does so until it is given another view."""
+
+    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
+        self._model = model
+        self._riding: dict[int, viser.ClientHandle] = {}
+        self._lock = threading.Lock()
+        server.on_client_disconnect(self._forget)
+
+    def give(self, client: viser.ClientHandle, preset: Preset, state: State) -> None:
+        """Show ``client`` the arm from ``preset``."""
+        with self._lock:
+            self._riding.pop(client.client_id, None)
+            if preset is Preset.TOOL:
+                self._riding[client.client_id] = client
+        _turn(client, look_from(preset, self._model, state))
+
+    def follow(self, state: State) -> None:
+        """Take the cameras that ride on the tool along."""
+        with self._lock:
+            riding = list(self._riding.values())
+        for client in riding:
+            _turn(client, look_from(Preset.TOOL, self._model, state))
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._riding.pop(client.client_id, None)
+
+
+def look_from(preset: Preset, model: RobotModel, state: State) -> Look:
+    """The view that ``preset`` is of an arm in ``state``."""
+    if preset is not Preset.TOOL:
+        return LOOKS[preset]
+    chain = model.arm.chain_to(state.tool)
+    T = model.T_base_shoulder @ forward(chain, state.q)
+    p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
+    # Above in the arm's plane, however the tool is rolled.
+    up = z - (z @ x) * x
+    size = float(np.linalg.norm(up))
+    up = up / size if size > LEAST_UP else -T[:3, 2]
+    return Look(_triple(p - BEHIND * x + ABOVE * up), _triple(p + AHEAD * x))
+
+
+LEAST_UP = 0.05
+"""The tool upright: up in its plane is no longer told by gravity."""
+
+
+def _turn(client: viser.ClientHandle, look: Look) -> None:
+    with client.atomic():
+        client.camera.up_direction = (0.0, 0.0, 1.0)
+        client.camera.position = look.position
+        client.camera.look_at = look.target
+
+
+def _triple(p: FloatArray) -> tuple[float, float, float]:
+    x, y, z = p.tolist()
+    return x, y, z

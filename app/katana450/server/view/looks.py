@@ -1,0 +1,83 @@
+"""Controls that change what is seen and nothing else: camera, theme, what is drawn besides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import viser
+
+from katana450.server.view.cameras import Preset
+from katana450.server.view.reachability import Cut, ReachabilityCloud
+from katana450.server.view.room import THEMES
+
+PERSONAL = ("View", "Theme")
+"""Labels of the controls that concern no window but the one they are clicked in."""
+
+
+@dataclass(frozen=True)
+class Shows:
+    """What the controls call.
+
+    ellipsoid, handles: show or hide them. look_from: turns one browser's camera. reachability: the
+    map, if one was given.
+    """
+
+    ellipsoid: Callable[[bool], None]
+    handles: Callable[[bool], None]
+    look_from: Callable[[viser.ClientHandle, Preset], None]
+    reachability: ReachabilityCloud | None
+
+
+def add_views(gui: viser.GuiApi, shows: Shows) -> None:
+    """A row of buttons, each for the browser it is clicked in."""
+    views = gui.add_button_group(
+        "View",
+        tuple(preset.value for preset in Preset),
+        hint="Where you look from; Tool rides on the tool until you choose another. "
+        "Drag, right-drag and wheel turn, shift and zoom",
+    )
+
+    @views.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            shows.look_from(event.client, Preset(views.value))
+
+
+def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
+    """The rest of them."""
+    add_themes(gui)
+    box = gui.add_checkbox(
+        "Velocity ellipsoid",
+        initial_value=False,
+        hint="How fast the tool point can go in each direction: flat where one is lost",
+    )
+    box.on_update(lambda _: shows.ellipsoid(box.value))
+    handles = gui.add_checkbox(
+        "Handles on things",
+        initial_value=False,
+        hint="Arrows by which cup, basin and objects can be put elsewhere on the table",
+    )
+    handles.on_update(lambda _: shows.handles(handles.value))
+    cloud = shows.reachability
+    if cloud is not None:
+        names = tuple(cut.value for cut in Cut)
+        cuts = gui.add_dropdown(
+            "Reachability",
+            names,
+            initial_value=Cut.HIDDEN.value,
+            hint="Where the tool can be: the map given with --workspace",
+        )
+        legend = gui.add_html(cloud.legend, visible=False)
+
+        @cuts.on_update
+        def _(_: viser.GuiEvent[Any]) -> None:
+            cut = Cut(cuts.value)
+            legend.visible = cut is not Cut.HIDDEN
+            cloud.show(cut)
+
+
+def add_themes(gui: viser.GuiApi) -> None:
+    """Light or dark. The page changes its own theme; the server does not see the click."""
+    gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")

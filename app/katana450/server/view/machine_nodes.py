@@ -1,0 +1,62 @@
+"""Any mechanism in the browser: a frame a link, nested as the links are, that turns or slides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import viser
+
+from katana450.arm.robot.mechanism import Joint, Mechanism, Shape
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.view.scene import add_shape
+from katana450.server.viser_bridge.posing import place, turn
+
+WORTH_SENDING = 1e-7
+"""[rad, m] A joint that moved less is where it was."""
+
+
+class MachineNodes:
+    """The links and their shapes."""
+
+    def __init__(self, server: viser.ViserServer, mechanism: Mechanism) -> None:
+        self.path: dict[str, str] = {}
+        self.shapes: dict[str, list[viser.MeshHandle]] = {}
+        """Of each link, as they are made."""
+        self._jointed: list[tuple[Joint, FloatArray, viser.FrameHandle]] = []
+        self._sent: dict[str, float] = {}
+        self._surfaces = {link.name: link.shapes for link in mechanism.links}
+        for number, link in enumerate(mechanism.links):
+            above = "" if link.parent is None else self.path[link.parent]
+            # A link's own name may hold what a path is parted by.
+            path = self.path[link.name] = f"{above}/link{number}"
+            T = link.T_parent_link
+            frame = server.scene.add_frame(
+                path, show_axes=False, wxyz=so3.to_quaternion(T[:3, :3]), position=T[:3, 3]
+            )
+            if link.joint is not None:
+                self._jointed.append((link.joint, T, frame))
+            self.shapes[link.name] = [
+                add_shape(server, f"{path}/shape{each}", shape, shape.material.colour)
+                for each, shape in enumerate(link.shapes)
+            ]
+
+    def surfaces(self, link: str) -> Sequence[Shape]:
+        """What its shapes are."""
+        return self._surfaces[link]
+
+    def move(self, values: Mapping[str, float]) -> None:
+        """Put the links where the joint ``values`` [rad, m] have them; sends only what changed."""
+        for joint, T_parent_link, frame in self._jointed:
+            value = values[joint.name]
+            if abs(value - self._sent.get(joint.name, np.inf)) <= WORTH_SENDING:
+                continue
+            self._sent[joint.name] = value
+            T = T_parent_link @ joint.motion(value)
+            if joint.slides:
+                x, y, z = T[:3, 3].tolist()
+                place(frame, (x, y, z))
+            else:
+                w, i, j, k = so3.to_quaternion(T[:3, :3]).tolist()
+                turn(frame, (w, i, j, k))

@@ -1,0 +1,118 @@
+"""The front panel of a mechanism that is driven joint by joint: why that is so, and its sliders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from html import escape
+
+import viser
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.joints import Joints
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.state import State
+from katana450.server.view.controls import Listen, add_motion, ends, listener, set_slider
+from katana450.server.view.follower import READOUT_INTERVAL
+from katana450.server.view.ledger import LedgerList
+from katana450.server.view.looks import add_themes
+from katana450.server.view.readout import style
+from katana450.server.view.texts import headline, mood, sentence, signed
+
+GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Reset()}
+
+STEPS = 400
+"""Of a slider from end to end, at least."""
+
+
+class MachinePanel:
+    """Sliders show the goal; the read-out shows where the joints are."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        joints: Joints,
+        put: Callable[[cmd.Command], int],
+        state: State,
+    ) -> None:
+        """``put`` takes a command; ``state`` is what the panel shows first."""
+        self._gui = gui
+        self._joints = joints
+        self._told_at = -math.inf
+        self._told = ""
+        listen: Listen = listener(put)
+        self._readout = gui.add_html(page(joints, state))
+        gui.add_html(f"<div class='k450'><p><b>Joints only.</b> {escape(joints.why)}</p></div>")
+        with gui.add_folder("Joints"):
+            self._sliders = [self._slider(axis, state, listen) for axis in range(joints.n)]
+        gestures = gui.add_button_group(
+            "Drive",
+            tuple(GESTURES),
+            hint="Home: every joint to zero, or the limit next to it. Hold: stop here.",
+        )
+        listen(gestures, lambda: GESTURES[gestures.value])
+        self._speed = add_motion(gui, listen, state)
+        gui.add_html(style())
+        with gui.add_folder("Show", expand_by_default=False):
+            add_themes(gui)
+        with gui.add_folder("Why", expand_by_default=False):
+            self._why = LedgerList(gui)
+
+    def follow(
+        self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool
+    ) -> None:
+        """Show ``state`` at time ``now`` [s]; see ``Panel.follow``."""
+        if now - self._told_at < READOUT_INTERVAL:
+            return
+        self._told_at = now
+        if caught_up:
+            for axis, slider in enumerate(self._sliders):
+                set_slider(slider, shown(self._joints, axis, float(state.goal[axis])))
+            set_slider(self._speed, 100.0 * state.speed)
+        told = page(self._joints, state)
+        if told != self._told:
+            self._told = self._readout.content = told
+        self._why.follow(ledger)
+
+    def _slider(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
+        joints = self._joints
+        low, high = ends(
+            *(shown(joints, axis, float(limit[axis])) for limit in (joints.lower, joints.upper))
+        )
+        slides = joints.slides[axis]
+        slider = self._gui.add_slider(
+            # With its number, as sentences have it; no name can pass for that of another control.
+            f"{axis + 1}. {joints.names[axis]}",
+            min=low,
+            max=high,
+            step=10.0 ** math.floor(math.log10((high - low) / STEPS)),
+            initial_value=min(max(shown(joints, axis, float(state.goal[axis])), low), high),
+            hint=f"{'mm' if slides else 'Degrees'}: {signed(low, 2)} to {signed(high, 2)}",
+        )
+        slider.precision = 2
+        unit = 1e-3 if slides else math.radians(1.0)
+        listen(slider, lambda: cmd.SetJoint(axis, unit * slider.value))
+        return slider
+
+
+def shown(joints: Joints, axis: int, value: float) -> float:
+    """A joint's value as people read it: [rad] in degrees, [m] in mm."""
+    return 1e3 * value if joints.slides[axis] else math.degrees(value)
+
+
+def page(joints: Joints, state: State) -> str:
+    """The read-out for ``state``, as HTML."""
+    rows = "".join(
+        f"<tr><th>{axis + 1}. {escape(name)}</th>"
+        f"<td data-now='{axis}'>{signed(shown(joints, axis, float(state.q[axis])), 1)}</td>"
+        f"<td data-goal='{axis}'>{signed(shown(joints, axis, float(state.goal[axis])), 1)}</td>"
+        f"<td class='unit'>{'mm' if joints.slides[axis] else '°'}</td></tr>"
+        for axis, name in enumerate(joints.names)
+    )
+    return (
+        f"<div class='k450'>"
+        f"<p class='status {mood(state)}'><b>{escape(headline(state))}</b>"
+        f"<span>{escape(sentence(state)) or '&nbsp;'}</span></p>"
+        f"<table><thead><tr><th>joint</th><th>now</th><th>goal</th><th></th></tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>"
+    )

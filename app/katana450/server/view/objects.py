@@ -1,0 +1,200 @@
+"""The panel of objects: choose one, colour, scale, turn, attach and remove it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import viser
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.solid import FAINTEST, Look
+from katana450.arm.control.state import State
+from katana450.arm.control.support import check_mounted
+from katana450.arm.control.things import LEAST_SCALE, MOST_SCALE, Mount, Surroundings, Thing, named
+from katana450.errors import InputError
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import frozen
+from katana450.server.view.controls import refuse, set_value
+from katana450.server.view.things import COLOUR
+
+NOTHING = "nothing yet"
+
+MOUNTS = {"Hand": Mount.HAND, "Table": Mount.TABLE, "Here": Mount.WORLD}
+
+OWN, REMOVE = "Own colour", "Remove"
+
+
+class ObjectsPanel:
+    """A folder of controls, all of the one object that is chosen."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        put: Callable[[cmd.Command], int],
+        state: Callable[[], State],
+        surroundings: Surroundings,
+    ) -> None:
+        """``state``: the newest. ``surroundings``: what objects stand on and are fixed to."""
+        self._surroundings = surroundings
+        self._put = put
+        self._state = state
+        self._things = state().things
+        self._shown: Thing | None = None
+        gui = server.gui
+        names = _names(self._things)
+        with gui.add_folder("Objects", expand_by_default=False):
+            self._choice = gui.add_dropdown(
+                "Object", names, hint="What the rest of this folder is about"
+            )
+            self._colour = gui.add_rgb("Colour", COLOUR)
+            self._opacity = gui.add_slider(
+                "Opacity",
+                min=100.0 * FAINTEST,
+                max=100.0,
+                step=1.0,
+                initial_value=100.0,
+                hint="Percent; for contacts it counts whole whatever it looks like",
+            )
+            self._scale = gui.add_number(
+                "Scale",
+                1.0,
+                min=LEAST_SCALE,
+                max=MOST_SCALE,
+                step=0.001,
+                hint="Times the size it came with",
+            )
+            self._turn = gui.add_slider(
+                "Turn",
+                min=-180.0,
+                max=180.0,
+                step=1.0,
+                initial_value=0.0,
+                hint="About the vertical, degrees",
+            )
+            self._hidden = gui.add_checkbox(
+                "Hidden",
+                initial_value=False,
+                hint="Not drawn; the arm keeps clear of it even so",
+            )
+            self._mounts = gui.add_button_group(
+                "Attach to",
+                tuple(MOUNTS),
+                hint="Hand: it goes with the hand and counts as a part of it. Table: it is set "
+                "down below. Here: it stays where it is, in the air too",
+            )
+            self._acts = gui.add_button_group("And", (OWN, REMOVE))
+        self._on(self._colour, lambda thing: _recoloured(thing, self._colour.value))
+        self._on(
+            self._opacity,
+            lambda thing: _looking(thing, opacity=max(0.01 * self._opacity.value, FAINTEST)),
+        )
+        self._on(self._scale, lambda thing: _scaled(thing, self._scale.value))
+        self._on(self._turn, lambda thing: _turned(thing, math.radians(self._turn.value)))
+        self._on(self._hidden, lambda thing: _looking(thing, hidden=self._hidden.value))
+        self._on(self._mounts, self._mounted)
+        self._on(self._acts, self._acted)
+        self._choice.on_update(lambda _: self._show(self._chosen(), anew=True))
+        self._show(self._chosen(), anew=True)
+
+    def follow(self, state: State, *, caught_up: bool) -> None:
+        """Show what there is. ``caught_up``: see ``Panel``."""
+        if not caught_up:
+            return
+        self._things = state.things
+        names = _names(state.things)
+        if names != tuple(self._choice.options):
+            new = [name for name in names if name not in self._choice.options]
+            chosen = self._choice.value
+            self._choice.options = names
+            if new or chosen not in names:
+                # What has just come is what one wants to touch.
+                chosen = new[-1] if new else names[0]
+            set_value(self._choice, chosen)
+        self._show(self._chosen())
+
+    def _chosen(self) -> Thing | None:
+        return named(self._things, self._choice.value)
+
+    def _show(self, thing: Thing | None, *, anew: bool = False) -> None:
+        if thing is None or (thing is self._shown and not anew):
+            return
+        self._shown = thing
+        set_value(self._colour, thing.look.colour or COLOUR)
+        set_value(self._opacity, round(100.0 * thing.look.opacity, 1))
+        set_value(self._scale, thing.scale)
+        set_value(self._hidden, thing.look.hidden)
+        yaw = math.degrees(so3.to_rpy(thing.T[:3, :3])[2])
+        if abs(math.remainder(self._turn.value - yaw, 360.0)) > 0.5:
+            set_value(self._turn, round(yaw) + 0.0)
+
+    def _mounted(self, thing: Thing) -> cmd.Command:
+        to, state = MOUNTS[self._mounts.value], self._state()
+        check_mounted(self._surroundings, state.things, thing, to, state.x)
+        return cmd.Attach(thing.name, to)
+
+    def _acted(self, thing: Thing) -> cmd.Command:
+        if self._acts.value == REMOVE:
+            if thing.held:
+                raise InputError(f"{thing.name!r} is held: open the gripper first.")
+            return cmd.Remove(thing.name)
+        return _looking(thing, colour=None)
+
+    def _on(self, handle: Any, say: Callable[[Thing], cmd.Command]) -> None:
+        """Send what ``say`` makes of the chosen thing when a person changes ``handle``."""
+
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            try:
+                # What is shown may be older than what was put there meanwhile.
+                self._things = self._state().things
+                thing = self._chosen()
+                if thing is None:
+                    raise InputError("There is no object: add one first.")
+                self._put(say(thing))
+            except InputError as error:
+                self._show(self._chosen(), anew=True)
+                refuse(event, error)
+
+        if isinstance(handle, viser.GuiButtonGroupHandle):
+            handle.on_click(changed)
+        else:
+            handle.on_update(changed)
+
+
+def _placed(thing: Thing, **changes: Any) -> cmd.Command:
+    if thing.held:
+        raise InputError(f"{thing.name!r} is held: open the gripper first.")
+    return cmd.Place(replace(thing, **changes))
+
+
+def _looking(thing: Thing, **changes: Any) -> cmd.Command:
+    return _placed(thing, look=replace(thing.look, **changes))
+
+
+def _recoloured(thing: Thing, value: tuple[int, int, int]) -> cmd.Command:
+    red, green, blue = (int(each) for each in value)
+    return _placed(thing, look=Look((red, green, blue), thing.look.opacity, thing.look.hidden))
+
+
+def _scaled(thing: Thing, scale: float) -> cmd.Command:
+    if thing.name in (CUP, BASIN):
+        raise InputError(f"The {thing.name} is as large as the water in it counts on.")
+    return _placed(thing, scale=float(scale))
+
+
+def _turned(thing: Thing, yaw: float) -> cmd.Command:
+    """About the z axis of the frame that it is in, where it stands."""
+    roll, pitch, _ = so3.to_rpy(thing.T[:3, :3])
+    T = np.array(thing.T)
+    T[:3, :3] = so3.from_rpy(roll, pitch, yaw)
+    return _placed(thing, T=frozen(T))
+
+
+def _names(things: tuple[Thing, ...]) -> tuple[str, ...]:
+    return tuple(thing.name for thing in things) or (NOTHING,)

@@ -1,0 +1,215 @@
+"""The front panel: what the arm does, sliders for its joints, a pose to type, buttons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from html import escape
+
+import numpy as np
+import viser
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.ledger import Entry
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.reading import Reading
+from katana450.server.view import readout
+from katana450.server.view.branches import BranchList, Find
+from katana450.server.view.controls import add_motion, ends, listener, set_slider, set_value
+from katana450.server.view.follower import READOUT_INTERVAL
+from katana450.server.view.ledger import LedgerList
+from katana450.server.view.looks import Shows, add_shows, add_views
+from katana450.server.view.texts import (
+    AXIS_NAMES,
+    READING_HINTS,
+    READINGS,
+    UNCHECKED,
+    degrees,
+    millimetres,
+)
+
+FARTHEST = 1000.0
+"""[mm] Beyond any tool point of the arm: what a typed position may hold."""
+
+
+GESTURES: dict[str, cmd.Command] = {
+    "Home": cmd.Home(),
+    "Stretch": cmd.Stretch(),
+    "Hold": cmd.Reset(),
+}
+
+
+class Panel:
+    """Sliders show the goal, as the gizmo does; the read-out shows the arm itself."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        put: Callable[[cmd.Command], int],
+        find: Find,
+        shows: Shows,
+        state: State,
+    ) -> None:
+        """``put`` takes a command; ``state`` is what the panel shows first."""
+        self._model = model
+        self._on_person = listener(put)
+        self._gui = server.gui
+        self._told_at = -math.inf
+        self._told = ""
+        self._readout = self._gui.add_html(readout.page(model, state))
+        add_views(self._gui, shows)
+        if not model.collides:
+            self._gui.add_markdown(UNCHECKED)
+        with self._gui.add_folder("Joints"):
+            self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
+            self._gripper = self._finger(state) if model.arm.gripper.moves else None
+        self._gestures = self._gui.add_button_group(
+            "Drive",
+            tuple(GESTURES),
+            hint="Home: to the ready posture. Stretch: every joint to zero, the arm along x. "
+            "Hold: stop here and forget the target.",
+        )
+        self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
+        self._speed = add_motion(self._gui, self._on_person, state)
+        with self._gui.add_folder("Pose by numbers"):
+            self._pose_form(state)
+        with self._gui.add_folder("Branches", expand_by_default=False):
+            self._branches = BranchList(server, model, find, self._on_person, state)
+        with self._gui.add_folder("Show", expand_by_default=False):
+            add_shows(self._gui, shows)
+        with self._gui.add_folder("Why", expand_by_default=False):
+            self._why = LedgerList(self._gui)
+        # At the end, where nobody sees that it takes a line.
+        self._gui.add_html(readout.style())
+
+    def follow(
+        self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool
+    ) -> None:
+        """Show ``state`` at time ``now`` [s], and ``ledger``, what held the arm back so far.
+
+        ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
+        that an older state never takes a slider out of the hand that moves it.
+        """
+        if now - self._told_at < READOUT_INTERVAL:
+            return
+        self._told_at = now
+        if caught_up:
+            self._set_controls(state)
+        page = readout.page(self._model, state)
+        if page != self._told:
+            self._told = self._readout.content = page
+        self._branches.follow(state, now)
+        self._why.follow(ledger)
+
+    def _set_controls(self, state: State) -> None:
+        for slider, angle in zip(self._sliders, state.goal, strict=True):
+            set_slider(slider, math.degrees(angle))
+        if self._gripper is not None:
+            set_slider(self._gripper, self._opening(state.gripper_goal))
+        set_slider(self._speed, 100.0 * state.speed)
+        set_value(self._tool, state.tool)
+        set_value(self._reading, READINGS[state.reading])
+        meaning = _meaning(state.reading)
+        if meaning != self._meaning.content:
+            self._meaning.content = meaning
+
+    def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
+        chain = self._model.arm.chain
+        lower, upper = ends(*(math.degrees(limit[axis]) for limit in (chain.lower, chain.upper)))
+        slider = self._gui.add_slider(
+            f"Axis {axis + 1}",
+            min=lower,
+            max=upper,
+            step=0.05,
+            initial_value=float(np.clip(math.degrees(state.goal[axis]), lower, upper)),
+            hint=f"{AXIS_NAMES[axis]}, degrees: "
+            f"{degrees(chain.lower[axis], 2)} to {degrees(chain.upper[axis], 2)}".capitalize(),
+        )
+        slider.precision = 2
+        self._on_person(slider, lambda: cmd.SetJoint(axis, math.radians(slider.value)))
+        return slider
+
+    def _finger(self, state: State) -> viser.GuiSliderHandle[float]:
+        fingers = self._model.arm.gripper
+        named = millimetres if fingers.slides else degrees
+        slider = self._gui.add_slider(
+            "Gripper",
+            min=0.0,
+            max=100.0,
+            step=0.5,
+            initial_value=self._opening(state.gripper_goal),
+            hint=f"Percent open: 0 is closed ({named(fingers.lower)} at each finger), "
+            f"100 is open ({named(fingers.upper)})",
+        )
+        slider.precision = 1
+        self._on_person(slider, lambda: cmd.SetGripper(self._finger_angle(slider.value)))
+        return slider
+
+    def _pose_form(self, state: State) -> None:
+        arm = self._model.arm
+        T = forward(arm.chain_to(state.tool), state.goal)
+        self._tool = self._gui.add_dropdown(
+            "Tool",
+            tuple(arm.tools),
+            initial_value=state.tool,
+            hint="The frame that the gizmo, the numbers and the read-out are of",
+        )
+        self._on_person(self._tool, lambda: cmd.SetTool(self._tool.value))
+        self._reading = self._gui.add_dropdown(
+            "Reading",
+            tuple(READINGS.values()),
+            initial_value=READINGS[state.reading],
+            hint="What counts when five axes cannot do it all",
+        )
+        self._meaning = self._gui.add_html(_meaning(state.reading))
+        self._on_person(self._reading, lambda: cmd.SetReading(_reading(self._reading.value)))
+        position = self._gui.add_vector3(
+            "x, y, z",
+            np.round(1e3 * T[:3, 3]) + 0.0,
+            min=(-FARTHEST, -FARTHEST, -FARTHEST),
+            max=(FARTHEST, FARTHEST, FARTHEST),
+            step=1.0,
+            hint="Tool position in mm, in the frame {S} at the shoulder",
+        )
+        angles = self._gui.add_vector3(
+            "r, p, y",
+            np.round(np.degrees(so3.to_rpy(T[:3, :3]))) + 0.0,
+            min=(-180.0, -180.0, -180.0),
+            max=(180.0, 180.0, 180.0),
+            step=1.0,
+            hint="Roll, pitch and yaw in degrees, in the frame {S}; pitch above 0 points down",
+        )
+
+        def pose() -> cmd.Command:
+            return cmd.SetPose(typed_pose(position.value, angles.value))
+
+        self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
+
+    def _opening(self, angle: float) -> float:
+        fingers = self._model.arm.gripper
+        return 100.0 * (angle - fingers.lower) / (fingers.upper - fingers.lower)
+
+    def _finger_angle(self, opening: float) -> float:
+        fingers = self._model.arm.gripper
+        return fingers.lower + opening / 100.0 * (fingers.upper - fingers.lower)
+
+
+def typed_pose(
+    position: tuple[float, float, float], angles: tuple[float, float, float]
+) -> FloatArray:
+    """The pose (4, 4) in {S} of numbers as people type them: mm, and degrees roll, pitch, yaw."""
+    R = so3.from_rpy(*(math.radians(angle) for angle in angles))
+    return se3.from_rotation_translation(R, 1e-3 * np.array(position))
+
+
+def _meaning(reading: Reading) -> str:
+    return f"<div class='k450'><p class='hint'>{escape(READING_HINTS[reading])}</p></div>"
+
+
+def _reading(name: str) -> Reading:
+    return next(reading for reading, text in READINGS.items() if text == name)

@@ -1,0 +1,75 @@
+"""The room round the arm: floor, sky and light, by day and by night."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from katana450.server.view.scene import Colour
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours of the room. dark: whether the panel is dark too."""
+
+    floor: Colour
+    cell: Colour
+    section: Colour
+    sky: Colour
+    shadow: float
+    dark: bool
+
+
+LIGHT = Theme((226, 231, 236), (207, 213, 220), (178, 187, 197), (247, 249, 251), 0.35, dark=False)
+DARK = Theme((38, 42, 48), (50, 55, 62), (70, 77, 87), (22, 24, 28), 0.6, dark=True)
+
+FLOOR_AT = -0.0255
+"""[m] The table lies on the floor, a hair above it so that nothing flickers."""
+
+THEMES = {"Light": LIGHT, "Dark": DARK}
+
+
+def furnish(server: viser.ViserServer) -> None:
+    """Light the scene and give it the light theme; a dark window's page changes it to its own."""
+    scene = server.scene
+    scene.configure_default_lights(enabled=False)
+    # Key from the left and above, in front: it models the cheeks; the rim parts arm from sky.
+    scene.add_light_directional(
+        "/light/key", intensity=1.7, cast_shadow=True, color=(255, 250, 242), position=KEY
+    )
+    scene.add_light_directional("/light/rim", intensity=0.9, color=(226, 238, 255), position=RIM)
+    scene.add_light_directional("/light/fill", intensity=0.35, position=FILL)
+    scene.configure_environment_map("studio", environment_intensity=0.45)
+    _paint(scene, LIGHT)
+
+
+KEY, RIM, FILL = (0.7, -0.9, 1.9), (-1.0, 1.4, 0.9), (1.2, 1.0, 0.6)
+"""[m] Where each light shines from, towards the base."""
+
+
+def _paint(scene: viser.SceneApi, theme: Theme) -> None:
+    scene.add_grid(
+        "/floor",
+        infinite_grid=True,
+        cell_size=0.05,
+        cell_thickness=0.6,
+        cell_color=theme.cell,
+        section_size=0.25,
+        section_thickness=1.0,
+        section_color=theme.section,
+        plane_color=theme.floor,
+        plane_opacity=1.0,
+        fade_distance=5.0,
+        shadow_opacity=theme.shadow,
+        position=(0.0, 0.0, FLOOR_AT),
+    )
+    scene.set_background_image(gradient(theme.sky, theme.floor), format="png")
+
+
+def gradient(top: Colour, bottom: Colour) -> npt.NDArray[np.uint8]:
+    """The sky as a picture (128, 2, 3): from ``top`` down to ``bottom``."""
+    rows: npt.NDArray[np.uint8] = np.linspace(top, bottom, 128).round().astype(np.uint8)
+    return np.repeat(rows[:, None, :], 2, axis=1)

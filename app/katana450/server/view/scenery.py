@@ -1,0 +1,70 @@
+"""All of a state that can be seen and is no control: arm, conduit, table, things, water."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import viser
+
+from katana450.arm.control.commands import Command
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import Props
+from katana450.extensions.importers.meshes import Meshes
+from katana450.maths.water.around import Around
+from katana450.server.view.conduit import Conduits
+from katana450.server.view.room import furnish
+from katana450.server.view.scene import ArmNodes
+from katana450.server.view.things import ThingNodes
+from katana450.server.view.water import WaterNodes
+from katana450.server.view.workcell import Workcell
+
+
+class Scenery:
+    """Its nodes; what has not changed is not sent."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        session: Session,
+        props: Props,
+        put: Callable[[Command], None],
+        meshes: Meshes,
+    ) -> None:
+        """``session``: knows where things are. ``put``: takes what is done with their handles.
+        ``meshes``: those that things are of."""
+        self._server = server
+        self._model = model
+        self._session = session
+        furnish(server)
+        Workcell(server, props)
+        self.things = ThingNodes(server, props, session.surroundings, put, meshes)
+        self.arm = ArmNodes(server, model)
+        self._conduits = Conduits(server, model, self.arm)
+        # Made when there is water.
+        self._water: WaterNodes | None = None
+        self._around: Around | None = None
+
+    def show(self, state: State) -> None:
+        """Everything as ``state`` has it."""
+        angles = self._model.joint_angles(state.q, state.gripper)
+        self.arm.move(angles)
+        self._conduits.move(angles)
+        self.things.follow(state)
+        self._show_water(state)
+
+    def _show_water(self, state: State) -> None:
+        pouring = self._session.pouring
+        if pouring is None or state.poured is None:
+            if self._water is not None:
+                self._water.hide()
+            return
+        around = pouring.around(state.things)
+        if self._water is None:
+            self._water = WaterNodes(self._server, around)
+        elif around is not self._around:
+            self._water.stand(around)
+        self._around = around
+        self._water.show(state.poured.water)

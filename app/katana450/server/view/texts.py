@@ -1,0 +1,206 @@
+"""Every word a person reads about the state of the arm, keyed by the enums of the core."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from katana450.arm.control.choices import Choice
+from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
+from katana450.maths.kinematics.reading import Reading
+
+AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
+
+
+def degrees(angle: float, digits: int = 1) -> str:
+    """An angle [rad] as people read it; a true minus sign, never "−0"."""
+    return signed(math.degrees(angle), digits) + "°"
+
+
+def millimetres(length: float, digits: int = 1) -> str:
+    """A length [m] as people read it."""
+    return signed(1e3 * length, digits) + " mm"
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with ``digits`` decimals, a true minus sign and no negative zero."""
+    text = f"{abs(value):.{digits}f}"
+    return "−" + text if value < 0 and float(text) != 0.0 else text
+
+
+def axis(number: int | None) -> str:
+    """An axis counted from 0, as people count it."""
+    return "an axis" if number is None else f"axis {number + 1}"
+
+
+PARTS = {
+    "base_link": "control box",
+    "arm_base_link": "base",
+    "pan_link": "shoulder",
+    "finger_left_link": "left finger",
+    "finger_right_link": "right finger",
+}
+"""Links whose names in the robot description are not what people call them."""
+
+UNCHECKED = "No collision checking: the robot description gives the links no collision shapes."
+
+
+def part(name: str) -> str:
+    """A link or a thing, as people call it."""
+    return PARTS.get(name, name.removesuffix("_link").replace("_", " "))
+
+
+def _contact(finding: Finding) -> str:
+    one, other = finding.parts or ("a link", "another")
+    return (
+        f"{part(one)} and {part(other)} are {_short(1e3 * finding.amount)} mm apart: "
+        f"the arm stops at {_short(1e3 * STOP)} mm"
+    )
+
+
+def _lopsided(finding: Finding) -> str:
+    finger, thing = finding.parts or ("a finger", "something")
+    return (
+        f"{part(finger)} is {_short(1e3 * finding.amount)} mm from {part(thing)}, which the other "
+        "touches: open, put the gripper about its middle, close again"
+    )
+
+
+REASONS: dict[Reason, Callable[[Finding], str]] = {
+    Reason.HALTED: lambda f: (
+        f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
+        "Reset in the bar, then say afresh where to go"
+    ),
+    Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
+    Reason.CONTACT: _contact,
+    Reason.ACROSS_GAP: lambda f: (
+        f"{axis(f.axis)} would have to leap {_short(math.degrees(f.amount))}° to follow: "
+        "drag another way round, or choose the pose under Branches"
+    ),
+    Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
+    Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
+    Reason.AXIS_1: lambda _: (
+        "axis 1 is in the way: drag round it, or choose another pose under Branches"
+    ),
+    Reason.LINKS: lambda _: "its links reach no farther that way",
+    Reason.SINGULAR: lambda _: "no joint moves the tool that way from here: go another way first",
+    Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
+    Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",
+    Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
+    Reason.GRIPPER_SLIDE_LIMIT: lambda f: f"the gripper at its limit of {millimetres(f.amount)}",
+    Reason.YAW_FIXED: lambda f: (
+        f"wrist yaw is fixed by position: {_short(math.degrees(f.amount))}° off"
+    ),
+    Reason.PITCH_CHANGED: lambda f: f"pitch gives way by {_short(math.degrees(f.amount))}°",
+    Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
+    Reason.LOPSIDED: _lopsided,
+    Reason.NOT_AT_START: lambda f: (
+        f"the plan begins elsewhere: {axis(f.axis)} is {_short(math.degrees(f.amount))}° off, "
+        "or the arm still moves; go to its start first"
+    ),
+    Reason.INTERNAL: lambda _: "something went wrong inside: the arm holds; see the server's log",
+}
+
+STATUS: dict[Status, str] = {
+    Status.OK: "On target",
+    Status.LIMITED: "As near as it can",
+    Status.HELD: "Held at the edge",
+    Status.BLOCKED: "Contact ahead",
+    Status.PAUSED: "Paused",
+    Status.HALTED: "Stopped",
+    Status.FAULT: "Fault",
+}
+
+READINGS: dict[Reading, str] = {
+    Reading.POSE: "Position, then orientation",
+    Reading.PITCH: "Pitch, then position",
+    Reading.POSITION: "Position, then pitch",
+}
+
+READING_HINTS: dict[Reading, str] = {
+    Reading.POSE: "The tool point goes where it is wished, and the tool turns as near as it can.",
+    Reading.PITCH: "The tool keeps the wished pitch, and stops where it cannot.",
+    Reading.POSITION: "The tool point goes where it is wished, with the nearest pitch it can have.",
+}
+
+BRANCH_HEADINGS = ("branch", "off by", "way there", "singular")
+
+NOTHING_LOST = "nothing"
+
+MOVING = "Moving"
+
+
+def mood(state: State) -> str:
+    """The word for it that the style sheets know."""
+    moves = state.moving and state.status is Status.OK
+    return "moving" if moves else state.status.value
+
+
+def title(robot: str) -> str:
+    """Of a page that shows the robot of this name."""
+    words = robot.replace("_", " ").strip()
+    return words[:1].upper() + words[1:]
+
+
+def headline(state: State) -> str:
+    """Two or three words for the state of the arm."""
+    if state.moving and state.status is Status.OK:
+        return MOVING
+    return STATUS[state.status]
+
+
+def sentence(state: State) -> str:
+    """Why the arm does not do what was wished, in one sentence; empty when it does."""
+    if not state.findings:
+        return ""
+    return _capital("; ".join(REASONS[each.reason](each) for each in state.findings)) + "."
+
+
+def told(finding: Finding) -> str:
+    """One reason by itself."""
+    return _capital(REASONS[finding.reason](finding))
+
+
+def room(number: int, angle: float) -> str:
+    """How far an axis counted from 0 is from its nearer limit [rad]."""
+    return f"{axis(number)}: {degrees(angle)} left"
+
+
+ROOM = "to each limit"
+"""Before how far each axis is from its nearer one."""
+
+FLAT = 1e6
+"""Condition from which on rounding says how far from a singularity the arm is."""
+
+
+def condition(values: FloatArray) -> str:
+    """Largest over smallest of singular values ``values`` (n,), falling; without end in a
+    singularity."""
+    return "∞" if values[0] >= FLAT * values[-1] else _short(float(values[0] / values[-1]))
+
+
+def badge(choice: Choice) -> tuple[str, str, str]:
+    """What a branch gives up, how long the way to it is, and how far it is from a singularity."""
+    badge = choice.badge
+    lost = []
+    if badge.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{_short(1e3 * badge.position_error)} mm")
+    if badge.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{_short(math.degrees(badge.rotation_error))}°")
+    if choice.contact is not None:
+        one, other = choice.contact.parts
+        lost.append(f"{part(one)} meets {part(other)}")
+    way = f"{degrees(badge.distance, 0)}, {badge.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, way, f"{badge.smallest_singular_value:.3f}"
+
+
+def _capital(said: str) -> str:
+    return said[0].upper() + said[1:]
+
+
+def _short(value: float) -> str:
+    """Enough digits to act on: none from 10 up, one below."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -1,0 +1,306 @@
+"""What stands around or is carried: where it is, and handles to put it elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import trimesh
+import viser
+
+from katana450.arm.control.commands import Command, Place
+from katana450.arm.control.solid import Solid
+from katana450.arm.control.state import State
+from katana450.arm.control.support import check_carried, is_loose
+from katana450.arm.control.things import Form, Surroundings, Thing
+from katana450.arm.robot.props import Props
+from katana450.arm.robot.visual import Visual
+from katana450.errors import InputError
+from katana450.extensions.importers.creases import Drawn, drawn, glb
+from katana450.extensions.importers.meshes import Meshes
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.server.view.controls import refuse
+from katana450.server.view.tint import Tint
+from katana450.server.viser_bridge.guard import WORKSPACE
+from katana450.server.viser_bridge.posing import place, turn
+
+HANDLE = 0.09
+"""[m] Length of a handle's arrows: they end outside cup and basin."""
+
+COLOUR = (148, 163, 184)
+"""Of what has none of its own."""
+
+COAT = 1.005
+"""[1] A coat is so much larger, that it does not flicker with what it coats."""
+
+FACETS = 48
+"""Of what is round."""
+
+
+class ThingNodes:
+    """A frame a thing with its shape in it, made anew when that is another."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        props: Props,
+        surroundings: Surroundings,
+        put: Callable[[Command], None],
+        meshes: Meshes,
+    ) -> None:
+        """``meshes``: those that things are of."""
+        self._server = server
+        self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
+        self._surroundings = surroundings
+        self._put = put
+        self._meshes = meshes
+        self._frames: dict[str, viser.FrameHandle] = {}
+        self._shapes: dict[str, _Shape] = {}
+        self._handles: dict[str, viser.TransformControlsHandle] = {}
+        self._made = 0
+        self._things: dict[str, Thing] = {}
+        self._seen: tuple[Thing, ...] = ()
+        self._dragged: str | None = None
+        self._wanted = False
+
+    def show_handles(self, visible: bool) -> None:
+        """Show or hide the handles."""
+        self._wanted = visible
+        for name, handle in self._handles.items():
+            thing = self._things.get(name)
+            wanted = visible and thing is not None and not thing.carried
+            if handle.visible != wanted:
+                handle.visible = wanted
+
+    def let_go(self) -> None:
+        """Take the handles out of every hand."""
+        self._dragged = None
+
+    def follow(self, state: State) -> None:
+        """Put everything where ``state`` has it."""
+        changed = state.things is not self._seen
+        if changed:
+            self._take_in(state.things)
+        near = state.near
+        for thing in state.things:
+            if changed or thing.carried:
+                self._pose(thing, state.x)
+            if thing.name not in self._props:
+                self._shapes[thing.name].warn(thing, near=thing.name in near)
+
+    def _take_in(self, things: tuple[Thing, ...]) -> None:
+        self._seen = things
+        self._things = {thing.name: thing for thing in things}
+        for name in set(self._frames) - set(self._things):
+            self._take_away(name)
+        for thing in things:
+            if thing.name not in self._frames:
+                self._add(thing.name)
+            frame, shape = self._frames[thing.name], self._shapes[thing.name]
+            shape.follow(thing)
+            if frame.visible == thing.look.hidden:
+                frame.visible = not thing.look.hidden
+        self.show_handles(self._wanted)
+
+    def _pose(self, thing: Thing, x: FloatArray) -> None:
+        T = self._surroundings.pose(thing, x)
+        px, py, pz = T[:3, 3].tolist()
+        w, i, j, k = so3.to_quaternion(T[:3, :3]).tolist()
+        place(self._frames[thing.name], (px, py, pz))
+        turn(self._frames[thing.name], (w, i, j, k))
+        if self._dragged != thing.name:
+            place(self._handles[thing.name], (px, py, pz))
+
+    def _add(self, name: str) -> None:
+        self._made += 1
+        path = f"/{name}" if name in self._props else f"/things/{self._made}"
+        self._frames[name] = self._server.scene.add_frame(path, show_axes=False)
+        self._shapes[name] = _Shape(self._server, path, self._meshes, self._props.get(name))
+        self._handles[name] = self._handle(name)
+
+    def _take_away(self, name: str) -> None:
+        if name in self._props:
+            # Others hang shapes of their own on it.
+            self._frames[name].visible = False
+            return
+        del self._shapes[name]
+        self._frames.pop(name).remove()
+        self._handles.pop(name).remove()
+
+    def _handle(self, name: str) -> viser.TransformControlsHandle:
+        handle = self._server.scene.add_transform_controls(
+            f"/handles/{self._made}",
+            scale=HANDLE,
+            line_width=3.0,
+            active_axes=(True, True, False),
+            disable_rotations=True,
+            depth_test=False,
+            translation_limits=((-WORKSPACE, WORKSPACE),) * 2 + ((0.0, 0.0),),
+            visible=False,
+        )
+
+        @handle.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            self._moved(name, event)
+
+        return handle
+
+    def _moved(self, name: str, event: viser.TransformControlsEvent) -> None:
+        thing = self._things.get(name)
+        if event.phase == "start":
+            self._dragged = name
+        if thing is None or thing.carried or self._dragged != name:
+            return
+        if event.phase == "end":
+            self._dragged = None
+        x, y, _ = (float(each) for each in event.target.position)
+        T = se3.from_rotation_translation(thing.T[:3, :3], (x, y, float(thing.T[2, 3])))
+        moved = replace(thing, T=T)
+        try:
+            if is_loose(moved):
+                check_carried(self._surroundings.table, self._seen, moved)
+        except InputError as error:
+            # It waits at the edge, and the handle comes back to it.
+            if event.phase == "end":
+                px, py, pz = thing.T[:3, 3].tolist()
+                place(self._handles[name], (px, py, pz))
+                refuse(event, error)
+            return
+        self._put(Place(moved))
+
+
+class _Shape:
+    """What of a thing is drawn: a file in its own colours, or a surface in one colour."""
+
+    def __init__(
+        self, server: viser.ViserServer, path: str, meshes: Meshes, prop: Any = None
+    ) -> None:
+        """``prop``: the GLB file of what has one and is no other form."""
+        self._scene = server.scene
+        self._path = f"{path}/shape"
+        self._coat_path = f"{path}/contact"
+        self._coat: viser.MeshHandle | None = None
+        self._meshes = meshes
+        self._prop = prop
+        self._node: Any = None
+        self._is: tuple[object, ...] = ()
+
+    def follow(self, thing: Thing) -> None:
+        """Look as ``thing`` does; sends only what is new."""
+        own = thing.look.colour is None and self._own(thing) is not None
+        key = None if thing.solid is None else thing.solid.key
+        # A file is sent anew for another opacity, a surface is not.
+        now = (thing.form, thing.size, key, own, thing.look.opacity if own else None)
+        if now != self._is:
+            self._is = now
+            self._node = self._made(thing, own=own)
+            if self._coat is not None:
+                self._coat.remove()
+                self._coat = None
+        if not own:
+            _set(self._node, "color", thing.look.colour or COLOUR)
+            _set(self._node, "opacity", _opacity(thing))
+        _set(self._node, "scale", thing.scale)
+
+    def warn(self, thing: Thing, *, near: bool) -> None:
+        """Coat it, as long as the arm is ``near``, in what it counts as."""
+        if self._coat is None and near:
+            body = _plain(thing) if thing.solid is None else _hull(thing.solid)
+            surface = _of(body)
+            self._coat = self._scene.add_mesh_simple(
+                self._coat_path,
+                (COAT * surface.vertices).astype(np.float32),
+                surface.faces.astype(np.uint32),
+                color=Tint.COLOUR,
+                opacity=Tint.OPACITY,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        if self._coat is not None:
+            _set(self._coat, "visible", near)
+            _set(self._coat, "scale", thing.scale)
+
+    def _made(self, thing: Thing, *, own: bool) -> Any:
+        # viser replaces the node of the name.
+        if own:
+            return self._scene.add_glb(self._path, self._own(thing) or b"", scale=thing.scale)
+        surface = self._surface(thing)
+        return self._scene.add_mesh_simple(
+            self._path,
+            surface.vertices.astype(np.float32),
+            surface.faces.astype(np.uint32),
+            color=thing.look.colour or COLOUR,
+            opacity=_opacity(thing),
+            side="double" if thing.form is Form.MESH else "front",
+            scale=thing.scale,
+        )
+
+    def _own(self, thing: Thing) -> bytes | None:
+        """A GLB file of it in its own colours; None where it has none."""
+        if thing.solid is not None:
+            mesh = self._meshes.get(thing.solid.key)
+            if mesh is None or mesh.colours is None:
+                return None
+            return glb(mesh.drawn, thing.look.opacity)
+        if self._prop is None or thing.look.opacity < 1.0:
+            return None
+        return bytes(self._prop.read_bytes())
+
+    def _surface(self, thing: Thing) -> Drawn:
+        if thing.solid is not None:
+            mesh = self._meshes.get(thing.solid.key)
+            if mesh is not None:
+                return mesh.drawn
+            # Known to the arm from before this process began.
+            return _of(_hull(thing.solid))
+        if self._prop is not None:
+            made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop).mesh
+            made.merge_vertices(merge_tex=True, merge_norm=True)
+            return _of(made)
+        return _of(_plain(thing))
+
+
+def _hull(solid: Solid) -> Any:
+    """What a mesh counts as."""
+    return trimesh.Trimesh(solid.corners).convex_hull
+
+
+def form(thing: Thing) -> Any:
+    """A trimesh of it as large as it is, on z = 0 of its own frame [m]; of a mesh, its hull."""
+    made = _hull(thing.solid) if thing.solid is not None else _plain(thing)
+    made.apply_scale(thing.scale)
+    return made
+
+
+def _plain(thing: Thing) -> Any:
+    """A trimesh of its form, at scale 1."""
+    match thing.form:
+        case Form.BOX:
+            made, height = trimesh.creation.box(thing.size), thing.size[2]
+        case Form.CYLINDER:
+            radius, height = thing.size
+            made = trimesh.creation.cylinder(radius, height, sections=FACETS)
+        case _:
+            height = 2.0 * thing.size[0]
+            made = trimesh.creation.icosphere(subdivisions=3, radius=thing.size[0])
+    made.apply_translation((0.0, 0.0, 0.5 * height))
+    return made
+
+
+def _of(mesh: Any) -> Drawn:
+    return drawn(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def _opacity(thing: Thing) -> float | None:
+    return None if thing.look.opacity == 1.0 else thing.look.opacity
+
+
+def _set(node: Any, name: str, value: object) -> None:
+    known = getattr(node, name)
+    if isinstance(known, np.ndarray):
+        known = tuple(known.tolist())
+    if known != value:
+        setattr(node, name, value)

@@ -1,0 +1,187 @@
+"""The window on the arm: one viser server, one scene for every browser."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+import viser
+
+from katana450.arm.control.commands import Command
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
+from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.props import load_props
+from katana450.arm.runtime.board import Board, Snapshot
+from katana450.arm.runtime.mailbox import CommandSink
+from katana450.errors import InputError
+from katana450.extensions.export.reachability_file import StoredMap
+from katana450.extensions.importers.meshes import Meshes
+from katana450.extensions.programs.script_files import Scripts
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.server.view.cameras import Cameras, Preset
+from katana450.server.view.ellipsoid import Ellipsoid
+from katana450.server.view.follower import Follower
+from katana450.server.view.gizmo import Gizmo
+from katana450.server.view.looks import Shows
+from katana450.server.view.objects import ObjectsPanel
+from katana450.server.view.paint import PaintNodes
+from katana450.server.view.panel import Panel
+from katana450.server.view.programs import ProgramsPanel, Steering
+from katana450.server.view.reachability import ReachabilityCloud
+from katana450.server.view.scene import Colour, Gap, GhostNodes
+from katana450.server.view.scenery import Scenery
+from katana450.server.view.texts import title
+from katana450.server.view.tint import Tint
+from katana450.server.view.traces import Traces
+
+GHOST_COLOURS: dict[Status, Colour] = {
+    Status.OK: (64, 156, 255),
+    Status.LIMITED: (255, 153, 0),
+    Status.HELD: (234, 88, 12),
+    Status.BLOCKED: (255, 153, 0),
+    Status.PAUSED: (120, 130, 145),
+    Status.HALTED: (230, 45, 45),
+    Status.FAULT: (230, 45, 45),
+}
+
+GHOST_OPACITY = 0.35
+
+GHOST_FROM = np.deg2rad(0.2)
+"""[rad] The ghost shows while a joint is farther than this from its goal."""
+
+
+@dataclass(frozen=True)
+class Besides:
+    """What is shown besides the arm.
+
+    workspace: a map of it. programs: who runs them, and which there are. meshes: those that things
+    are of.
+    """
+
+    workspace: StoredMap | None = None
+    programs: tuple[Steering, Scripts] | None = None
+    meshes: Meshes = field(default_factory=Meshes)
+
+
+class View(Follower):
+    """Shows each new snapshot to every browser; hands what people do to the mailbox."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: RobotModel,
+        board: Board,
+        mailbox: CommandSink,
+        session: Session,
+        frame_rate: float,
+        besides: Besides | None = None,
+    ) -> None:
+        """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
+        second [Hz].
+
+        Raises ConfigurationError for the map of another arm.
+        """
+        super().__init__(server, board, frame_rate)
+        besides = Besides() if besides is None else besides
+        server.gui.set_panel_label(title(model.name))
+        self._model = model
+        self._mailbox = mailbox
+        props = load_props()
+        self._scenery = Scenery(server, model, session, props, self._put_dragged, besides.meshes)
+        state = board.snapshot.state
+        self._paint = PaintNodes(server, self._scenery.arm)
+        self._tint = Tint(server, model, self._scenery.arm.path, props)
+        self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
+        self._gap = Gap(server)
+        self._traces = Traces(server, model)
+        self._gizmo = Gizmo(server, model, self._put_dragged, lambda: board.snapshot.state)
+        self._ellipsoid = Ellipsoid(server, model)
+        cloud = (
+            None
+            if besides.workspace is None
+            else ReachabilityCloud(server, model, besides.workspace)
+        )
+        self._cameras = Cameras(server, model)
+        shows = Shows(
+            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, cloud
+        )
+        self._goal: FloatArray | None = None
+        self._tool = ""
+        self._T_base_goal = np.eye(4)
+        self._panel = Panel(server, model, mailbox.put, session.choices, shows, state)
+        self._objects = ObjectsPanel(
+            server, mailbox.put, lambda: board.snapshot.state, session.surroundings
+        )
+        self._programs: ProgramsPanel | None = None
+        if besides.programs is not None:
+            steering, scripts = besides.programs
+            self._programs = ProgramsPanel(
+                server, model, steering, scripts, lambda: board.snapshot.state
+            )
+        self.show(board.snapshot)
+
+    def let_go(self) -> None:
+        """Take the handle out of every hand: what is dragged on with it moves nothing."""
+        self._gizmo.let_go()
+        self._scenery.things.let_go()
+
+    def _put_dragged(self, command: Command) -> None:
+        try:
+            self._mailbox.put(command)
+        except InputError:
+            # A drag sends twenty a second; the next one tells the same more truly.
+            return
+
+    def _show_ellipsoid(self, visible: bool) -> None:
+        self._ellipsoid.show(visible, self._board.snapshot.state)
+
+    def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
+        self._cameras.give(client, preset, self._board.snapshot.state)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Send every browser what has changed."""
+        state = snapshot.state
+        with self._server.atomic():
+            self._scenery.show(state)
+            self._paint.follow(state)
+            self._tint.follow(state)
+            self._show_goal(state)
+            self._ellipsoid.follow(state)
+            self._traces.follow(state)
+            self._cameras.follow(state)
+            caught_up = snapshot.ticket == self._mailbox.last_ticket
+            self._panel.follow(state, time.perf_counter(), self._board.ledger, caught_up=caught_up)
+            self._objects.follow(state, caught_up=caught_up)
+            if self._programs is not None:
+                self._programs.follow()
+        self._server.flush()
+
+    def _show_goal(self, state: State) -> None:
+        away = float(np.abs(state.goal - state.q).max()) > GHOST_FROM
+        visible = away or state.status is not Status.OK
+        self._ghost.show(visible, GHOST_COLOURS[state.status])
+        if visible:
+            self._ghost.move(self._model.joint_angles(state.goal, state.gripper_goal))
+        # A goal is never written to: another one is another array.
+        if state.goal is not self._goal or state.tool != self._tool:
+            self._goal, self._tool = state.goal, state.tool
+            chain = self._model.arm.chain_to(state.tool)
+            self._T_base_goal = self._model.T_base_shoulder @ forward(chain, state.goal)
+            self._gizmo.aim(state, self._T_base_goal)
+        self._gizmo.follow()
+        self._gap.show(self._wished(state), self._T_base_goal[:3, 3])
+
+    def _wished(self, state: State) -> FloatArray | None:
+        """The tool point that was wished, (3,) [m] in the base frame, if one was."""
+        match state.target:
+            case ToolTarget(position=position):
+                p = position
+            case PoseTarget(T=T):
+                p = T[:3, 3]
+            case _:
+                return None
+        T_base_shoulder = self._model.T_base_shoulder
+        return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]

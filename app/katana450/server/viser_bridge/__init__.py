@@ -1,0 +1,1 @@
+"""The connection to viser: every use of its private parts is in this package."""

@@ -1,0 +1,162 @@
+"""Every message of a browser to viser is decoded here, and passes or does not.
+
+The shape of each message that our page can send is defined in
+``katana450.server.viser_bridge.guard``. Here is the rest: how large, how often, from whom.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any
+
+import msgspec
+from viser import _messages as wire
+
+from katana450.errors import LeaseError
+from katana450.server.viser_bridge.guard import Guard
+from katana450.server.web.token_bucket import Bucket
+
+log = logging.getLogger(__name__)
+
+LARGEST = 16_384
+"""Bytes of a message: a typed text of 200 characters is the longest there is."""
+
+RATE, BURST = 150.0, 300.0
+"""Messages a second, and at once. viser's page sends each kind at most 20 times a second."""
+
+PATIENCE, FORGIVEN = 100.0, 1.0
+"""Bad messages until their sender is closed, and how many a second are forgotten."""
+
+NO_MESSAGE = 25.0
+"""A message that cannot even be read counts as this many."""
+
+SEEN = "Seen"
+"""What our script says of frames on the screen, on the same line; not for viser."""
+
+DRAGGING = (wire.TransformControlsUpdateMessage, wire.TransformControlsDragEndMessage)
+
+TOLD = 20
+"""Bad messages of one browser that are logged one by one; a flood must not fill the log."""
+
+
+class Ruling(Enum):
+    """What becomes of a message."""
+
+    PASS = auto()
+    DROP = auto()
+    CLOSE = auto()
+    """It is dropped, and its sender is to be closed."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """On one message.
+
+    Attributes:
+        ruling: what becomes of it.
+        corrections: viser messages for the sender alone, which put its window right again.
+        refusal: why its person may not move the arm just now; no fault of theirs.
+        seen: how many frames are on the screen, where the message was about that.
+    """
+
+    ruling: Ruling
+    corrections: tuple[Any, ...] = ()
+    refusal: str | None = None
+    seen: int | None = None
+
+
+class Firewall:
+    """In front of viser, for one connection."""
+
+    def __init__(
+        self,
+        guard: Guard,
+        who: str,
+        drags: set[str],
+        drive: Callable[[], None],
+        steer: Callable[[], None],
+        pace: Callable[[], None],
+        t: float,
+    ) -> None:
+        """``drive`` raises a LeaseError when its person must not move the arm at this moment,
+        ``steer`` when they must not tell a program what to do, ``pace`` when they must not pause,
+        resume or slow down what moves.
+
+        ``who``: for the log. ``drags``: the gizmos it holds; whoever empties it ends the drags.
+        """
+        self._guard = guard
+        self._who = who
+        self._drags = drags
+        self._drive = drive
+        self._steer = steer
+        self._pace = pace
+        self._flood = Bucket(RATE, BURST, t)
+        self._patience = Bucket(FORGIVEN, PATIENCE, t)
+        self.dropped: Counter[str] = Counter()
+        """Bad messages by their type."""
+
+    def judge(self, data: bytes | None, t: float) -> Verdict:
+        """Of a message that came at ``t`` [s]; ``data`` is None for one of text."""
+        if not self._flood.take(t):
+            return self._drop("flood", "it comes too fast", t)
+        if data is None or len(data) > LARGEST:
+            return self._drop("none", "it is too long or no bytes", t, NO_MESSAGE)
+        seen = _seen(data)
+        if seen is not None:
+            return Verdict(Ruling.DROP, seen=seen)
+        try:
+            message = wire.Message.deserialize(data)
+        except Exception as error:
+            # Whatever viser's decoder stumbles over is not for it.
+            return self._drop("none", f"it cannot be read ({type(error).__name__})", t, NO_MESSAGE)
+        objection = self._guard.objection(message)
+        if objection is not None:
+            return self._drop(type(message).__name__, objection, t)
+        if not self._guard.drives(message):
+            return Verdict(Ruling.PASS)
+        if isinstance(message, DRAGGING) and message.name not in self._drags:
+            # Its beginning was refused, or it was ended here while the hand went on.
+            return Verdict(Ruling.DROP, tuple(self._guard.correction(message)))
+        try:
+            self._check_may(message)
+        except LeaseError as refusal:
+            corrections = tuple(self._guard.correction(message))
+            return Verdict(Ruling.DROP, corrections, refusal=str(refusal))
+        if isinstance(message, wire.TransformControlsDragStartMessage):
+            self._drags.add(message.name)
+        elif isinstance(message, wire.TransformControlsDragEndMessage):
+            self._drags.discard(message.name)
+        return Verdict(Ruling.PASS)
+
+    def _check_may(self, message: Any) -> None:
+        if self._guard.steers(message):
+            self._steer()
+        elif self._guard.paces(message):
+            self._pace()
+        else:
+            self._drive()
+
+    def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> Verdict:
+        self.dropped[kind] += 1
+        told = self.dropped.total()
+        if told <= TOLD:
+            log.warning("Dropped a %s of %s: %s.", kind, self._who, objection)
+        if told == TOLD:
+            log.warning("More of %s is dropped without a word.", self._who)
+        patient = self._patience.take(t, weight)
+        return Verdict(Ruling.DROP if patient else Ruling.CLOSE)
+
+
+def _seen(data: bytes) -> int | None:
+    try:
+        message = msgspec.msgpack.decode(data)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    match message:
+        case {"type": str(kind), "count": int(count), **rest} if kind == SEEN and not rest:
+            return count
+    return None

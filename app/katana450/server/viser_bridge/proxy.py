@@ -1,0 +1,243 @@
+"""One browser's way to viser and back."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from contextlib import suppress
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
+
+from katana450.errors import LeaseError
+from katana450.server.service.hub import Hub, key_of
+from katana450.server.viser_bridge.flow import Flow
+from katana450.server.viser_bridge.frames import HATCH_HEADER, Hatch
+from katana450.server.viser_bridge.guard import Guard
+from katana450.server.viser_bridge.message_filter import Firewall, Ruling, Verdict
+from katana450.server.viser_bridge.viser_server import KEY_HEADER
+from katana450.server.web.authenticator import NOT_YOU, Door, Visitor
+from katana450.server.web.control_socket import PAGE
+from katana450.server.web.places import Places
+
+log = logging.getLogger(__name__)
+
+SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
+
+PICTURES = 1000.0
+"""A second, that go to all browsers together: what a core can send them. A crowd shares them; who
+drives is not asked to."""
+
+FRAME = 1.0 / 60.0
+"""[s] Pictures come no faster anyway."""
+
+LOOK_AGAIN = 0.1
+"""[s] How soon a browser that is behind is looked at again, should it say nothing."""
+
+BROWSERS, BROWSERS_EACH = 64, 16
+"""Browsers that are shown the scene at one time, and those of one identity."""
+
+REFUSALS_EVERY = 0.5
+"""[s] A person who drags what is not theirs is told so, but not twenty times a second."""
+
+
+class Proxy:
+    """Joins browsers to viser, each by a connection of its own."""
+
+    def __init__(self, hub: Hub, door: Door, guard: Guard, port: int, key: str) -> None:
+        """``port`` of viser on this machine, and the ``key`` to it."""
+        self._hub = hub
+        self._door = door
+        self._guard = guard
+        self._port = port
+        self._key = key
+        self._places = Places(BROWSERS, BROWSERS_EACH)
+
+    async def serve(self, browser: WebSocket) -> None:
+        """Answer a request for viser's socket."""
+        visitor = self._door.visitor(browser.cookies)
+        if visitor is None or SUBPROTOCOL not in browser.scope["subprotocols"]:
+            await browser.close(1008)
+            return
+        with self._places.taken(visitor.session) as free:
+            if free:
+                await self._serve(browser, visitor)
+            else:
+                await browser.close(1013)
+
+    async def _serve(self, browser: WebSocket, visitor: Visitor) -> None:
+        page = browser.query_params.get("page", "")
+        # Without our page around it viser can be looked at, and no more.
+        key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
+        hatch = Hatch()
+        try:
+            async with connect(
+                f"ws://127.0.0.1:{self._port}",
+                subprotocols=[SUBPROTOCOL],
+                additional_headers={KEY_HEADER: self._key, HATCH_HEADER: hatch.name},
+                user_agent_header=None,
+                compression=None,
+                max_size=None,
+                max_queue=1,
+                ping_interval=None,
+            ) as upstream:
+                await browser.accept(SUBPROTOCOL)
+                line = _Line(self._hub, self._guard, browser, upstream, hatch, key)
+                if not await self._door.while_welcome(
+                    lambda: self._door.visitor(browser.cookies), line.run()
+                ):
+                    await browser.close(NOT_YOU, "Your link is no good any more.")
+        except OSError as error:
+            log.warning("viser does not answer: %s", str(error) or type(error).__name__)
+            # Who has left meanwhile needs no farewell.
+            with suppress(WebSocketDisconnect, RuntimeError):
+                await browser.close(1013)
+
+
+class _Line:
+    """Between one browser and viser."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        guard: Guard,
+        browser: WebSocket,
+        upstream: ClientConnection,
+        hatch: Hatch,
+        key: str,
+    ) -> None:
+        self._hub = hub
+        self._hatch = hatch
+        self._browser = browser
+        self._upstream = upstream
+        self._key = key
+        self._flow = Flow()
+        self._room = asyncio.Event()
+        self._sending = asyncio.Lock()
+        self._drags: set[str] = set()
+        self._told_at = float("-inf")
+        self._due = float("-inf")
+        self._unwelcome = False
+        window = hub.window(key)
+        who = window.person.name if window is not None else "a window without our page"
+        may = self._drive, self._steer, self._pace
+        self._firewall = Firewall(guard, who, self._drags, *may, hub.clock())
+
+    async def run(self) -> None:
+        """Until either side closes."""
+        self._hub.show(self._key, self._flow, self._drags)
+        ways = (self._down(), self._up(), self._upstream.wait_closed())
+        tasks = [asyncio.create_task(way) for way in ways]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                with suppress(ConnectionClosed, WebSocketDisconnect, WebSocketDisconnected):
+                    task.result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            # A farewell would wait behind pictures that nobody fetches any more.
+            self._upstream.transport.abort()
+            self._hub.hide(self._flow)
+        # Only now, or a picture could come after it.
+        if self._unwelcome:
+            with suppress(WebSocketDisconnect, WebSocketDisconnected):
+                await self._browser.close(1008)
+
+    async def _down(self) -> None:
+        """Pictures, as fast as the browser sees them."""
+        while True:
+            await self._send(await self._hatch.take())
+            await asyncio.sleep(self._pause(self._hub.clock()))
+            await self._wait_for_room()
+
+    async def _wait_for_room(self) -> None:
+        while not self._flow.has_room(self._hub.clock()):
+            self._room.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LOOK_AGAIN):
+                    await self._room.wait()
+
+    def _pause(self, t: float) -> float:
+        """[s] Before the next picture, so that a crowd leaves time for whoever drives."""
+        holder = self._hub.lease.holder
+        share = self._hub.watching / PICTURES
+        if share <= FRAME or (holder is not None and holder.key == self._key):
+            return 0.0
+        self._due = max(self._due + share, t)
+        return self._due - t
+
+    async def _up(self) -> None:
+        """What the firewall lets pass."""
+        while True:
+            # One message a turn of the loop, as in a conversation.
+            await asyncio.sleep(0)
+            message = await self._browser.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            data = message.get("bytes")
+            verdict = self._firewall.judge(data, self._hub.clock())
+            if verdict.ruling is Ruling.PASS and data is not None:
+                await self._upstream.send(data)
+            elif verdict.ruling is Ruling.CLOSE or not await self._answer(verdict):
+                log.warning("Closed a browser that sent too much that no page sends.")
+                self._unwelcome = True
+                return
+
+    async def _answer(self, verdict: Verdict) -> bool:
+        """To a message that stays here; False for one that lies."""
+        if verdict.seen is not None:
+            self._room.set()
+            return self._flow.seen(verdict.seen, self._hub.clock())
+        if verdict.corrections:
+            await self._send(_frame(verdict.corrections))
+        window = self._hub.window(self._key)
+        t = self._hub.clock()
+        if verdict.refusal and window is not None and t - self._told_at >= REFUSALS_EVERY:
+            self._told_at = t
+            window.tell({"is": "refused", "why": verdict.refusal})
+        return True
+
+    async def _send(self, frame: bytes) -> None:
+        async with self._sending:
+            await self._browser.send_bytes(frame)
+            self._flow.sent(len(frame), self._hub.clock())
+
+    def _drive(self) -> None:
+        if not self._key:
+            raise LeaseError("Open the front page to drive the arm.")
+        self._hub.drive(self._key)
+
+    def _pace(self) -> None:
+        window = self._hub.window(self._key)
+        if window is None:
+            raise LeaseError("Open the front page to drive the arm.")
+        self._hub.drive(self._hub.performer.actor(window).person.key)
+
+    def _steer(self) -> None:
+        window = self._hub.window(self._key)
+        if window is None:
+            raise LeaseError("Open the front page to run programs.")
+        self._hub.performer.touch(window)
+
+
+def _frame(messages: tuple[Any, ...]) -> bytes:
+    """As viser sends them: two sizes, and compressed msgpack."""
+    packed = msgspec.msgpack.encode(
+        {
+            "messages": [message.as_serializable_dict([]) for message in messages],
+            "timestampSec": time.perf_counter(),
+            "binaryBufferLengths": (),
+        }
+    )
+    compressed = zstandard.ZstdCompressor(level=1).compress(packed)
+    sizes = len(packed).to_bytes(8, "little") + len(compressed).to_bytes(8, "little")
+    return sizes + compressed

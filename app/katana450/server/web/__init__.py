@@ -1,0 +1,1 @@
+"""The HTTP server: routes, authentication, limits, and the sockets of pages and programs."""

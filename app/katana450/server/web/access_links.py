@@ -1,0 +1,148 @@
+"""Access links: who was given one, for how long, and the secret that signs them.
+
+All of it is in one file that its owner alone can read. A link holds a signed token with a number
+and an expiry; what the number stands for is in the file, so striking it out there ends it at once.
+"""
+
+from __future__ import annotations
+
+import logging
+import secrets
+import stat
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+from itsdangerous import BadSignature, URLSafeSerializer
+
+from katana450.arm.control.lease import Role
+from katana450.atomic import write_files, writer_of
+from katana450.errors import ConfigurationError, InputError
+
+log = logging.getLogger(__name__)
+
+SALT = "katana450 access link"
+LONGEST_NAME = 40
+LONGEST_TOKEN = 400
+
+
+class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What one link is good for. ``expires``: seconds since the epoch."""
+
+    name: str
+    role: Role
+    expires: float
+
+
+class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    secret: str
+    grants: dict[str, Grant]
+
+
+@dataclass
+class AccessFile:
+    """The links that were given out; read again whenever the file has changed.
+
+    A file that cannot be read any more while it is in use takes nobody's link away.
+    """
+
+    path: Path
+    _failure: str | None = field(default=None, repr=False)
+    _read_at: tuple[int, int, int] | None = field(default=None, repr=False)
+    _content: _Content = field(default_factory=lambda: _Content("", {}), repr=False)
+
+    @classmethod
+    def open(cls, path: Path) -> AccessFile:
+        """Of a file that is there. Raises ConfigurationError with what to do about it."""
+        file = cls(path)
+        file._refresh()
+        return file
+
+    @classmethod
+    def create(cls, path: Path) -> AccessFile:
+        """Likewise; made with a new secret if it is not there."""
+        if not path.exists():
+            cls(path)._write(_Content(secrets.token_urlsafe(32), {}))
+        return cls.open(path)
+
+    @property
+    def grants(self) -> dict[str, Grant]:
+        """By number, those that have expired too."""
+        self._refresh()
+        return dict(self._content.grants)
+
+    def give(self, name: str, role: Role, expires: float) -> str:
+        """A token for a new link, good until ``expires`` [s since the epoch]."""
+        if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
+            raise InputError(f"A name has 1 to {LONGEST_NAME} characters that can be printed.")
+        self._refresh()
+        number = secrets.token_hex(8)
+        grants = self._content.grants | {number: Grant(name, role, expires)}
+        self._write(_Content(self._content.secret, grants))
+        return str(self._signer().dumps([number, expires]))
+
+    def revoke(self, number: str) -> Grant:
+        """Strike a link out. Raises InputError when there is none of that number."""
+        grants = self.grants
+        if number not in grants:
+            raise InputError(f"There is no link {number!r}; `katana450 access list` shows them.")
+        grant = grants.pop(number)
+        self._write(_Content(self._content.secret, grants))
+        return grant
+
+    def check(self, token: str, now: float) -> tuple[str, Grant] | None:
+        """The number and grant of a token that is good at ``now`` [s since the epoch], or None."""
+        if len(token) > LONGEST_TOKEN:
+            return None
+        self._refresh_or_keep()
+        try:
+            # itsdangerous compares signatures in constant time.
+            payload = self._signer().loads(token)
+            number, expires = msgspec.convert(payload, tuple[str, float])
+        except (BadSignature, msgspec.ValidationError):
+            return None
+        grant = self._content.grants.get(number)
+        if grant is None or not now < min(expires, grant.expires):
+            return None
+        return number, grant
+
+    def _signer(self) -> URLSafeSerializer:
+        return URLSafeSerializer(self._content.secret, salt=SALT)
+
+    def _refresh_or_keep(self) -> None:
+        """Read the file again; while that fails the last good links count, which is logged once."""
+        try:
+            self._refresh()
+        except ConfigurationError as error:
+            if self._failure != str(error):
+                self._failure = str(error)
+                log.error("The last good links count until this is mended. %s", error)
+        else:
+            self._failure = None
+
+    def _refresh(self) -> None:
+        try:
+            about = self.path.stat()
+        except OSError as error:
+            raise ConfigurationError(
+                f"The access file {self.path} cannot be read: {error.strerror}. "
+                "`katana450 access give --file PATH` makes one."
+            ) from error
+        read_at = (about.st_mtime_ns, about.st_size, about.st_ino)
+        if read_at == self._read_at:
+            return
+        if stat.S_IMODE(about.st_mode) & 0o077:
+            raise ConfigurationError(
+                f"Others can read the access file {self.path}: chmod 600 {self.path}, and if "
+                "somebody may have read it, delete it and give new links."
+            )
+        try:
+            self._content = msgspec.json.decode(self.path.read_bytes(), type=_Content)
+        except (OSError, msgspec.MsgspecError) as error:
+            raise ConfigurationError(f"{self.path} is not an access file: {error}") from error
+        self._read_at = read_at
+
+    def _write(self, content: _Content) -> None:
+        data = msgspec.json.format(msgspec.json.encode(content), indent=1) + b"\n"
+        write_files({self.path: writer_of(data)}, mode=0o600)
+        self._refresh()

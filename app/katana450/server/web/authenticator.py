@@ -1,0 +1,171 @@
+"""Who stands at the door: the same machine's people without a word, others by their links."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from ipaddress import ip_address
+from typing import Any
+from urllib.parse import urlsplit
+
+from katana450.arm.control.lease import Role
+from katana450.errors import ConfigurationError
+from katana450.server.web.access_links import LONGEST_NAME, AccessFile
+
+SESSION_SIZE = 22
+"""Characters of a session's name: 16 random bytes."""
+
+CHECK_EVERY = 1.0
+"""[s] Between two looks at whether somebody is still welcome."""
+
+NOT_YOU = 4401
+"""Close code for who must come in (again) by the front page."""
+
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
+
+
+@dataclass(frozen=True)
+class Visitor:
+    """Somebody who may come in. ``session`` tells browsers apart; ``name`` is that of the link."""
+
+    session: str
+    name: str | None
+    role: Role
+
+
+@dataclass(frozen=True)
+class Address:
+    """Under which names the server may be spoken to.
+
+    Attributes:
+        names: host names besides bare addresses of this machine.
+        any_address: whether a bare address is one of ours; not so on loopback alone.
+        secure: whether the server speaks TLS itself.
+        public: origin of a reverse proxy in front, such as ``https://arm.example.org``.
+    """
+
+    names: frozenset[str]
+    any_address: bool
+    secure: bool
+    public: str | None = None
+
+    @property
+    def cookies_are_secure(self) -> bool:
+        return self.secure or (self.public or "").startswith("https:")
+
+    def is_ours(self, host: str) -> bool:
+        """Whether ``host``, of a Host header, names this server.
+
+        A page on the web can point a name of its own here, and would then count as our origin.
+        """
+        if self.public is not None and host.lower() == urlsplit(self.public).netloc:
+            return True
+        try:
+            name = (urlsplit(f"//{host}").hostname or "").lower()
+        except ValueError:
+            return False
+        if name in self.names:
+            return True
+        try:
+            ip_address(name)
+        except ValueError:
+            return False
+        return self.any_address
+
+    def is_our_page(self, origin: str, host: str) -> bool:
+        """Whether ``origin``, of an Origin header, is our own page's, asked for at ``host``."""
+        scheme = "https" if self.secure else "http"
+        return origin in (f"{scheme}://{host}", self.public)
+
+
+def public_origin(url: str) -> str:
+    """The origin of ``url``. Raises ConfigurationError when it is none."""
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.path not in ("", "/"):
+        raise ConfigurationError(
+            f"A public address looks like https://arm.example.org, not {url!r}."
+        )
+    return f"{parts.scheme}://{parts.netloc.lower()}"
+
+
+class Door:
+    """Knows visitors by their cookies."""
+
+    def __init__(self, access: AccessFile | None, port: int, address: Address) -> None:
+        """Without ``access`` everyone who can reach the port may do everything."""
+        self._access = access
+        self._secure = address.cookies_are_secure
+        # Cookies do not tell ports apart.
+        self._cookie = f"katana450-{port}"
+
+    @property
+    def asks(self) -> bool:
+        """Whether one needs a link."""
+        return self._access is not None
+
+    def visitor(self, cookies: Mapping[str, str]) -> Visitor | None:
+        """Who sends these cookies, if they may come in."""
+        value = cookies.get(self._cookie, "")
+        if self._access is not None:
+            known = self._access.check(value, time.time())
+            return None if known is None else Visitor(known[0], known[1].name, known[1].role)
+        if len(value) != SESSION_SIZE:
+            return None
+        return Visitor(value, None, Role.ADMIN)
+
+    def program(
+        self, name: str, authorization: str = "", cookies: Mapping[str, str] | None = None
+    ) -> Visitor | None:
+        """Who sends this Authorization header or these cookies, if they may come in.
+
+        ``name``: what the program calls itself; behind that of the link where one is asked for.
+        """
+        name = name if name.isprintable() and 0 < len(name) <= LONGEST_NAME else "Program"
+        if self._access is None:
+            return Visitor(secrets.token_urlsafe(16), name, Role.ADMIN)
+        scheme, _, token = authorization.partition(" ")
+        if scheme.lower() == "bearer":
+            known = self._access.check(token.strip(), time.time())
+            found = None if known is None else Visitor(known[0], known[1].name, known[1].role)
+        else:
+            found = self.visitor(cookies or {})
+        return None if found is None else replace(found, name=f"{found.name}, {name}")
+
+    async def while_welcome(
+        self, visitor: Callable[[], Visitor | None], work: Coroutine[Any, Any, None]
+    ) -> bool:
+        """Do ``work`` as long as there is a ``visitor``; whether it came to its own end."""
+        task = asyncio.create_task(work)
+        try:
+            while True:
+                done, _ = await asyncio.wait([task], timeout=CHECK_EVERY)
+                if done:
+                    await task
+                    return True
+                if visitor() is None:
+                    return False
+        finally:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+
+    def welcome(self, token: str) -> str | None:
+        """A Set-Cookie header for the bearer of ``token``, or None for who is not let in."""
+        if self._access is None:
+            return self._set(secrets.token_urlsafe(16))
+        known = self._access.check(token, time.time())
+        if known is None:
+            return None
+        return self._set(token, max_age=int(known[1].expires - time.time()))
+
+    def _set(self, value: str, max_age: int | None = None) -> str:
+        parts = [f"{self._cookie}={value}", "Path=/", "HttpOnly", "SameSite=Strict"]
+        if max_age is not None:
+            parts.append(f"Max-Age={max_age}")
+        if self._secure:
+            parts.append("Secure")
+        return "; ".join(parts)

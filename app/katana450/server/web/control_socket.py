@@ -1,0 +1,82 @@
+"""The page's own socket: STOP, signs of life, the lease, jogging and knobs up, the status down.
+
+States come down only as they are asked for, a few at a time, so a slow line has no backlog of them.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from starlette.websockets import WebSocket
+
+from katana450.server.api import requests
+from katana450.server.service import status
+from katana450.server.service.budget import Budget, Budgets
+from katana450.server.service.hub import Hub, Window
+from katana450.server.web.authenticator import NOT_YOU, Door
+from katana450.server.web.channel import Conversation, Line, SocketLine
+from katana450.server.web.token_bucket import Bucket
+
+PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
+"""The name a page gives itself; nobody else can guess it."""
+
+RATE, BURST = 160.0, 320.0
+"""Requests a second, and at once: ten signs of life, 25 jogs, 30 looks, and hands on knobs and
+buttons."""
+
+PUSH_EVERY = 0.1
+"""[s] Between two looks at whether there is news."""
+
+BAD_AT_MOST = 4
+"""Requests that are none; at one more the socket is closed."""
+
+
+class ControlSocket(Conversation):
+    """One page's: it is told what is new of the status, on a slow line less often."""
+
+    def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
+        t = hub.clock()
+        super().__init__(
+            hub, line, budget, often=Bucket(RATE, BURST, t), bad=Bucket(0.0, BAD_AT_MOST, t)
+        )
+        self._told: dict[str, Any] = {}
+        self._looked_at = float("-inf")
+        self.window: Window | None = None
+
+    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+        super().answer(window, request)
+        if isinstance(request, requests.Stop):
+            self.tell({"is": "stopping"})
+        if not isinstance(request, requests.Beat | requests.Jog):
+            self.wake()
+
+    def unasked(self) -> tuple[Any, float | None]:
+        t = self.hub.clock()
+        if self.window is None or t - self._looked_at < PUSH_EVERY / 2:
+            return None, PUSH_EVERY
+        self._looked_at = t
+        now = status.common(self.hub) | status.of(self.hub, self.window)
+        news = {key: value for key, value in now.items() if self._told.get(key, self) != value}
+        if not news:
+            return None, PUSH_EVERY
+        self._told = now
+        return {"is": "status", **news}, PUSH_EVERY
+
+
+async def serve(hub: Hub, door: Door, budgets: Budgets, socket: WebSocket) -> None:
+    """Answer a request for a control socket."""
+    visitor = door.visitor(socket.cookies)
+    page = socket.query_params.get("page", "")
+    await socket.accept()
+    if visitor is None or not PAGE.fullmatch(page):
+        await socket.close(NOT_YOU, "Come in by the front page.")
+        return
+    line = SocketLine(socket)
+    control = ControlSocket(hub, line, budgets.of(visitor.session))
+    control.window = window = hub.join(visitor, page, control.tell, line.arrival)
+    try:
+        if not await door.while_welcome(lambda: door.visitor(socket.cookies), control.run(window)):
+            await line.close(NOT_YOU, "Your link is no good any more.")
+    finally:
+        hub.leave(window)

@@ -1,0 +1,167 @@
+"""The API over HTTP: what can be read, STOP, and single requests of a program that keeps asking."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import re
+from collections.abc import Awaitable, Callable
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from katana450.arm.control.lease import LOST_AFTER
+from katana450.errors import InputError, LeaseError
+from katana450.server.api import answers, requests, schema
+from katana450.server.api.fields import ROOT, Id
+from katana450.server.service.budget import FIXED_HTTP, Budget, Budgets, BusyError
+from katana450.server.service.dispatcher import Desk, driver_key
+from katana450.server.service.hub import Hub, Window
+from katana450.server.web import program_socket as program
+from katana450.server.web.admission import address_of, identity
+from katana450.server.web.authenticator import Door, Visitor
+from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
+from katana450.server.web.uploads import Uploads
+
+log = logging.getLogger(__name__)
+
+QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "links")
+"""Each is a path of its own."""
+
+PROGRAM = re.compile(r"[A-Za-z0-9_-]{16,64}")
+"""The key of a program that asks by POST: whoever knows it speaks for the program, so nobody else
+is shown it. The name that others see is in NAME."""
+
+KEY, NAME = "x-program", "x-name"
+"""Headers of the key and the name of a program."""
+
+TOO_SOON = 503
+
+LONGEST_PAUSE = 0.5
+"""[s] Before too frequent a request is refused."""
+
+
+class Api:
+    """Its routes."""
+
+    def __init__(self, hub: Hub, door: Door, budgets: Budgets) -> None:
+        self._hub = hub
+        self._budgets = budgets
+        self._door = door
+        self._desk = Desk(hub)
+        self._uploads = Uploads(hub, door, self._visitor)
+        self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
+
+    def routes(self) -> list[BaseRoute]:
+        """All of them."""
+
+        async def described(_request: Request) -> Response:
+            return Response(schema.openapi_json(), media_type="application/json")
+
+        async def socket(socket: WebSocket) -> None:
+            await program.serve_socket(self._hub, self._door, self._budgets, socket)
+
+        return [
+            *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
+            Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
+            Route(f"{ROOT}/do", self._do, methods=["POST"]),
+            *self._uploads.routes(),
+            Route(f"{ROOT}/openapi.json", described),
+            WebSocketRoute(f"{ROOT}/socket", socket),
+        ]
+
+    def _read(self, at: str) -> Callable[[Request], Awaitable[Response]]:
+        async def read(request: Request) -> Response:
+            visitor, driver = self._visitor(request), ""
+            if self._key(request, visitor) in self._posting:
+                # A program that looks is alive; a stranger's look is nothing.
+                window = self._window(request, visitor)
+                driver = driver_key(self._hub, window)
+                self._hub.beat(window)
+            try:
+                with self._budget(request).charged(driver, fixed=FIXED_HTTP):
+                    return as_json(self._desk.look(at))
+            except LeaseError as error:
+                raise HTTPException(TOO_SOON, str(error)) from error
+            except BusyError as error:
+                return await _too_much(error)
+            except InputError as error:
+                return as_json(answers.Refused(why=str(error)), NOT_NOW)
+
+        return read
+
+    async def _stop(self, request: Request) -> Response:
+        self._hub.stop(self._visitor(request).name or "Somebody")
+        return Response(status_code=204)
+
+    async def _do(self, request: Request) -> Response:
+        visitor = self._visitor(request)
+        if not PROGRAM.fullmatch(request.headers.get(KEY, "")):
+            why = (
+                "A header X-Program with a key of 16 to 64 letters and digits of your own tells "
+                "you apart. Keep it to yourself; X-Name has the name that others see."
+            )
+            return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
+        body = await body_of(request, requests.LARGEST)
+        try:
+            asked = requests.decoded(body)
+            if isinstance(asked, requests.Hello | requests.Watch):
+                raise InputError("That is for a connection that lasts: the socket or the TCP port.")
+            window = self._window(request, visitor)
+            return as_json(self._desk.do(window, asked, self._budget(request)))
+        except BusyError as error:
+            return await _too_much(error, requests.id_of(body))
+        except InputError as error:
+            refused = answers.Refused(why=str(error), id=requests.id_of(body))
+            return as_json(refused, NOT_UNDERSTOOD)
+        except LeaseError as error:
+            return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
+
+    def _budget(self, request: Request) -> Budget:
+        return self._budgets.of(identity(self._door, request) or address_of(request))
+
+    def _visitor(self, request: Request) -> Visitor:
+        headers = request.headers
+        visitor = self._door.program(
+            headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
+        )
+        if visitor is None:
+            raise HTTPException(401, "A token is asked for; `katana450 access give` makes one.")
+        return visitor
+
+    def _window(self, request: Request, visitor: Visitor) -> Window:
+        """That of the program that asks; it closes when nothing is heard of it for a while."""
+        key = self._key(request, visitor)
+        known = self._posting.pop(key, None)
+        if known is None:
+            session, _, page = key.partition("/")
+            visitor = Visitor(session, visitor.name, visitor.role)
+            window = self._hub.join(visitor, page, lambda _notice: None)
+            assert window.person.key == key
+        else:
+            window, timer = known
+            timer.cancel()
+        timer = asyncio.get_running_loop().call_later(LOST_AFTER, self._forget, key)
+        self._posting[key] = (window, timer)
+        return window
+
+    def _key(self, request: Request, visitor: Visitor) -> str:
+        """What ties the requests of one program together."""
+        session = visitor.session if self._door.asks else "programs"
+        return f"{session}/{request.headers.get(KEY, '')}"
+
+    def _forget(self, key: str) -> None:
+        window, _ = self._posting.pop(key)
+        self._hub.leave(window, for_good=True)
+
+
+async def _too_much(error: BusyError, id: Id = None) -> Response:
+    # Who asks again at once is slowed down; STOP comes by another route.
+    await asyncio.sleep(min(error.retry, LONGEST_PAUSE))
+    answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)
+    answer.headers["Retry-After"] = str(math.ceil(error.retry))
+    return answer

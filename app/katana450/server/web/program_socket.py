@@ -1,0 +1,265 @@
+"""Programs that speak to the server: on a websocket, or a line of JSON at a time on a TCP port."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import secrets
+import socket
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, nullcontext, suppress
+from typing import Any
+
+import msgspec
+from starlette.websockets import WebSocket
+
+from katana450.arm.control.lease import BEAT
+from katana450.errors import InputError
+from katana450.server.api import answers, requests
+from katana450.server.service import serialize as tell
+from katana450.server.service.budget import Budget, Budgets, BusyError
+from katana450.server.service.dispatcher import driver_key
+from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.hub import Hub, Window
+from katana450.server.service.interfaces import Arm
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.admission import address_of, identity, refuse
+from katana450.server.web.authenticator import NOT_YOU, Door, Visitor
+from katana450.server.web.channel import NONSENSE, Conversation, GoneError, Line, SocketLine
+from katana450.server.web.places import Places
+from katana450.server.web.token_bucket import Bucket
+
+log = logging.getLogger(__name__)
+
+RATE, BURST = 400.0, 800.0
+"""Requests a second, and at once: a stream of joint angles may come quicker than the arm ticks."""
+
+MISTAKES, FORGIVEN = 20, 1.0
+"""Requests that are none: so many at once, and so many more a second."""
+
+COMPLAINED_EVERY = 5.0
+"""[s] Between two words to a program that watches more than its budget allows."""
+
+HELLO_SECONDS = 5.0
+"""[s] A line that says nothing for so long is closed."""
+
+UNSENT = 4096
+"""Bytes that may wait to be sent: a state or two, so that what is told is new."""
+
+LINES, LINES_EACH = 16, 8
+"""TCP connections at a time, of everybody together and of one identity."""
+
+
+TOO_MUCH_ASKED = "Too much is asked by your programs together. Wait a moment, and ask less often."
+
+
+class Program(Conversation):
+    """One program's: it is told the state as often as it wants."""
+
+    def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
+        t = hub.clock()
+        often, bad = Bucket(RATE, BURST, t), Bucket(FORGIVEN, MISTAKES, t)
+        super().__init__(hub, line, budget, often=often, bad=bad)
+        self._window: Window | None = None
+        self._complained = -math.inf
+        self._period: float | None = None
+        self._due = 0.0
+        self._watched: tuple[requests.Named, ...] = ()
+
+    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+        if isinstance(request, requests.Watch):
+            if request.fields:
+                arm = self.hub.present()
+                arm.nodes.read(arm.state, request.fields)
+            self._watched = request.fields
+            self._period = 1.0 / request.hz if request.hz > 0.0 else None
+            self._due = self.hub.clock()
+        super().answer(window, request)
+        self.wake()
+
+    def unasked(self) -> tuple[Any, float | None]:
+        if self._period is None or self.hub.arm is None:
+            return None, self._period
+        t = self.hub.clock()
+        if t < self._due:
+            return None, self._due - t
+        self._due = max(self._due + self._period, t)
+        driver = "" if self._window is None else driver_key(self.hub, self._window)
+        try:
+            with self.budget.charged(driver):
+                return self._state(self.hub.arm), self._due - t
+        except BusyError as error:
+            self._due = max(self._due, t + error.retry)
+            if t - self._complained < COMPLAINED_EVERY:
+                return None, self._due - t
+            self._complained = t
+            why = f"States come less often than they are watched. {error}"
+            return answers.Refused(why=why, retry=error.retry), self._due - t
+
+    def _state(self, arm: Arm) -> answers.State:
+        """With the fields that are watched; those of a thing that is gone are left out."""
+        now = tell.state(self.hub)
+        values: list[answers.Value] = []
+        for each in self._watched:
+            with suppress(InputError):
+                values += arm.nodes.read(arm.state, (each,))
+        return msgspec.structs.replace(now, fields=tuple(values))
+
+    def greet(self, window: Window) -> None:
+        """Say who they are here."""
+        self._window, person = window, window.person
+        self.tell(
+            answers.Welcome(
+                name=person.name, number=window.number, role=person.role.value, beat=BEAT
+            )
+        )
+
+
+async def serve_socket(hub: Hub, door: Door, budgets: Budgets, socket: WebSocket) -> None:
+    """Answer a program that asks for a websocket."""
+    name = socket.query_params.get("name", "")
+
+    def visitor() -> Visitor | None:
+        return door.program(name, socket.headers.get("authorization", ""), socket.cookies)
+
+    budget = budgets.of(identity(door, socket) or address_of(socket))
+    if budget.is_exhausted():
+        await refuse(socket, TOO_MUCH_ASKED)
+        return
+    await socket.accept()
+    await _serve(hub, door, budget, SocketLine(socket), visitor)
+
+
+class Lines:
+    """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
+    the connection, so that a page's request, which begins otherwise, gets nowhere."""
+
+    def __init__(self, hub: Hub, door: Door, budgets: Budgets) -> None:
+        self._hub = hub
+        self._door = door
+        self._budgets = budgets
+        self._places = Places(LINES, LINES_EACH)
+        self._acceptor: Acceptor | None = None
+        self._writers: set[asyncio.StreamWriter] = set()
+
+    @asynccontextmanager
+    async def open(self, listening: socket.socket | None) -> AsyncIterator[None]:
+        """Serve whoever connects to ``listening``, if there is one, until this ends."""
+        if listening is None:
+            yield
+            return
+        self._acceptor = Acceptor(listening, LINES)
+        self._acceptor.start(self._protocol)
+        try:
+            yield
+        finally:
+            self._acceptor.close()
+            await self._acceptor.wait_closed()
+            for writer in self._writers:
+                writer.close()
+
+    def _protocol(self) -> asyncio.Protocol:
+        reader = asyncio.StreamReader(limit=requests.LARGEST)
+        return asyncio.StreamReaderProtocol(reader, self.serve)
+
+    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """One connection, to its end."""
+        writer.transport.set_write_buffer_limits(high=UNSENT)
+        line = _TcpLine(reader, writer)
+        self._writers.add(writer)
+        try:
+            hello = await self._hello(line)
+            if hello is not None:
+                await self._converse(line, hello, writer.get_extra_info("peername"))
+        except GoneError:
+            return
+        finally:
+            self._writers.discard(writer)
+            writer.close()
+            with suppress(ConnectionError):
+                await writer.wait_closed()
+
+    async def _converse(
+        self, line: _TcpLine, hello: requests.Hello, client: tuple[str, int]
+    ) -> None:
+        def visitor() -> Visitor | None:
+            return self._door.program(hello.name, f"Bearer {hello.token}")
+
+        found = visitor()
+        session = "" if found is None else found.session
+        # Without links all programs of this machine are one to the budget, but have places enough.
+        budget = self._budgets.of(session if self._door.asks else client[0])
+        acceptor = self._acceptor
+        kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
+        with self._places.taken(session) as free, kept:
+            if free:
+                await _serve(self._hub, self._door, budget, line, visitor)
+            else:
+                why = f"No more than {LINES} programs at a time, and {LINES_EACH} of one link."
+                await line.close(0, why)
+
+    async def _hello(self, line: _TcpLine) -> requests.Hello | None:
+        try:
+            async with asyncio.timeout(HELLO_SECONDS):
+                request = requests.decoded(await line.receive())
+        except TimeoutError:
+            await line.close(0, 'Nothing was said. Begin with {"do": "hello", "name": "..."}.')
+        except InputError as error:
+            await line.close(0, f'{error} Begin with {{"do": "hello", "name": "..."}}.')
+        else:
+            if isinstance(request, requests.Hello):
+                return request
+            await line.close(0, 'Begin with {"do": "hello", "name": "..."}.')
+        return None
+
+
+async def _serve(
+    hub: Hub, door: Door, budget: Budget, line: Line, visitor: Callable[[], Visitor | None]
+) -> None:
+    found = visitor()
+    if found is None:
+        await line.close(NOT_YOU, "A token is asked for; `katana450 access give` makes one.")
+        return
+    program = Program(hub, line, budget)
+    window = hub.join(found, secrets.token_hex(16), program.tell, line.arrival)
+    program.greet(window)
+    try:
+        if not await door.while_welcome(visitor, program.run(window)):
+            await line.close(NOT_YOU, "The token is no good any more.")
+    finally:
+        hub.leave(window, for_good=True)
+
+
+class _TcpLine:
+    """A line of JSON each way, ended by a line feed."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+        self.arrival = Arrival(writer.get_extra_info("socket"))
+
+    async def receive(self) -> str | bytes:
+        try:
+            line = await self._reader.readline()
+        except ConnectionError as error:
+            raise GoneError from error
+        except ValueError as error:
+            # The reader's word for a line that does not end.
+            await self.close(NONSENSE, f"A request has at most {requests.LARGEST} bytes.")
+            raise GoneError from error
+        if not line:
+            raise GoneError
+        return line
+
+    async def send(self, text: str) -> None:
+        try:
+            self._writer.write(text.encode() + b"\n")
+            await self._writer.drain()
+        except ConnectionError as error:
+            raise GoneError from error
+
+    async def close(self, _code: int, why: str) -> None:
+        with suppress(GoneError):
+            await self.send(answers.encoded(answers.Refused(why=why)))
+        self._writer.close()

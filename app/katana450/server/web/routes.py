@@ -1,0 +1,133 @@
+"""The routes: our page, its files, viser behind its firewall, and what programs may ask."""
+
+from __future__ import annotations
+
+import logging
+from urllib.parse import urlsplit
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp
+from starlette.websockets import WebSocket
+
+from katana450.server.api.fields import LONGEST_PRESS
+from katana450.server.service import status
+from katana450.server.service.budget import Budgets
+from katana450.server.service.hub import Hub
+from katana450.server.viser_bridge import viser_page
+from katana450.server.viser_bridge.proxy import Proxy
+from katana450.server.web import control_socket
+from katana450.server.web import security as headers
+from katana450.server.web import static_files as files
+from katana450.server.web.acceptor import Acceptor
+from katana450.server.web.admission import Admission
+from katana450.server.web.authenticator import Address, Door, Visitor
+from katana450.server.web.bodies import body_of
+from katana450.server.web.http_api import Api
+from katana450.server.web.token_bucket import Bucket
+
+log = logging.getLogger(__name__)
+
+LARGEST_BODY = 1024
+"""Bytes of what is sent by POST."""
+
+TRIES, AT_ONCE = 2.0, 20.0
+"""Bad links that are answered a second, and at once, of everybody together."""
+
+
+class _Entry(msgspec.Struct, forbid_unknown_fields=True):
+    token: str
+
+
+def application(
+    hub: Hub, door: Door, budgets: Budgets, proxy: Proxy, address: Address, acceptor: Acceptor
+) -> ASGIApp:
+    """Everything that answers at the port."""
+    static = files.load()
+    index = static.pop("index.html")
+    viser = viser_page.load()
+    viser_file = files.File.of(viser.html, files.TYPES[".html"])
+    page_policy, viser_policy = headers.page_policy(), headers.viser_policy(viser.script_hashes)
+    tries = Bucket(TRIES, AT_ONCE, hub.clock())
+
+    async def page(request: Request) -> Response:
+        return index.answer(request, page_policy)
+
+    async def file(request: Request) -> Response:
+        found = static.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        # A worker is under the policy of its own file.
+        return found.answer(request, page_policy)
+
+    async def viser_index(request: Request) -> Response:
+        _known(door, request)
+        _check_query(request, address)
+        return viser_file.answer(request, viser_policy)
+
+    async def enter(request: Request) -> Response:
+        """Come in: with the token of a link where the door asks for one."""
+        try:
+            entry = msgspec.json.decode(await body_of(request, LARGEST_BODY), type=_Entry)
+        except msgspec.MsgspecError as error:
+            raise HTTPException(400, "A token is asked for.") from error
+        if not entry.token and door.visitor(request.cookies) is not None:
+            return Response(status_code=204)
+        cookie = door.welcome(entry.token)
+        if cookie is None:
+            # Who has a good link is let in, however many others guess.
+            if entry.token and not tries.take(hub.clock()):
+                raise HTTPException(429, "Too many tries. Wait a moment.")
+            log.warning("Somebody came with a link that is no good (any more).")
+            raise HTTPException(401, "This link is no good, or no good any more. Ask for another.")
+        return Response(status_code=204, headers={"Set-Cookie": cookie})
+
+    async def stop(request: Request) -> Response:
+        """The same as the button, for a page whose socket is gone."""
+        visitor = _known(door, request)
+        press = request.query_params.get("press", "")[:LONGEST_PRESS]
+        hub.stop(visitor.name or "Somebody", press or None)
+        return Response(status_code=204)
+
+    async def health(_request: Request) -> Response:
+        wrong = status.health(hub)
+        return PlainTextResponse("ok\n" if wrong is None else f"{wrong}\n", 503 if wrong else 200)
+
+    async def control(socket: WebSocket) -> None:
+        await control_socket.serve(hub, door, budgets, socket)
+
+    routes = [
+        Route("/", page),
+        Route("/static/{name:path}", file),
+        Route("/viser/", viser_index),
+        Route("/enter", enter, methods=["POST"]),
+        Route("/stop", stop, methods=["POST"]),
+        Route("/health", health),
+        WebSocketRoute("/viser", proxy.serve),
+        WebSocketRoute("/control", control),
+        *Api(hub, door, budgets).routes(),
+    ]
+    admission = Admission(Starlette(routes=routes), door, acceptor)
+    return headers.Threshold(admission, address)
+
+
+def _known(door: Door, request: Request) -> Visitor:
+    visitor = door.visitor(request.cookies)
+    if visitor is None:
+        raise HTTPException(401, "Come in by the front page.")
+    return visitor
+
+
+def _check_query(request: Request, address: Address) -> None:
+    """viser's page would run what any server named here sends it."""
+    if "playbackPath" in request.query_params:
+        raise HTTPException(400, "Recordings are not played here.")
+    for url in request.query_params.getlist("websocket"):
+        scheme = "wss:" if address.cookies_are_secure else "ws:"
+        parts = urlsplit(url)
+        if f"{parts.scheme}:" != scheme or parts.netloc != request.headers["host"]:
+            raise HTTPException(400, "The page may speak to this server alone.")

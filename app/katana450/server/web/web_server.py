@@ -1,0 +1,252 @@
+"""The front door, running: a thread of its own with the only port that others can reach."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import socket
+import ssl
+import threading
+import time
+from asyncio import BaseTransport, Transport
+from contextlib import suppress
+from http import HTTPStatus
+from typing import Any, cast
+
+import uvicorn
+import viser
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.http11 import Request
+
+from katana450.errors import ConfigurationError
+from katana450.extensions.importers.meshes import Meshes
+from katana450.server.service.arm_handle import Motion
+from katana450.server.service.budget import Budgets
+from katana450.server.service.heartbeats import Arrival, keep_alive
+from katana450.server.service.hub import TICK, Hub
+from katana450.server.service.steering import Steering
+from katana450.server.viser_bridge.guard import Guard
+from katana450.server.viser_bridge.message_filter import LARGEST
+from katana450.server.viser_bridge.proxy import Proxy
+from katana450.server.viser_bridge.viser_server import open_server
+from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Door, public_origin
+from katana450.server.web.channel import ARRIVAL
+from katana450.server.web.listen import reaches_beyond
+from katana450.server.web.program_socket import Lines
+from katana450.server.web.routes import application
+from katana450.settings import Settings
+
+log = logging.getLogger(__name__)
+
+UNSENT = 16_384
+"""Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
+
+UNREAD = 4_096
+"""Bytes that are read at once of what a browser sends: they are taken apart at once, and everybody
+waits for it."""
+
+UNREAD_TLS = 65_536
+"""Likewise where TLS reads them, which takes all that the machine holds."""
+
+START_SECONDS = 10.0
+GOODBYE_SECONDS = 1
+
+
+class Gateway:
+    """Owns the port, and viser behind it."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        listening: socket.socket,
+        lines: socket.socket | None = None,
+        meshes: Meshes | None = None,
+    ) -> None:
+        """``listening``: the port; ``lines``: that for programs which speak JSON lines.
+        ``meshes``: those that things are of, where uploaded ones are kept too.
+
+        Raises ConfigurationError when it must not be served there as ``settings`` say.
+        """
+        _check_tls(settings)
+        raise_descriptor_limit()
+        self._listening = listening
+        self._lines_at = lines
+        self._loop: asyncio.AbstractEventLoop | None = None
+        try:
+            access = _access(settings, self._listening)
+            key = secrets.token_urlsafe(32)
+            self.viser: viser.ViserServer = open_server(key)
+            self.port: int = self._listening.getsockname()[1]
+            for each in (listening, lines):
+                if each is not None:
+                    keep_alive(each)
+            self.address = _address(settings, self._listening)
+            self._hub = Hub(
+                time.monotonic, settings.silence, meshes, owner_silence=settings.owner_silence
+            )
+            self.steering = Steering(self._hub.performer, lambda: self._loop)
+            door = Door(access, self.port, self.address)
+            proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
+            acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
+            app = application(self._hub, door, budgets, proxy, self.address, acceptor)
+            self._lines = Lines(self._hub, door, budgets)
+        except BaseException:
+            self._listening.close()
+            raise
+        self._server = _Server(
+            acceptor,
+            uvicorn.Config(
+                app,
+                http="h11",
+                ws=_BrowserSocket,
+                ws_max_size=LARGEST,
+                ws_per_message_deflate=False,
+                lifespan="off",
+                log_config=None,
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=GOODBYE_SECONDS,
+                ssl_certfile=settings.tls_cert,
+                ssl_keyfile=settings.tls_key,
+            ),
+        )
+        self._thread = threading.Thread(target=self._run, name="gateway", daemon=True)
+        self._started = threading.Event()
+
+    def start(self) -> None:
+        """Answer from now on."""
+        self._thread.start()
+        if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
+            raise ConfigurationError("The gateway did not start; see the log above.")
+
+    def attach(self, arm: Motion) -> None:
+        """From now on the arm can be driven."""
+        self._hub.arm = arm
+
+    def announce(self, why: str) -> None:
+        """Tell everybody why something that was asked is not done. For any thread."""
+        loop = self._loop
+        if loop is not None:
+            loop.call_soon_threadsafe(self._hub.announce, why)
+
+    def stop(self) -> None:
+        """Close every socket and the port; viser is left to ``close_server``."""
+        self._server.should_exit = True
+        if self._thread.is_alive():
+            self._thread.join()
+        self._listening.close()
+
+    def _run(self) -> None:
+        asyncio.run(self._serve())
+
+    async def _serve(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        watch = asyncio.create_task(self._watch())
+        try:
+            async with self._lines.open(self._lines_at):
+                await self._server.serve()
+        finally:
+            watch.cancel()
+            with suppress(asyncio.CancelledError):
+                await watch
+            self._started.set()
+
+    async def _watch(self) -> None:
+        while True:
+            if self._server.started:
+                self._started.set()
+            try:
+                self._hub.tick()
+            except Exception:
+                # Whatever went wrong, the watch over the arm goes on.
+                log.exception("The watch over who drives met an error.")
+            await asyncio.sleep(TICK)
+
+
+class _Server(uvicorn.Server):
+    """Serves what an acceptor lets in.
+
+    asyncio alone accepts thousands in a turn, bounds nothing, and logs a traceback per failure.
+    """
+
+    def __init__(self, acceptor: Acceptor, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._acceptor = acceptor
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:  # noqa: ARG002
+        await super().startup(sockets=[])
+        # It can be closed and waited for, as uvicorn does with its servers.
+        self.servers.append(cast(Any, self._acceptor.start(self._protocol, self.config.ssl)))
+
+    def _protocol(self) -> asyncio.Protocol:
+        protocol: asyncio.Protocol = cast(Any, self.config.http_protocol_class)(
+            config=self.config, server_state=self.server_state, app_state=self.lifespan.state
+        )
+        return protocol
+
+
+class _BrowserSocket(WebSocketsSansIOProtocol):
+    """A websocket in whose buffers little can wait, neither of what is sent nor of what comes."""
+
+    def connection_made(self, transport: BaseTransport) -> None:
+        super().connection_made(transport)
+        cast(Transport, transport).set_write_buffer_limits(high=UNSENT)
+        line = transport.get_extra_info("socket")
+        if line is None:
+            return
+        if hasattr(transport, "max_size"):
+            # A smaller buffer of the machine would do as well, but what does not fit in it is
+            # dropped, the receipts of what was sent the other way with it, and both ends stall.
+            cast(Any, transport).max_size = UNREAD
+        else:
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, UNREAD_TLS)
+        if hasattr(socket, "TCP_NOTSENT_LOWAT"):
+            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
+
+    def handle_connect(self, event: Request) -> None:
+        super().handle_connect(event)
+        if self.response.status_code == HTTPStatus.SWITCHING_PROTOCOLS:
+            # The socket itself knows when the newest message arrived.
+            line = self.transport.get_extra_info("socket")
+            cast(dict[str, Any], self.scope)[ARRIVAL] = Arrival(line)
+
+
+def _check_tls(settings: Settings) -> None:
+    if (settings.tls_cert is None) != (settings.tls_key is None):
+        raise ConfigurationError("https takes both --tls-cert and --tls-key.")
+    if settings.tls_cert is None or settings.tls_key is None:
+        return
+    try:
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(settings.tls_cert, settings.tls_key)
+    except OSError as error:
+        raise ConfigurationError(
+            f"{settings.tls_cert} and {settings.tls_key} are no certificate and its key: {error}."
+        ) from error
+
+
+def _access(settings: Settings, listening: socket.socket) -> AccessFile | None:
+    if settings.access is not None:
+        return AccessFile.open(settings.access)
+    if reaches_beyond(listening) and not settings.insecure:
+        raise ConfigurationError(
+            f"On {settings.host} other machines can reach the arm. Make a link for each person "
+            "with `katana450 access give --file access.json --name NAME --role operator` and "
+            "start with --access access.json; or say --insecure, and everybody can drive it."
+        )
+    return None
+
+
+def _address(settings: Settings, listening: socket.socket) -> Address:
+    beyond = reaches_beyond(listening)
+    names = LOOPBACK_NAMES | ({settings.host, socket.gethostname().lower()} if beyond else set())
+    return Address(
+        frozenset(names),
+        any_address=beyond,
+        secure=settings.tls_cert is not None,
+        public=None if settings.public_url is None else public_origin(settings.public_url),
+    )
