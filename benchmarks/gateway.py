@@ -35,7 +35,7 @@ from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy
 from katana450.server.viser_bridge.viser_server import KEY_HEADER, open_server
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Door
+from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
 from katana450.server.web.listen import listen
 from katana450.server.web.routes import application
 from tests.gateway.client import enter, page_name, websocket
@@ -57,7 +57,7 @@ def serve() -> None:
     address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
     listening = listen("127.0.0.1", 0)
     port = listening.getsockname()[1]
-    hub, door = Hub(time.monotonic), Door(None, port, address)
+    hub, door = Hub(time.monotonic), Authenticator(None, port, address)
     proxy = Proxy(hub, door, Guard(server), server.get_port(), KEY)
     config = uvicorn.Config(
         application(hub, door, Budgets(hub.clock), proxy, address, Acceptor(listening)),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.ledger import Entry, news
+from katana450.arm.control.event_log import Entry, news
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.server.view.texts import REASONS, STATUS, sentence

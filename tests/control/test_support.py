@@ -7,12 +7,12 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
-from katana450.arm.control.things import Form, Mount, Surroundings, Thing
+from katana450.arm.control.things import Environment, Form, Mount, Thing
 from katana450.assembly.robot_session import described
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.around import Table
+from katana450.maths.water.environment import Table
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
@@ -86,7 +86,7 @@ def test_scene_with_the_cup_in_the_air_is_refused_as_a_whole() -> None:
 def test_object_is_not_left_in_the_air_when_it_is_taken_off_the_hand() -> None:
     rules = described(Settings(), URDF_PATH, None).session
     x = rules.begin(rules.ready, 0.0, 0.0).x
-    around: Surroundings = rules.surroundings
+    around: Environment = rules.surroundings
     held = around.mounted(can(at(0.3, 0.0, 0.3)), Mount.HAND, x)
     assert held.fixed
     check_mounted(around, (), held, Mount.TABLE, x)

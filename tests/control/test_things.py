@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.room import free_place, girth
+from katana450.arm.control.placement import free_place, girth
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Look, Solid
 from katana450.arm.control.state import Reason, State

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.server.viser_bridge.flow import LONGEST, MOST, OVERDUE, Flow
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.token_bucket import TokenBucket
 
 
 def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:
-    bucket = Bucket(10.0, 3.0, 0.0)
+    bucket = TokenBucket(10.0, 3.0, 0.0)
     assert [bucket.take(0.0) for _ in range(4)] == [True, True, True, False]
     assert not bucket.take(0.09)
     assert bucket.take(0.11)
@@ -23,13 +23,13 @@ def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:
 
 
 def test_a_bucket_takes_many_or_none() -> None:
-    bucket = Bucket(1.0, 5.0, 0.0)
+    bucket = TokenBucket(1.0, 5.0, 0.0)
     assert not bucket.take(0.0, 6.0)
     assert bucket.take(0.0, 5.0)
 
 
 def test_time_that_goes_back_fills_nothing() -> None:
-    bucket = Bucket(1.0, 1.0, 10.0)
+    bucket = TokenBucket(1.0, 1.0, 10.0)
     assert bucket.take(10.0)
     assert not bucket.take(0.0)
     assert not bucket.take(10.5)

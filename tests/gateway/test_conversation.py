@@ -10,7 +10,7 @@ from katana450.arm.control.lease import Role
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
-from katana450.server.web.authenticator import Visitor
+from katana450.server.web.authenticator import Identity
 from katana450.server.web.channel import FAREWELL, GoneError
 from katana450.server.web.program_socket import Program
 
@@ -51,7 +51,7 @@ def test_who_has_asked_two_hundred_times_keeps_nobody_waiting() -> None:
     async def ask() -> list[int]:
         hub, torrent = Hub(time.monotonic), Torrent()
         program = Program(hub, torrent, Budgets(hub.clock).of("a"))
-        window = hub.join(Visitor("session", "Torrent", Role.OPERATOR), "a-page", program.tell)
+        window = hub.join(Identity("session", "Torrent", Role.OPERATOR), "a-page", program.tell)
         asking = asyncio.create_task(program.run(window))
         taken = [torrent.left]
         while torrent.left:
@@ -70,7 +70,7 @@ def test_who_asks_too_much_and_hears_nothing_is_left_all_the_same() -> None:
         hub, deaf = Hub(time.monotonic), Deaf()
         deaf.left = 10**9
         program = Program(hub, deaf, Budgets(hub.clock).of("a"))
-        window = hub.join(Visitor("session", "Deaf", Role.OPERATOR), "a-page", program.tell)
+        window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.tell)
         async with asyncio.timeout(10.0 * FAREWELL):
             await program.run(window)
 

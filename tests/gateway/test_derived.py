@@ -11,16 +11,16 @@ import pytest
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state import State
-from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service import derived
 from katana450.server.service.budget import Budgets
 from katana450.server.service.derived import once
-from katana450.server.service.dispatcher import Desk
+from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import Arm
-from katana450.server.web.authenticator import Visitor
+from katana450.server.web.authenticator import Identity
 
 
 def _snapshot() -> Snapshot:
@@ -38,14 +38,14 @@ def test_branches_are_computed_once_per_snapshot_for_all_who_ask() -> None:
     hub.arm = cast(Arm, arm)
     budgets = Budgets(hub.clock)
     for number in range(3):
-        visitor = Visitor(f"session-{number}", "Viewer", Role.VIEWER)
+        visitor = Identity(f"session-{number}", "Viewer", Role.VIEWER)
         window = hub.join(visitor, "a-page", lambda _notice: None)
         request = requests.Look(at="branches", id=number)
-        answer = Desk(hub).do(window, request, budgets.of(visitor.session))
+        answer = Dispatcher(hub).do(window, request, budgets.of(visitor.session))
         assert answer == answers.Branches(choices=[], id=number)
     assert len(computed) == 1
     arm.snapshot = _snapshot()
-    Desk(hub).look("branches")
+    Dispatcher(hub).look("branches")
     assert len(computed) == 2
 
 

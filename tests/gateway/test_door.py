@@ -24,7 +24,7 @@ from katana450.arm.control.lease import Role
 from katana450.cli.main import main
 from katana450.errors import ConfigurationError, InputError
 from katana450.server.web.access_links import SALT, AccessFile
-from katana450.server.web.authenticator import Address, Door, public_origin
+from katana450.server.web.authenticator import Address, Authenticator, public_origin
 from tests.browser.server import APP, ROOT, AppServer, free_port
 from tests.gateway.client import ask, controlling, enter, opened
 
@@ -162,7 +162,7 @@ def test_a_public_address_is_one(url: str) -> None:
 def test_cookies_are_for_our_pages_alone(file: AccessFile) -> None:
     token = file.give("Anna", Role.VIEWER, time.time() + HOUR)
     for address, secure in ((LOOPBACK, False), (OPEN, True), (PROXIED, True)):
-        door = Door(file, 8080, address)
+        door = Authenticator(file, 8080, address)
         cookie = door.welcome(token)
         assert cookie is not None
         for part in ("HttpOnly", "SameSite=Strict", "Path=/", "Max-Age=3"):

@@ -10,27 +10,27 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.choices import Choice
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.lease import LOST_AFTER, Lease, Role
-from katana450.arm.control.ledger import Entry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Halt, Reason, State
-from katana450.arm.control.things import Surroundings
+from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
-from katana450.arm.runtime.board import Snapshot
-from katana450.arm.runtime.lateness import Lateness
+from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import LeaseError
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import Rates
-from katana450.server.service import serialize as tell
+from katana450.server.service import serialize
 from katana450.server.service.heartbeats import Heartbeat
 from katana450.server.service.hub import TICK, Hub, Window, key_of
 from katana450.server.service.vrml_nodes import Nodes
-from katana450.server.web.authenticator import Visitor
+from katana450.server.web.authenticator import Identity
 from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
@@ -44,10 +44,10 @@ class FakeArm:
     robot: RobotModel
     nodes: Nodes
     ready: FloatArray
-    lateness: Lateness
-    surroundings: Surroundings
+    lateness: LoopTiming
+    surroundings: Environment
     pouring: Pouring | None
-    rig: Rig
+    rig: PlanContext
     margins: Margins
     holding: FloatArray | None
 
@@ -133,7 +133,7 @@ class Table:
         heartbeat: Heartbeat | None = None,
     ) -> Window:
         told = self.told.setdefault(page, [])
-        return self.hub.join(Visitor("session", name, role), page, told.append, heartbeat)
+        return self.hub.join(Identity("session", name, role), page, told.append, heartbeat)
 
     def wait(self, seconds: float, *alive: Window) -> None:
         """Let time pass, with signs of life of those who are ``alive``."""
@@ -183,7 +183,7 @@ def test_the_journal_has_who_drove_and_who_stopped(table: Table) -> None:
     table.hub.stop(watcher.person.name)
     table.arm.ledger = tuple(entries[1:])
     table.wait(2 * TICK)
-    lines = [tell.line(line) for line in table.hub.journal.lines]
+    lines = [serialize.line(line) for line in table.hub.journal.lines]
     assert [line.who for line in lines] == [None, driver.person.name, "Vera"]
     told = [line.finding for line in lines]
     assert [each.reason for each in told] == ["axis limit", "contact", "halted"]
@@ -352,7 +352,7 @@ def test_two_browsers_with_one_link_are_two_people(table: Table) -> None:
 def test_a_guessed_page_of_another_session_is_somebody_else(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.hub.drive(driver.person.key)
-    stranger = Visitor("another session", None, Role.ADMIN)
+    stranger = Identity("another session", None, Role.ADMIN)
     with pytest.raises(LeaseError):
         table.hub.drive(key_of(stranger, PAGES[0]))
 
@@ -391,7 +391,7 @@ def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:
 
 def test_before_the_arm_is_there_nobody_drives_it() -> None:
     hub = Hub(lambda: 0.0)
-    window = hub.join(Visitor("session", None, Role.ADMIN), PAGES[0], lambda _: None)
+    window = hub.join(Identity("session", None, Role.ADMIN), PAGES[0], lambda _: None)
     with pytest.raises(LeaseError, match="not there yet"):
         hub.drive(window.person.key)
     hub.tick()

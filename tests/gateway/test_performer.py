@@ -12,7 +12,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.order import PATIENCE
 from katana450.server.api.fields import Order
 from katana450.server.service.hub import Window
@@ -26,7 +26,7 @@ class Staged(Table):
 
     def __init__(self, session: Session) -> None:
         super().__init__(session.begin(session.ready, 0.0, 0.0))
-        self.arm.rig = Rig(session, np.eye(4))
+        self.arm.rig = PlanContext(session, np.eye(4))
 
     @property
     def status(self) -> str:

@@ -21,8 +21,7 @@ from katana450.extensions.programs.program import compiled
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.server.api.fields import Order
-from katana450.server.service import program_planning as planning
-from katana450.server.service import status
+from katana450.server.service import program_planning, status
 from katana450.server.service.hub import Window
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_performer import SCRIPT, Staged
@@ -55,7 +54,7 @@ def table(session: Session) -> Staged:
 @pytest.fixture
 def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
     slow = Slow()
-    monkeypatch.setattr(planning, "compiled", slow.compiled)
+    monkeypatch.setattr(program_planning, "compiled", slow.compiled)
     yield slow
     slow.released.set()
 

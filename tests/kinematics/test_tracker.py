@@ -16,8 +16,8 @@ from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
 from katana450.maths.kinematics.reading import Reading
-from katana450.maths.kinematics.stance import Stance, nearest_stance
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import EFFORT, HOP, Tracked, Tracking, leap, track
 from tests.kinematics.family import random_member, random_pose
@@ -252,7 +252,7 @@ def test_a_call_looks_for_a_bounded_number_of_poses(
     """However far and however blocked the way is."""
     sought = 0
 
-    def counted(*args: Any) -> Stance:
+    def counted(*args: Any) -> NearestPosture:
         nonlocal sought
         sought += 1
         return nearest_stance(*args)

@@ -11,8 +11,8 @@ from katana450.errors import InputError
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.badge import Badge, branches
 from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.branch_metrics import BranchMetrics, branches
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
 from katana450.maths.kinematics.velocity import (
@@ -216,7 +216,7 @@ def test_badges_say_what_a_branch_costs(chain: Chain) -> None:
     assert here.distance == pytest.approx(0.0, abs=1e-9)
     assert here.within_limits
     for badge in badges:
-        assert isinstance(badge, Badge)
+        assert isinstance(badge, BranchMetrics)
         assert np.allclose(forward(chain, badge.q), T, atol=1e-9)
         assert badge.position_error < 1e-9
         assert badge.within_limits == chain.within_limits(badge.q)

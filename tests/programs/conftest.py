@@ -12,7 +12,7 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
 from katana450.assembly.robot_session import described
 from katana450.extensions.programs import runner
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.maths.geometry.arrays import FloatArray
@@ -28,7 +28,7 @@ class Stage:
     def __init__(self, model: RobotModel, *, bare: bool = False) -> None:
         """``bare``: without its gripper."""
         self.session = described(replace(Settings(), bare=bare), URDF_PATH, None).session
-        self.rig = Rig(self.session, model.T_base_shoulder)
+        self.rig = PlanContext(self.session, model.T_base_shoulder)
 
     def begin(self) -> State:
         return self.session.begin(self.session.ready, 0.0, 0.0)

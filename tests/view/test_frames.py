@@ -39,7 +39,7 @@ def visers_own(monkeypatch: pytest.MonkeyPatch) -> Any:
 class Line:
     """Takes in what is sent."""
 
-    def __init__(self, hatch: frames.Hatch | None = None) -> None:
+    def __init__(self, hatch: frames.FrameSlot | None = None) -> None:
         self.heard: list[bytes] = []
         self.request = SimpleNamespace(
             headers={} if hatch is None else {frames.HATCH_HEADER: hatch.name}
@@ -116,12 +116,12 @@ def test_a_crowd_is_sent_frames_that_were_packed_once(monkeypatch: pytest.Monkey
 
 
 def test_what_is_not_taken_gives_way_to_what_is_newer() -> None:
-    async def take(hatch: frames.Hatch) -> list[float]:
+    async def take(hatch: frames.FrameSlot) -> list[float]:
         told = opened(await hatch.take())[0]["messages"]
         return [message["position"][0] for message in told]
 
     async def act(viser: asyncio.AbstractEventLoop) -> None:
-        hatch = frames.Hatch()
+        hatch = frames.FrameSlot()
 
         async def begin() -> tuple[Any, Any]:
             buffer = AsyncMessageBuffer(viser, persistent_messages=True)

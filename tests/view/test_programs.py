@@ -11,7 +11,7 @@ import viser
 
 from katana450.arm.control.session import Session
 from katana450.arm.robot.model import RobotModel
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
@@ -24,7 +24,7 @@ from katana450.server.view.programs import ProgramsPanel, _page
 from tests.browser.server import free_port
 
 
-class Performer:
+class ProgramRunner:
     """Remembers what was asked."""
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ def test_what_is_said_is_text_and_no_markup() -> None:
 def test_it_previews_steers_and_teaches(
     server: viser.ViserServer, model: RobotModel, session: Session, tmp_path: Path
 ) -> None:
-    performer = Performer()
+    performer = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
     # Not the first, which is for an arm without its gripper.
@@ -68,7 +68,7 @@ def test_it_previews_steers_and_teaches(
     panel.follow()
     way = panel._preview._way
     assert not way.visible
-    rig = Rig(session, model.T_base_shoulder)
+    rig = PlanContext(session, model.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"
     performer.program = compiled(parse(text), rig, state)
     panel.follow()
@@ -97,10 +97,10 @@ def test_it_previews_steers_and_teaches(
 def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     server: viser.ViserServer, model: RobotModel, session: Session, tmp_path: Path
 ) -> None:
-    performer = Performer()
+    performer = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
-    rig = Rig(session, model.T_base_shoulder)
+    rig = PlanContext(session, model.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
     program = compiled(parse(text), rig, state)
     preview = panel._preview

@@ -12,8 +12,8 @@ from katana450.arm.control.choices import Choice
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.maths.collision.contact import Contact
-from katana450.maths.kinematics.badge import Badge
 from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.reading import Reading
 from katana450.server.view.texts import (
     AXIS_NAMES,
@@ -151,7 +151,7 @@ def test_a_badge_is_told_in_three_words(
     said: str,
 ) -> None:
     contact = None if parts is None else Contact(parts, 0.001, np.zeros((2, 3)), np.eye(3)[2])
-    cost = Badge(
+    cost = BranchMetrics(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
     choice = Choice(cost, contact)

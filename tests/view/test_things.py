@@ -16,11 +16,11 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Look
 from katana450.arm.control.state import Finding, Reason, State
-from katana450.arm.control.things import Form, Surroundings, Thing
+from katana450.arm.control.things import Environment, Form, Thing
 from katana450.arm.robot.props import load_props
 from katana450.extensions.importers.creases import drawn, glb
 from katana450.extensions.importers.meshes import Mesh, Meshes, read_mesh
-from katana450.maths.water.around import Table
+from katana450.maths.water.environment import Table
 from katana450.server.view.objects import NOTHING, ObjectsPanel
 from katana450.server.view.things import ThingNodes
 from katana450.server.view.tint import Tint
@@ -53,7 +53,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
     meshes = Meshes()
     meshes.put([mesh], ())
     put: list[cmd.Command] = []
-    nodes = ThingNodes(server, load_props(), Surroundings(None, None), put.append, meshes)
+    nodes = ThingNodes(server, load_props(), Environment(None, None), put.append, meshes)
     state = session.begin(session.ready, 0.0, 0.0)
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
 
@@ -94,7 +94,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
 def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
-    nodes = ThingNodes(server, load_props(), Surroundings(None, None), print, Meshes())
+    nodes = ThingNodes(server, load_props(), Environment(None, None), print, Meshes())
     state = session.begin(session.ready, 0.0, 0.0)
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
     nodes.follow(seen(state, thing))
@@ -127,7 +127,7 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
 ) -> None:
     """The person hears why when they let go, and the handle comes back to the cup."""
     put: list[cmd.Command] = []
-    around = Surroundings(None, None, Table((-0.25, 0.75), (-0.7, 0.7), -0.025))
+    around = Environment(None, None, Table((-0.25, 0.75), (-0.7, 0.7), -0.025))
     nodes = ThingNodes(server, load_props(), around, put.append, Meshes())
     cup = Thing("cup", Form.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
     nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))

@@ -9,7 +9,7 @@ import numpy as np
 
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Flow, Water
 
 Step = tuple[FloatArray, FloatArray]
@@ -23,7 +23,7 @@ def placed(x: float, y: float, z: float, tilt: float = 0.0) -> FloatArray:
     return se3.from_rotation_translation(so3.exp((tilt, 0.0, 0.0)), (x, y, z))
 
 
-def over_basin(around: Around, tilt: float) -> FloatArray:
+def over_basin(around: WaterEnvironment, tilt: float) -> FloatArray:
     """A cup whose mouth is 20 cm over the table, turned about the middle of it."""
     x, y, _ = around.basin.at
     mouth = around.cup.floor + around.cup.inside.depth

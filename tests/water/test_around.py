@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from katana450.arm.robot.props import BASIN_AT, load_props
 from katana450.arm.robot.water import around_of
 from katana450.errors import InputError
-from katana450.maths.water.around import Around, Basin
+from katana450.maths.water.environment import Basin, WaterEnvironment
 from tests.geometry.strategies import repeatable
 
 radii = st.floats(0.01, 0.3)
@@ -25,7 +25,7 @@ basins = st.builds(
 )
 
 
-def test_the_props_are_the_vessels(around: Around) -> None:
+def test_the_props_are_the_vessels(around: WaterEnvironment) -> None:
     props = load_props()
     assert around.cup.inside.radius == props.cup.inner_radius
     assert around.cup.floor + around.cup.inside.depth == pytest.approx(props.cup.height)
@@ -46,13 +46,13 @@ def test_a_level_is_the_inverse_of_a_volume(basin: Basin, share: float) -> None:
     assert basin.level(basin.volume(level)) == pytest.approx(level, rel=1e-11, abs=1e-15)
 
 
-def test_a_straight_basin_is_the_limit_of_leaning_ones(around: Around) -> None:
+def test_a_straight_basin_is_the_limit_of_leaning_ones(around: WaterEnvironment) -> None:
     straight = replace(around.basin, rim_radius=around.basin.floor_radius)
     nearly = replace(straight, rim_radius=straight.floor_radius * (1.0 + 1e-12))
     assert nearly.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)
 
 
-def test_a_basin_without_size_or_place_is_refused(around: Around) -> None:
+def test_a_basin_without_size_or_place_is_refused(around: WaterEnvironment) -> None:
     with pytest.raises(InputError, match="depth"):
         replace(around.basin, depth=math.nan)
     with pytest.raises(InputError, match="stands at"):

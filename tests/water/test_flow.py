@@ -14,7 +14,7 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.vectors import Vector
-from katana450.maths.water.around import Around, Basin
+from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.flow import Flow, Water
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.slosh import steady_acceleration
@@ -185,9 +185,9 @@ def test_the_cup_catches_what_falls_into_its_mouth(flow: Flow) -> None:
         checked(flying, after, flow)
 
 
-def test_a_full_basin_spills_onto_the_table(around: Around) -> None:
+def test_a_full_basin_spills_onto_the_table(around: WaterEnvironment) -> None:
     small = Basin(around.basin.at, 0.004, 0.04, 0.05, 0.01, 0.06)
-    flow = Flow(Around(around.cup, small, around.table))
+    flow = Flow(WaterEnvironment(around.cup, small, around.table))
     water = flow.begin(FULL, over_basin(flow.around, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     assert water.basin == counted(small.capacity)

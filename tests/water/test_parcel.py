@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.parcel import Ground, Parcel, landing
 from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
@@ -29,7 +29,9 @@ def test_it_flies_as_a_stone_does() -> None:
 @repeatable
 @given(st.tuples(st.floats(-0.2, 0.8), st.floats(-0.6, 0.8), st.floats(0.08, 0.6)), velocities)
 def test_it_lands_where_small_steps_lead(
-    around: Around, start: tuple[float, float, float], velocity: tuple[float, float, float]
+    around: WaterEnvironment,
+    start: tuple[float, float, float],
+    velocity: tuple[float, float, float],
 ) -> None:
     basin, table = around.basin, around.table
     parcel = Parcel(1, start, velocity, 0.0, 0.01)
@@ -57,7 +59,7 @@ def test_it_lands_where_small_steps_lead(
         assert end.point == pytest.approx((x, y, z), abs=2e-3)
 
 
-def test_what_leaves_inside_the_basin_stays_there(around: Around) -> None:
+def test_what_leaves_inside_the_basin_stays_there(around: WaterEnvironment) -> None:
     x, y, _ = around.basin.at
     dipped = Parcel(1, (x, y, 0.03), (0.1, 0.0, 0.0), 0.0, 0.01)
     assert landing(dipped, around, 0.01).ground is Ground.BASIN
@@ -65,7 +67,7 @@ def test_what_leaves_inside_the_basin_stays_there(around: Around) -> None:
     assert landing(beside, around, 0.01).ground is Ground.TABLE
 
 
-def test_beside_the_table_there_is_the_floor(around: Around) -> None:
+def test_beside_the_table_there_is_the_floor(around: WaterEnvironment) -> None:
     (west, _), floor = around.table.x, around.table.floor
     end = landing(Parcel(1, (west - 0.1, 0.0, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01), around, 0.0)
     assert end.ground is Ground.FLOOR

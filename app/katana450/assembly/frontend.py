@@ -6,8 +6,8 @@ from multiprocessing.connection import Connection
 
 from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.arm.runtime.link import FrontEnd
-from katana450.arm.runtime.navigator import Navigator
-from katana450.assembly.frontend_process import Outfit
+from katana450.arm.runtime.planning_worker import PlanningWorker
+from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.robot_session import Described, Jointed, recognised
 from katana450.errors import ConfigurationError
 from katana450.extensions.export.reachability_file import load_map
@@ -17,13 +17,13 @@ from katana450.server.service.arm_handle import Motion
 from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
 from katana450.server.view.follower import Follower
 from katana450.server.view.machine_view import MachineView
-from katana450.server.view.view import Besides, View
+from katana450.server.view.view import View, ViewOptions
 from katana450.server.web.web_server import Gateway
 from katana450.settings import Settings
 
 
 def attached(
-    gateway: Gateway, outfit: Outfit, meshes: Meshes, pipe: Connection
+    gateway: Gateway, outfit: FrontendConfig, meshes: Meshes, pipe: Connection
 ) -> tuple[FrontEnd, Follower]:
     """The front's end of ``pipe``, and the view, neither running yet; ``gateway`` has the arm.
 
@@ -39,15 +39,15 @@ def attached(
             )
         return link, _machine(gateway, settings, found, link)
     stored = None if workspace is None else load_map(workspace)
-    besides = Besides(stored, (gateway.steering, Scripts(settings.programs)), meshes)
+    besides = ViewOptions(stored, (gateway.steering, Scripts(settings.programs)), meshes)
     return link, _arm(gateway, outfit, found, link, besides)
 
 
 def _arm(
-    gateway: Gateway, outfit: Outfit, found: Described, link: FrontEnd, besides: Besides
+    gateway: Gateway, outfit: FrontendConfig, found: Described, link: FrontEnd, besides: ViewOptions
 ) -> View:
     model, session, _ = found
-    navigator = Navigator(session, link.board, link)
+    navigator = PlanningWorker(session, link.board, link)
     frame_rate = outfit.settings.frame_rate
     view = View(gateway.viser, model, link.board, navigator, session, frame_rate, besides)
     navigator.tell = gateway.announce

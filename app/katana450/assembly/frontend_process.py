@@ -32,7 +32,7 @@ OPEN, READY = "open", "ready"
 
 
 @dataclass(frozen=True)
-class Outfit:
+class FrontendConfig:
     """What a front is given each time it is started.
 
     ``urdf``, ``tool``: see ``robot.model.load``. ``listening``: the port for browsers. ``lines``:
@@ -52,7 +52,7 @@ class Outfit:
 class Front:
     """One such process, as the one that started it sees it."""
 
-    def __init__(self, outfit: Outfit) -> None:
+    def __init__(self, outfit: FrontendConfig) -> None:
         """Starts it."""
         spawn = multiprocessing.get_context("spawn")
         self._told, telling = spawn.Pipe(duplex=False)
@@ -112,7 +112,7 @@ class Front:
             self._process.join()
 
 
-def _run(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
+def _run(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
     """What it does, from its start to its end."""
     # Ctrl-C goes to all processes of a terminal; the arm's says when this one is to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -128,7 +128,7 @@ def _run(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
         return
 
 
-def _serve(outfit: Outfit, pipe: Connection, telling: Connection) -> None:
+def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
     from katana450.extensions.importers.meshes import Meshes
     from katana450.server.viser_bridge.viser_server import close_server
     from katana450.server.web.web_server import Gateway

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import CUP
-from katana450.arm.control.room import free_place
 from katana450.arm.control.things import Form, Thing
 from katana450.assembly.robot_session import Described
 from katana450.errors import InputError

@@ -18,7 +18,7 @@ from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.badge import Badge
+from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
@@ -84,7 +84,7 @@ class Kinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
-                | (self._badge(Badge.of(chain, solution, start)) if self._badges else {})
+                | (self._badge(BranchMetrics.of(chain, solution, start)) if self._badges else {})
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
@@ -92,7 +92,7 @@ class Kinematics:
             "rotation_misfit": so3.misfit(np.array(given)[:3, :3]),
         }
 
-    def _badge(self, badge: Badge) -> dict[str, Any]:
+    def _badge(self, badge: BranchMetrics) -> dict[str, Any]:
         contact = met(self._world, badge.q, self._arm.gripper.clamp(0.0))
         return {
             "distance_rad": badge.distance,

@@ -41,7 +41,7 @@ def _run(text: str, source: str, options: Namespace) -> int:
     try:
         script = parse(text)
         if options.headless or options.dry_run or options.report is not None:
-            from katana450.cli.rehearsal import rehearse
+            from katana450.cli.simulate import rehearse
 
             status = rehearse(script, options)
             if status or options.headless or options.dry_run:

@@ -22,7 +22,7 @@ from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import described
 from katana450.atomic import check_writable, write_files, writer_of
-from katana450.cli.performance import Performance, chosen
+from katana450.cli.clocked_run import Performance, chosen
 from katana450.cli.progress import progress
 from katana450.errors import InputError
 from katana450.extensions.render.camera import Camera

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from katana450.assembly.frontend_process import OPEN, READY, Front, Outfit
+from katana450.assembly.frontend_process import OPEN, READY, Front, FrontendConfig
 from katana450.assembly.log_lines import start_log
 from katana450.resources import URDF_PATH
 from katana450.server.web.listen import HERE, listen
@@ -67,7 +67,7 @@ def serve(
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
     meshes = () if stored is None else stored.meshes
-    outfit = Outfit(settings, urdf, tool, listening, lines, workspace, meshes)
+    outfit = FrontendConfig(settings, urdf, tool, listening, lines, workspace, meshes)
     current, arm = Front(outfit), None
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.

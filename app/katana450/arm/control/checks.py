@@ -8,14 +8,14 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import Arm
 from katana450.arm.control.pouring import CUP, Pouring
 from katana450.arm.control.support import check_carried, is_loose
-from katana450.arm.control.things import Mount, Surroundings, Thing
+from katana450.arm.control.things import Environment, Mount, Thing
 from katana450.errors import InputError
 
 NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
 
 
 def check(
-    arm: Arm, pouring: Pouring | None, surroundings: Surroundings, command: cmd.Command
+    arm: Arm, pouring: Pouring | None, surroundings: Environment, command: cmd.Command
 ) -> None:
     """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
     n = arm.chain.n
@@ -40,9 +40,7 @@ def check(
             _check_things(pouring, surroundings, command)
 
 
-def _check_things(
-    pouring: Pouring | None, surroundings: Surroundings, command: cmd.Command
-) -> None:
+def _check_things(pouring: Pouring | None, surroundings: Environment, command: cmd.Command) -> None:
     match command:
         case cmd.Fill(volume=volume):
             _check_water(pouring, volume)
@@ -66,6 +64,6 @@ def _check_water(pouring: Pouring | None, volume: float) -> None:
     pouring.check(volume)
 
 
-def _check_hand(surroundings: Surroundings, thing: Thing) -> None:
+def _check_hand(surroundings: Environment, thing: Thing) -> None:
     if thing.fixed and surroundings.hand is None:
         raise InputError(NO_HAND)

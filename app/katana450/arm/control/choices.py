@@ -12,8 +12,8 @@ from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.badge import Badge
 from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import leap
@@ -23,7 +23,7 @@ from katana450.maths.kinematics.tracker import leap
 class Choice:
     """A branch to take. contact: what the arm would meet at its end; None when nothing."""
 
-    badge: Badge
+    badge: BranchMetrics
     contact: Contact | None
 
 
@@ -55,7 +55,7 @@ def choices(arm: Arm, state: State, world: World | None = None) -> tuple[Choice,
     world: what must not be touched; without one nothing is said of contacts.
     """
     chain = arm.chain_to(state.tool)
-    found = [Badge.of(chain, choice(arm, state, branch), state.q) for branch in BRANCHES]
+    found = [BranchMetrics.of(chain, choice(arm, state, branch), state.q) for branch in BRANCHES]
     return tuple(Choice(badge, met(world, badge.q, state.gripper)) for badge in found)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from katana450.arm.control.aims import without
 from katana450.arm.control.state import Finding, Reason, State
-from katana450.arm.control.things import Hand, Surroundings, Thing
+from katana450.arm.control.things import Environment, Hand, Thing
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -20,7 +20,7 @@ OPENED_TURN, OPENED_SLIDE = 0.02, 1e-3
 """[rad, m] By as much the fingers open before what they held is free: 1 mm at the pads."""
 
 
-def gripped(surroundings: Surroundings, world: World | None, state: State) -> State:
+def gripped(surroundings: Environment, world: World | None, state: State) -> State:
     """``state`` after what the fingers did in this tick."""
     hand = surroundings.hand
     if world is None or hand is None or not (hand.fingers and state.things):
@@ -58,7 +58,7 @@ def _felt(fingers: tuple[str, ...], world: World, thing: Thing, x: FloatArray) -
 
 
 def _closed(
-    surroundings: Surroundings, state: State, thing: Thing, felt: dict[str, float], x: FloatArray
+    surroundings: Environment, state: State, thing: Thing, felt: dict[str, float], x: FloatArray
 ) -> State:
     """The fingers have closed on ``thing``: they stop there, and hold it if both have."""
     state = without(without(state, Reason.CONTACT), Reason.LOPSIDED)

@@ -22,7 +22,7 @@ from katana450.arm.control.joints import Joints
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import LONGEST_STEP
 from katana450.arm.control.state import Finding, Halt, JointTarget, Reason, State
-from katana450.arm.control.things import Surroundings
+from katana450.arm.control.things import Environment
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES
@@ -47,7 +47,7 @@ class JointSession:
         """``way``: how far its links go between two joint vectors (n,) [m]."""
         self.joints = joints
         self.ready = joints.ready
-        self.surroundings = Surroundings(None, None)
+        self.surroundings = Environment(None, None)
         self.pouring: Pouring | None = None
         self._way = way
         self._limiter = Limiter(joints.limits)

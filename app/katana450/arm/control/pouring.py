@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.arm.control.things import Surroundings, Thing, named
+from katana450.arm.control.things import Environment, Thing, named
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.vectors import Vector, scale, sub, vector
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Flow, Water
 from katana450.maths.water.score import Course
 
@@ -41,7 +41,7 @@ class Poured:
 class Pouring:
     """The rules of it, in one surrounding; its methods are pure."""
 
-    def __init__(self, around: Around, surroundings: Surroundings) -> None:
+    def __init__(self, around: WaterEnvironment, surroundings: Environment) -> None:
         """``around``: cup, basin and table; where the basin stands the things say."""
         self._around = around
         self._surroundings = surroundings
@@ -90,7 +90,7 @@ class Pouring:
         """How far [m] the lip is above the surface; negative while water flows over it."""
         return self._flow(things).margin_to_rim(poured.water)
 
-    def around(self, things: Sequence[Thing]) -> Around:
+    def around(self, things: Sequence[Thing]) -> WaterEnvironment:
         """With the basin where it stands."""
         return self._flow(things).around
 

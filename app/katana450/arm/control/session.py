@@ -42,7 +42,7 @@ from katana450.arm.control.state import (
     Target,
     ToolTarget,
 )
-from katana450.arm.control.things import Hand, Surroundings, Thing, furnished_with, placed
+from katana450.arm.control.things import Environment, Hand, Thing, furnished_with, placed
 from katana450.errors import InputError
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -50,7 +50,7 @@ from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tracker import track
 from katana450.maths.motion.limiter import Motion
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 
 TOOL_SPEED = 0.5
 """[m/s] The most of the tool point, unless somebody says otherwise: a person can follow it."""
@@ -77,7 +77,7 @@ class Session:
         tool_speed: float = TOOL_SPEED,
         hand: Hand | None = None,
         things: tuple[Thing, ...] = (),
-        around: Around | None = None,
+        around: WaterEnvironment | None = None,
     ) -> None:
         """``ready``: (n,) the posture [rad] that Home drives to, inside the limits.
 
@@ -88,7 +88,7 @@ class Session:
         """
         self.arm = arm
         self.world = world
-        self.surroundings = Surroundings(world, hand, None if around is None else around.table)
+        self.surroundings = Environment(world, hand, None if around is None else around.table)
         self._things = things
         self.pouring = None if around is None else Pouring(around, self.surroundings)
         self._tool_speed = tool_speed

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from katana450.arm.control.pouring import BASIN, CUP
-from katana450.arm.control.things import Form, Mount, Surroundings, Thing
+from katana450.arm.control.things import Environment, Form, Mount, Thing
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.around import Table
+from katana450.maths.water.environment import Table
 
 GAP = 1e-3
 """[m] An object that hangs no higher than this over a surface stands on it."""
@@ -54,7 +54,7 @@ def check_carried(table: Table | None, things: Sequence[Thing], thing: Thing) ->
 
 
 def check_mounted(
-    surroundings: Surroundings, things: Sequence[Thing], thing: Thing, to: Mount, x: FloatArray
+    surroundings: Environment, things: Sequence[Thing], thing: Thing, to: Mount, x: FloatArray
 ) -> None:
     """Raise InputError if ``thing``, taken off the hand, would be left where nothing carries it.
 

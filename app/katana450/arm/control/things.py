@@ -16,7 +16,7 @@ from katana450.maths.collision.shape import Shape, box, cylinder, hull, sphere
 from katana450.maths.collision.world import Part, World, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-from katana450.maths.water.around import Table
+from katana450.maths.water.environment import Table
 
 MOST = 24
 """Things at a time."""
@@ -221,7 +221,7 @@ class Hand:
     slides: bool = False
 
 
-class Surroundings:
+class Environment:
     """The world for any things that stand around, and where these are."""
 
     def __init__(self, world: World | None, hand: Hand | None, table: Table | None = None) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from katana450.arm.robot.props import BASIN_AT, Point, Props, Vessel
-from katana450.maths.water.around import Around, Basin, Cup, Table
 from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.environment import Basin, Cup, Table, WaterEnvironment
 
 
-def around_of(props: Props, basin_at: Point = BASIN_AT) -> Around:
+def around_of(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
     """``basin_at``: where the basin stands [m], in the base frame. The floor bears the table."""
     cup, basin, table = props.cup, props.basin, props.table
-    return Around(
+    return WaterEnvironment(
         Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor),
         Basin(
             basin_at,

@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.ledger import Entry
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.things import same
-from katana450.arm.runtime.board import Board, Snapshot
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.lateness import Lateness
 from katana450.arm.runtime.loop import ControlLoop
+from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.readiness import readable, writable
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.wire import Names, Plans
 from katana450.errors import InputError
 
@@ -68,7 +68,7 @@ class News:
 
     snapshot: Snapshot
     ledger: tuple[Entry, ...]
-    lateness: Lateness
+    lateness: LoopTiming
 
 
 class ArmEnd:
@@ -196,7 +196,7 @@ class FrontEnd:
         self._plans = Plans()
         first = _loaded(pipe.recv_bytes(), self._plans)
         self._heard = time.monotonic()
-        self.board = Board(first.snapshot, first.lateness)
+        self.board = StatePublisher(first.snapshot, first.lateness)
         self.board.pin(first.snapshot, first.ledger)
         self.cut = threading.Event()
         """Set once there is no arm any more."""

@@ -9,13 +9,13 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from katana450.arm.control.commands import Command, Stop
-from katana450.arm.control.ledger import news
+from katana450.arm.control.event_log import news
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
-from katana450.arm.runtime.board import Board, Snapshot
 from katana450.arm.runtime.clock import Clock
-from katana450.arm.runtime.lateness import Lateness, Punctuality
+from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 
 log = logging.getLogger(__name__)
@@ -59,13 +59,13 @@ class ControlLoop:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
-        self.board = Board(Snapshot(self._state, 0), self.lateness)
+        self.board = StatePublisher(Snapshot(self._state, 0), self.lateness)
         """Where it shows what it does."""
         self.ticks = 0
         """Ticks that were completed."""
 
     @property
-    def lateness(self) -> Lateness:
+    def lateness(self) -> LoopTiming:
         """How well the ticks come when they are due."""
         return self._punctuality.lateness
 

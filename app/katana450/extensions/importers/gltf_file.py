@@ -18,7 +18,7 @@ import numpy.typing as npt
 from katana450.errors import InputError
 from katana450.extensions.importers.surface import (
     MOST_COPIES,
-    Pile,
+    MeshBuilder,
     Reading,
     Surface,
     check_triangles,
@@ -180,7 +180,7 @@ class _File:
 
     def reading(self) -> Reading:
         """Of the scene that is shown first."""
-        pile = Pile(self._name)
+        pile = MeshBuilder(self._name)
         waiting = [(root, np.eye(4)) for root in self._roots()]
         seen: set[int] = set()
         while waiting:
@@ -230,7 +230,7 @@ class _File:
 
     def _mesh(self, number: int) -> Surface:
         if number not in self._meshes:
-            pile = Pile(self._name)
+            pile = MeshBuilder(self._name)
             for primitive in self._document.meshes[number].primitives:
                 if primitive.mode in (TRIANGLES, STRIP, FAN):
                     pile.add(self._surface(primitive))

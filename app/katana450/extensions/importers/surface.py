@@ -81,7 +81,7 @@ class Reading:
     left_out: tuple[str, ...] = ()
 
 
-class Pile:
+class MeshBuilder:
     """Surfaces that are put together to one, as long as they are few enough."""
 
     def __init__(self, name: str) -> None:

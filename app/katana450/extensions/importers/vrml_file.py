@@ -15,7 +15,7 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node, Route, Value
 from katana450.extensions.export.vrml_text import HEADER, Reader
-from katana450.extensions.importers.surface import MOST_COPIES, Pile, Reading, Surface
+from katana450.extensions.importers.surface import MOST_COPIES, MeshBuilder, Reading, Surface
 from katana450.extensions.importers.vrml_solids import (
     MAKERS,
     number,
@@ -133,7 +133,7 @@ class _Flattening:
 
     def __init__(self, name: str, left_out: Counter[str]) -> None:
         self._name, self._left_out = name, left_out
-        self._pile = Pile(name)
+        self._pile = MeshBuilder(name)
         self._surfaces: dict[int, Surface | None] = {}
         self._visits = 0
 

@@ -51,7 +51,7 @@ TICK = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class PlanContext:
     """What a script is for.
 
     session: the rules of the arm, and what stands around it. T_base_shoulder: (4, 4) the frame {S}
@@ -90,7 +90,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Taken:
+class GraspInfo:
     """Where the tool took what it holds; at what pitch [rad], where it was free to choose."""
 
     at: ToolTarget
@@ -119,12 +119,12 @@ class Draft:
 class Bench:
     """Takes the arm from step to step as it will go, and notes the orders."""
 
-    def __init__(self, rig: Rig, state: State) -> None:
+    def __init__(self, rig: PlanContext, state: State) -> None:
         """``state``: where the arm stands at first, at rest."""
         self.rig = rig
         self.state = state
         self.orders: list[tuple[str, Order | Draft]] = []
-        self.taken: Taken | None = None
+        self.taken: GraspInfo | None = None
         """Where the tool took what it holds."""
         self.given_up: tuple[float, ...] = ()
         """[rad] Pitches to take a thing with that led nowhere."""

@@ -11,7 +11,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.things import Thing
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.bench import Bench, Taken
+from katana450.extensions.programs.bench import Bench, GraspInfo
 from katana450.extensions.programs.carry import APPROACHES, before
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.order import Grip, Use
@@ -95,7 +95,7 @@ class Grasp:
             said = ", ".join(finding.reason.value for finding in held.findings)
             raise InputError(f"the fingers do not hold it ({said or 'they pass it'}).")
         bench.note(f"grasp {self.name}: close", Grip(closed), held)
-        bench.taken = Taken(bench.at, pitch if self.pitch is None else None)
+        bench.taken = GraspInfo(bench.at, pitch if self.pitch is None else None)
 
 
 def _there(bench: Bench, middle: FloatArray, pitch: float, back: float) -> FloatArray:

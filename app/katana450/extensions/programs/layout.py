@@ -10,7 +10,7 @@ import numpy as np
 
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import Bench, Draft, Taken
+from katana450.extensions.programs.bench import Bench, Draft, GraspInfo
 from katana450.extensions.programs.order import Go, Order
 from katana450.extensions.programs.script import Placed, Script
 from katana450.extensions.programs.situation import Situation
@@ -53,7 +53,7 @@ class Laid(NamedTuple):
 
     orders: list[tuple[str, Order | Draft]]
     state: State
-    taken: Taken | None
+    taken: GraspInfo | None
 
 
 class Layout:
@@ -127,7 +127,7 @@ class Layout:
                 found.append((name, order))
         return found
 
-    def _note_grasp(self, before: Taken | None, place: tuple[int, State]) -> None:
+    def _note_grasp(self, before: GraspInfo | None, place: tuple[int, State]) -> None:
         """Remember where a thing was taken at a pitch of choice, until it is set down."""
         bench = self._bench
         if bench.taken is None:

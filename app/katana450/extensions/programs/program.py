@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import Bench, Rig
+from katana450.extensions.programs.bench import Bench, PlanContext
 from katana450.extensions.programs.layout import Layout, Report
 from katana450.extensions.programs.order import Go, Pace, Task
 from katana450.extensions.programs.script import Script
@@ -34,7 +34,7 @@ class Program:
 
 def compiled(
     script: Script,
-    rig: Rig,
+    rig: PlanContext,
     state: State,
     speed: float = 1.0,
     report: Report = lambda _: None,

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.room import girth
+from katana450.arm.control.placement import girth
 from katana450.arm.control.support import check_carried
 from katana450.arm.control.things import Thing
 from katana450.errors import InputError

@@ -31,7 +31,7 @@ STEP = 4e-3
 """[m] Off a neighbour's plane that counts as one."""
 
 
-class Veil(NamedTuple):
+class Translucent(NamedTuple):
     """Something to be seen through. opacity: the share of what is behind it that it hides."""
 
     item: Item
@@ -55,7 +55,7 @@ class Picture:
 
 def picture(
     items: Sequence[Item],
-    veils: Sequence[Veil],
+    veils: Sequence[Translucent],
     camera: Camera,
     theme: Theme,
     rays: int = STILL,
@@ -70,7 +70,7 @@ class _Take:
     def __init__(
         self,
         items: Sequence[Item],
-        veils: Sequence[Veil],
+        veils: Sequence[Translucent],
         camera: Camera,
         theme: Theme,
         rays: int,

@@ -17,7 +17,7 @@ from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.urdf_mechanism import shapes_of
 from katana450.arm.robot.visual import Visual
-from katana450.extensions.render.picture import Veil
+from katana450.extensions.render.picture import Translucent
 from katana450.extensions.render.scene import Item, smooth
 from katana450.extensions.render.water import veils_of
 from katana450.maths.geometry import so3
@@ -81,7 +81,7 @@ class Stage:
             found += [Item(thing.name, shape, T) for shape in shapes]
         return found
 
-    def water(self, state: State) -> list[Veil]:
+    def water(self, state: State) -> list[Translucent]:
         """The water, if there is any."""
         pouring = self._session.pouring
         if pouring is None or state.poured is None:

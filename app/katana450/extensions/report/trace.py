@@ -53,7 +53,7 @@ class Trace:
     margin: FloatArray
 
 
-class Rehearsal:
+class Simulation:
     """One run, a tick at a time."""
 
     def __init__(self, program: Program, session: Session, driver: Driver, rate: float) -> None:

@@ -56,13 +56,13 @@ def obstacle(name: str, T_base_shape: FloatArray, *shapes: Shape) -> Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Likeness:
+class Fingerprint:
     """The bodies and pairs of a world, as a digest, and where each is, (b, 4, 4)."""
 
     bodies: bytes
     places: FloatArray
 
-    def differs_by(self, other: Likeness) -> float:
+    def differs_by(self, other: Fingerprint) -> float:
         """By how much any body is elsewhere [m or 1]; infinitely when they are other bodies."""
         if self.bodies != other.bodies:
             return np.inf
@@ -185,14 +185,14 @@ class World:
         return min(gaps, default=np.inf)
 
     @cached_property
-    def likeness(self) -> Likeness:
+    def likeness(self) -> Fingerprint:
         """By which another world, of another process too, is known to be the same."""
         told = hashlib.sha256(repr(self.pairs).encode())
         for part in self.parts:
             told.update(f"{part.name} {part.mover}".encode())
             for shape in part.shapes:
                 told.update(shape.mark)
-        return Likeness(told.digest(), frozen(self.T_mover_body))
+        return Fingerprint(told.digest(), frozen(self.T_mover_body))
 
     def with_carried(self, carried: Part) -> World:
         """This world and what the arm carries, which meets what more than one joint lets meet it.

@@ -53,7 +53,7 @@ def exp(w: npt.ArrayLike) -> FloatArray:
 def log(R: FloatArray) -> FloatArray:
     """The rotation vector w (3,) with exp(w) == R and |w| <= pi.
 
-    Taken through the unit quaternion, whose parts stay accurate both near 0 and near pi. At exactly
+    Computed through the unit quaternion, whose parts stay accurate near 0 and near pi. At exactly
     pi the axis and its opposite are both right; one is returned.
     """
     w, x, y, z = (float(c) for c in to_quaternion(R))

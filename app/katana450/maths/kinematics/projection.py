@@ -24,8 +24,8 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.limited import LimitedArm
+from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
 from katana450.maths.kinematics.reading import Reading
-from katana450.maths.kinematics.stance import Stance, nearest_stance
 from katana450.maths.kinematics.turns import in_limits_turn, nearest_turn, wrapped
 
 POSITION_WORTH_TELLING: Final = 5e-5
@@ -98,7 +98,7 @@ def project(
 
 
 def measured(
-    chain: Chain, T: FloatArray, asked: Asked, stance: Stance, q: FloatArray | None = None
+    chain: Chain, T: FloatArray, asked: Asked, stance: NearestPosture, q: FloatArray | None = None
 ) -> Projection:
     """What `stance` makes of `T` (4, 4) = T_S_tool [m], which `asked` is.
 
@@ -142,7 +142,7 @@ def measured(
     )
 
 
-def _axis_1_binds(arm: FiveAxisArm, asked: Asked, stance: Stance) -> bool:
+def _axis_1_binds(arm: FiveAxisArm, asked: Asked, stance: NearestPosture) -> bool:
     """Whether the asked point is across axis 1 from where the branch ends, or where it cannot turn.
 
     A turn of axis 1 moves a tool point beside it outward or inward alone.
@@ -158,7 +158,7 @@ def _axis_1_binds(arm: FiveAxisArm, asked: Asked, stance: Stance) -> bool:
     return ends or beside
 
 
-def _binding(chain: Chain, q: FloatArray, stance: Stance) -> Iterator[int]:
+def _binding(chain: Chain, q: FloatArray, stance: NearestPosture) -> Iterator[int]:
     held = stance.in_plane.posture_bound
     may_bind = (stance.theta1_bound, held, held, held, stance.in_plane.roll_bound)
     if any(may_bind):

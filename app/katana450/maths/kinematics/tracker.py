@@ -25,6 +25,7 @@ from katana450.maths.kinematics.asked import Asked
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.limited import LimitedArm
+from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
 from katana450.maths.kinematics.planar import Interval
 from katana450.maths.kinematics.projection import (
     ANGLE_WORTH_TELLING,
@@ -33,7 +34,6 @@ from katana450.maths.kinematics.projection import (
     measured,
 )
 from katana450.maths.kinematics.reading import Reading
-from katana450.maths.kinematics.stance import Stance, nearest_stance
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
@@ -166,7 +166,9 @@ def leap(
     return _projection(chain, target, asked, stance)
 
 
-def _projection(chain: Chain, target: ToolTarget, asked: Asked, stance: Stance) -> Projection:
+def _projection(
+    chain: Chain, target: ToolTarget, asked: Asked, stance: NearestPosture
+) -> Projection:
     sign = LimitedArm.of(chain).arm.signs[0]
     return measured(chain, target.pose(chain, sign * stance.alpha[0]), asked, stance)
 
@@ -194,14 +196,14 @@ class _Pursuit:
     effort: what looking for them took. ended: whether no further one would lead nearer.
     """
 
-    def __init__(self, limited: LimitedArm, asked: Asked, best: Stance) -> None:
+    def __init__(self, limited: LimitedArm, asked: Asked, best: NearestPosture) -> None:
         self.limited = limited
         self.asked = asked
         self.best = best
         self.effort = 0
         self.ended = False
 
-    def follow(self, alpha: Five, most: int) -> Stance:
+    def follow(self, alpha: Five, most: int) -> NearestPosture:
         """`best` if it is a hop away, else where hops from `alpha` of so much effort lead."""
         arm = self.limited.arm
         found, miss = None, _misses(arm, self.asked, alpha)
@@ -224,12 +226,12 @@ class _Pursuit:
         return found
 
 
-def _effort(stance: Stance) -> int:
+def _effort(stance: NearestPosture) -> int:
     reached = stance.position_error <= tolerances.SAME_POSITION
     return stance.searches * (1 if reached else OUT_OF_REACH_EFFORT)
 
 
-def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: Stance) -> Stance:
+def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: NearestPosture) -> NearestPosture:
     """`best`, but not where it only ends near the nearest place, farther from it than `alpha`."""
     if arm.off_axis == 0.0:
         return best
@@ -238,7 +240,7 @@ def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: Stance) -> Stan
     return best._replace(alpha=alpha) if away else best
 
 
-def _hop(limited: LimitedArm, alpha: Five, asked: Asked, branch: Branch) -> Stance:
+def _hop(limited: LimitedArm, alpha: Five, asked: Asked, branch: Branch) -> NearestPosture:
     """The nearest pose with every axis within a hop of `alpha`."""
     arm = limited.arm
     theta1 = _theta1(limited, alpha[0], asked, branch)

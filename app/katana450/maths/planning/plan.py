@@ -13,7 +13,7 @@ import numpy as np
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import Likeness, World
+from katana450.maths.collision.world import Fingerprint, World
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.clearance import Clearance, Room
@@ -88,7 +88,7 @@ class Plan:
     """
 
     segments: tuple[Segment, ...]
-    clear_of: Likeness | None = None
+    clear_of: Fingerprint | None = None
     fingers: float = 0.0
     nearest: Nearest | None = None
 

@@ -16,8 +16,8 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.limited import LimitedArm
+from katana450.maths.kinematics.nearest_posture import nearest_stance
 from katana450.maths.kinematics.reading import Reading
-from katana450.maths.kinematics.stance import nearest_stance
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import Curve, Tool
 from katana450.maths.planning.jet import Coefficient, Jet

@@ -17,7 +17,7 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.geometry.vectors import Vector, add, norm, scale, sub, vector
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.parcel import Ground, Parcel, landing
 from katana450.maths.water.puddle import Puddle, spill
 from katana450.maths.water.slosh import Slosh, frequency
@@ -86,7 +86,7 @@ class Surface:
 class Flow:
     """Steps of the water in one surrounding. Its methods are pure."""
 
-    def __init__(self, around: Around) -> None:
+    def __init__(self, around: WaterEnvironment) -> None:
         self.around = around
         self._cup_holds = counted(around.cup.inside.capacity)
         self._basin_holds = counted(around.basin.capacity)

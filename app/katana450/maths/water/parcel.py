@@ -7,7 +7,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from katana450.maths.geometry.vectors import Vector
-from katana450.maths.water.around import Around, Basin
+from katana450.maths.water.environment import Basin, WaterEnvironment
 from katana450.maths.water.units import GRAVITY
 
 
@@ -53,7 +53,7 @@ class Landing(NamedTuple):
     point: Vector
 
 
-def landing(parcel: Parcel, around: Around, level: float) -> Landing:
+def landing(parcel: Parcel, around: WaterEnvironment, level: float) -> Landing:
     """Where ``parcel`` comes down; in the basin the water stands ``level`` [m] over its floor.
 
     The basin gets what comes down through the plane of its rim inside it. The cup is not looked at.

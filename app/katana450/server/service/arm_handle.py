@@ -8,23 +8,23 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.choices import Choice
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.joint_session import JointSession
-from katana450.arm.control.ledger import Entry
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Surroundings
+from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.weight import loads_of
-from katana450.arm.runtime.board import Snapshot
-from katana450.arm.runtime.lateness import Lateness
 from katana450.arm.runtime.link import FrontEnd
+from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import CommandSink
-from katana450.arm.runtime.navigator import Navigator
+from katana450.arm.runtime.planning_worker import PlanningWorker
+from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
@@ -41,7 +41,7 @@ class Motion:
         model: RobotModel | Machine,
         session: Session | JointSession,
         link: FrontEnd,
-        navigator: Navigator | None,
+        navigator: PlanningWorker | None,
         nodes: Nodes,
         let_go: Callable[[], None],
     ) -> None:
@@ -71,7 +71,7 @@ class Motion:
         return self._session.ready
 
     @property
-    def surroundings(self) -> Surroundings:
+    def surroundings(self) -> Environment:
         """Knows where things are."""
         return self._session.surroundings
 
@@ -81,11 +81,11 @@ class Motion:
         return self._session.pouring
 
     @property
-    def rig(self) -> Rig:
+    def rig(self) -> PlanContext:
         """What programs are planned for. Raises InputError where there are only joints."""
         if isinstance(self._session, JointSession):
             self._session.refuse()
-        return Rig(self._session, self.robot.T_base_shoulder)
+        return PlanContext(self._session, self.robot.T_base_shoulder)
 
     @property
     def robot(self) -> RobotModel:
@@ -95,7 +95,7 @@ class Motion:
         return self.model
 
     @property
-    def lateness(self) -> Lateness:
+    def lateness(self) -> LoopTiming:
         """How well the control loop keeps its period."""
         return self._board.lateness
 

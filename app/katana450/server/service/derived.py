@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
-from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.state_publisher import Snapshot
 
 T = TypeVar("T")
 

@@ -12,12 +12,12 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.server.api import answers, requests
-from katana450.server.service import serialize as tell
+from katana450.server.service import serialize
 from katana450.server.service.budget import Budget
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.interfaces import Arm
-from katana450.server.service.object_requests import Placing
+from katana450.server.service.object_requests import ObjectRequests
 
 BARE: dict[type[requests.AnyRequest], cmd.Command] = {
     requests.Settle: cmd.Settle(),
@@ -52,12 +52,12 @@ def driver_key(hub: Hub, window: Window) -> str:
     return window.person.key if hub.lease.holder == actor.person else ""
 
 
-class Desk:
+class Dispatcher:
     """Does what a window asks, or raises the LeaseError or InputError that says why not."""
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
-        self._placing = Placing(hub)
+        self._placing = ObjectRequests(hub)
 
     def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life.
@@ -164,26 +164,26 @@ class Desk:
         hub = self._hub
         match at:
             case "ledger":
-                return tell.ledger(hub.journal.lines)
+                return serialize.ledger(hub.journal.lines)
             case "state":
-                return tell.state(hub)
+                return serialize.state(hub)
         arm = hub.present()
         if at == "loop":
-            return tell.loop(arm.lateness)
+            return serialize.loop(arm.lateness)
         return once(arm.snapshot, at, lambda: self._derived(arm, at))
 
     def _derived(self, arm: Arm, at: str) -> answers.Answer:
         """What follows from the newest snapshot alone."""
         match at:
             case "arm":
-                return tell.arm(arm.model, arm.ready.tolist())
+                return serialize.arm(arm.model, arm.ready.tolist())
             case "links":
                 return arm.nodes.links(arm.state)
             case "branches":
-                return answers.Branches(choices=[tell.choice(each) for each in arm.choices()])
+                return answers.Branches(choices=[serialize.choice(each) for each in arm.choices()])
             case "world":
                 return arm.nodes.world(arm.state)
-        return tell.things(arm)
+        return serialize.things(arm)
 
 
 def _misfit(request: requests.AnyRequest) -> float | None:

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from katana450.arm.control.ledger import Entry
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.state import Reason
-from katana450.arm.runtime.board import KEPT
+from katana450.arm.runtime.state_publisher import KEPT
 from katana450.server.view.texts import told
 
 log = logging.getLogger(__name__)

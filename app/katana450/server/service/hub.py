@@ -20,10 +20,10 @@ from katana450.server.api.fields import Rates
 from katana450.server.service.event_log import Journal
 from katana450.server.service.heartbeats import Heartbeat
 from katana450.server.service.interfaces import Arm, Behind
-from katana450.server.service.program_runner import Performer
+from katana450.server.service.program_runner import ProgramRunner
 from katana450.server.service.scene_transfer import Scenes
 from katana450.server.service.stop_state import Presses, Stopped
-from katana450.server.web.authenticator import Visitor
+from katana450.server.web.authenticator import Identity
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -65,7 +65,7 @@ class Hub:
         self.arm: Arm | None = None
         """None until the arm is there."""
         self.journal = Journal()
-        self.performer = Performer(self, owner_silence)
+        self.performer = ProgramRunner(self, owner_silence)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}
@@ -79,7 +79,7 @@ class Hub:
 
     def join(
         self,
-        visitor: Visitor,
+        visitor: Identity,
         page: str,
         tell: Callable[[dict[str, Any]], None],
         heartbeat: Heartbeat | None = None,
@@ -328,7 +328,7 @@ class Hub:
         if self.lease.holder != window.person:
             self.acquire(window)
 
-    def _meet(self, key: str, visitor: Visitor) -> tuple[Person, int]:
+    def _meet(self, key: str, visitor: Identity) -> tuple[Person, int]:
         self._numbers += 1
         number = self._numbers
         name = visitor.name or f"Window {number}"
@@ -338,6 +338,6 @@ class Hub:
         return Person(key, name, visitor.role), number
 
 
-def key_of(visitor: Visitor, page: str) -> str:
+def key_of(visitor: Identity, page: str) -> str:
     """What ties the sockets of one page together."""
     return f"{visitor.session}/{page}"

@@ -7,16 +7,16 @@ from typing import Protocol
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.choices import Choice
-from katana450.arm.control.ledger import Entry
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Surroundings
+from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
-from katana450.arm.runtime.board import Snapshot
-from katana450.arm.runtime.lateness import Lateness
-from katana450.extensions.programs.bench import Rig
+from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import Rates
@@ -45,13 +45,13 @@ class Arm(Protocol):
     def ready(self) -> FloatArray: ...
 
     @property
-    def rig(self) -> Rig: ...
+    def rig(self) -> PlanContext: ...
 
     @property
-    def lateness(self) -> Lateness: ...
+    def lateness(self) -> LoopTiming: ...
 
     @property
-    def surroundings(self) -> Surroundings: ...
+    def surroundings(self) -> Environment: ...
 
     @property
     def pouring(self) -> Pouring | None: ...

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import BASIN, CUP
-from katana450.arm.control.room import free_place
 from katana450.arm.control.solid import PLAIN, Look
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
 from katana450.arm.control.things import MOST, Form, Mount, Thing, named
@@ -19,7 +19,7 @@ from katana450.server.api import requests
 from katana450.server.service.hub import Hub
 
 
-class Placing:
+class ObjectRequests:
     """Makes commands of it, or raises the InputError or LeaseError that says why not."""
 
     def __init__(self, hub: Hub) -> None:

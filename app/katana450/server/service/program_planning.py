@@ -9,7 +9,7 @@ from enum import Enum
 
 from katana450.arm.control.state import State
 from katana450.errors import CancelledError, KatanaError
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.layout import PlanningStage
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.script import parse
@@ -49,7 +49,7 @@ class Planning:
         self,
         text: str,
         speed: float,
-        rig: Rig,
+        rig: PlanContext,
         state: State,
         clock: Callable[[], float],
         note: str = "",
@@ -122,7 +122,7 @@ class Planning:
             why=self.note,
         )
 
-    def _plan(self, rig: Rig, state: State) -> None:
+    def _plan(self, rig: PlanContext, state: State) -> None:
         try:
             script = parse(self.text)
             self.name = script.name

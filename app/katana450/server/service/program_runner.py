@@ -21,7 +21,7 @@ from katana450.server.api import answers
 from katana450.server.api.fields import Order
 from katana450.server.service.heartbeats import Heartbeat
 from katana450.server.service.program_planning import Planning
-from katana450.server.web.authenticator import Visitor
+from katana450.server.web.authenticator import Identity
 
 if TYPE_CHECKING:
     from katana450.server.service.hub import Hub, Window
@@ -37,7 +37,7 @@ class _Here(Heartbeat):
         return self._clock()
 
 
-class Performer:
+class ProgramRunner:
     """At most one program at a time."""
 
     def __init__(self, hub: Hub, owner_silence: float) -> None:
@@ -300,7 +300,7 @@ class Performer:
             hub.give_up(window)
         planning.refused, planning.note = None, ""
         program = planning.program
-        visitor = Visitor(f"program of {window.person.key}", program.name, Role.OPERATOR)
+        visitor = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
         joined = hub.join(visitor, "program", lambda _notice: None, _Here(hub.clock))
         try:
             hub.acquire(joined)

@@ -15,8 +15,8 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
-from katana450.arm.runtime.board import Snapshot
-from katana450.arm.runtime.lateness import Lateness
+from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import tool_speed
@@ -253,7 +253,7 @@ def hexadecimal(colour: Colour) -> str:
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
-def loop(lateness: Lateness) -> answers.Loop:
+def loop(lateness: LoopTiming) -> answers.Loop:
     """How well the loop keeps its period."""
     return answers.Loop(
         period=lateness.period,

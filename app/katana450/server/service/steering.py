@@ -10,7 +10,7 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.program import Program
 from katana450.server.api import answers
 from katana450.server.api.fields import Order
-from katana450.server.service.program_runner import Performer
+from katana450.server.service.program_runner import ProgramRunner
 
 PATIENCE = 2.0
 """[s] Until the panel gives up on an answer."""
@@ -20,7 +20,7 @@ class Steering:
     """What the panel may ask; done in the gateway's one thread."""
 
     def __init__(
-        self, performer: Performer, loop: Callable[[], asyncio.AbstractEventLoop | None]
+        self, performer: ProgramRunner, loop: Callable[[], asyncio.AbstractEventLoop | None]
     ) -> None:
         """``loop``: the gateway's, once it runs."""
         self._performer = performer

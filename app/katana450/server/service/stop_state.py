@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import Self
 
-from katana450.arm.runtime.board import Snapshot
+from katana450.arm.runtime.state_publisher import Snapshot
 
 REMEMBERED = 256
 """Presses of STOP that are known when they are repeated."""

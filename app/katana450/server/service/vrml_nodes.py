@@ -18,7 +18,7 @@ from katana450.arm.control.arrangement import look_of, shifted
 from katana450.arm.control.looks import Colour, Trait
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
-from katana450.arm.control.things import Surroundings, Thing
+from katana450.arm.control.things import Environment, Thing
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.mechanism import PLAIN, Joint, Mechanism
 from katana450.arm.robot.model import RobotModel
@@ -108,7 +108,7 @@ class _Node:
 class Nodes:
     """All there is to be named. Changes nothing by itself."""
 
-    def __init__(self, mechanism: Mechanism, body: Body, surroundings: Surroundings) -> None:
+    def __init__(self, mechanism: Mechanism, body: Body, surroundings: Environment) -> None:
         self._mechanism = mechanism
         self._body = body
         self._surroundings = surroundings

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 
 import viser
 
-from katana450.arm.runtime.board import Board, Snapshot
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 
 READOUT_INTERVAL = 0.1
 """[s] People cannot read numbers that change faster, nor need sliders that do."""
@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 class Follower(ABC):
     """Shows each new snapshot, at most so many a second."""
 
-    def __init__(self, server: viser.ViserServer, board: Board, frame_rate: float) -> None:
+    def __init__(self, server: viser.ViserServer, board: StatePublisher, frame_rate: float) -> None:
         """``frame_rate``: most updates a second [Hz]."""
         self._server = server
         self._board = board

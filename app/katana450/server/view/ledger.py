@@ -7,7 +7,7 @@ from html import escape
 
 import viser
 
-from katana450.arm.control.ledger import Entry
+from katana450.arm.control.event_log import Entry
 from katana450.server.view.texts import told
 
 SHOWN = 12

@@ -9,8 +9,8 @@ from html import escape
 import viser
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.joints import Joints
-from katana450.arm.control.ledger import Entry
 from katana450.arm.control.state import State
 from katana450.server.view.controls import Listen, add_motion, ends, listener, set_slider
 from katana450.server.view.follower import READOUT_INTERVAL

@@ -8,8 +8,8 @@ import viser
 
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.mechanism import camera
-from katana450.arm.runtime.board import Board, Snapshot
 from katana450.arm.runtime.mailbox import CommandSink
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.server.view.follower import Follower
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel
@@ -25,7 +25,7 @@ class MachineView(Follower):
         self,
         server: viser.ViserServer,
         machine: Machine,
-        board: Board,
+        board: StatePublisher,
         sink: CommandSink,
         frame_rate: float,
     ) -> None:

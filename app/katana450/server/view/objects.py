@@ -15,7 +15,7 @@ from katana450.arm.control.pouring import BASIN, CUP
 from katana450.arm.control.solid import FAINTEST, Look
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_mounted
-from katana450.arm.control.things import LEAST_SCALE, MOST_SCALE, Mount, Surroundings, Thing, named
+from katana450.arm.control.things import LEAST_SCALE, MOST_SCALE, Environment, Mount, Thing, named
 from katana450.errors import InputError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import frozen
@@ -37,7 +37,7 @@ class ObjectsPanel:
         server: viser.ViserServer,
         put: Callable[[cmd.Command], int],
         state: Callable[[], State],
-        surroundings: Surroundings,
+        surroundings: Environment,
     ) -> None:
         """``state``: the newest. ``surroundings``: what objects stand on and are fixed to."""
         self._surroundings = surroundings

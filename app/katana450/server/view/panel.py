@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.ledger import Entry
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
 from katana450.maths.geometry import se3, so3

@@ -12,7 +12,7 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import Props
 from katana450.extensions.importers.meshes import Meshes
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.conduit import Conduits
 from katana450.server.view.room import furnish
 from katana450.server.view.scene import ArmNodes
@@ -45,7 +45,7 @@ class Scenery:
         self._conduits = Conduits(server, model, self.arm)
         # Made when there is water.
         self._water: WaterNodes | None = None
-        self._around: Around | None = None
+        self._around: WaterEnvironment | None = None
 
     def show(self, state: State) -> None:
         """Everything as ``state`` has it."""

@@ -14,7 +14,7 @@ from katana450.arm.control.commands import Command, Place
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
-from katana450.arm.control.things import Form, Surroundings, Thing
+from katana450.arm.control.things import Environment, Form, Thing
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.visual import Visual
 from katana450.errors import InputError
@@ -47,7 +47,7 @@ class ThingNodes:
         self,
         server: viser.ViserServer,
         props: Props,
-        surroundings: Surroundings,
+        surroundings: Environment,
         put: Callable[[Command], None],
         meshes: Meshes,
     ) -> None:

@@ -13,8 +13,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
 from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
-from katana450.arm.runtime.board import Board, Snapshot
 from katana450.arm.runtime.mailbox import CommandSink
+from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.errors import InputError
 from katana450.extensions.export.reachability_file import StoredMap
 from katana450.extensions.importers.meshes import Meshes
@@ -54,7 +54,7 @@ GHOST_FROM = np.deg2rad(0.2)
 
 
 @dataclass(frozen=True)
-class Besides:
+class ViewOptions:
     """What is shown besides the arm.
 
     workspace: a map of it. programs: who runs them, and which there are. meshes: those that things
@@ -73,11 +73,11 @@ class View(Follower):
         self,
         server: viser.ViserServer,
         model: RobotModel,
-        board: Board,
+        board: StatePublisher,
         mailbox: CommandSink,
         session: Session,
         frame_rate: float,
-        besides: Besides | None = None,
+        besides: ViewOptions | None = None,
     ) -> None:
         """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
         second [Hz].
@@ -85,7 +85,7 @@ class View(Follower):
         Raises ConfigurationError for the map of another arm.
         """
         super().__init__(server, board, frame_rate)
-        besides = Besides() if besides is None else besides
+        besides = ViewOptions() if besides is None else besides
         server.gui.set_panel_label(title(model.name))
         self._model = model
         self._mailbox = mailbox

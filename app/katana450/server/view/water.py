@@ -12,7 +12,7 @@ from trimesh.visual.material import PBRMaterial
 
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.around import Around
+from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Flow, Water
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
@@ -51,7 +51,7 @@ TWIST = 2.4
 class WaterNodes:
     """Sends what changed enough to be seen, and nothing of water at rest."""
 
-    def __init__(self, server: viser.ViserServer, around: Around) -> None:
+    def __init__(self, server: viser.ViserServer, around: WaterEnvironment) -> None:
         self._server = server
         self._around = around
         self._flow = Flow(around)
@@ -69,7 +69,7 @@ class WaterNodes:
         # Made when they are first needed: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
 
-    def stand(self, around: Around) -> None:
+    def stand(self, around: WaterEnvironment) -> None:
         """From now on cup and basin are as ``around`` says."""
         self._around, self._flow = around, Flow(around)
         x, y, z = around.basin.at

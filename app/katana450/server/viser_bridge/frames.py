@@ -33,7 +33,7 @@ HATCH_HEADER = "X-Katana450-Hatch"
 """Header in which the gateway names the hatch of a browser's line."""
 
 
-class Hatch:
+class FrameSlot:
     """Where the frames for one browser come out: in the gateway's thread, one when one is wanted.
 
     A frame that is made says what is so by then, and one that waits grows old; so none is made
@@ -77,7 +77,7 @@ def _signal(loop: asyncio.AbstractEventLoop, event: asyncio.Event) -> None:
         loop.call_soon_threadsafe(event.set)
 
 
-_hatches: WeakValueDictionary[str, Hatch] = WeakValueDictionary()
+_hatches: WeakValueDictionary[str, FrameSlot] = WeakValueDictionary()
 
 
 class _Packed(NamedTuple):

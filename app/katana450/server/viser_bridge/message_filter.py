@@ -18,7 +18,7 @@ from viser import _messages as wire
 
 from katana450.errors import LeaseError
 from katana450.server.viser_bridge.guard import Guard
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -94,8 +94,8 @@ class Firewall:
         self._drive = drive
         self._steer = steer
         self._pace = pace
-        self._flood = Bucket(RATE, BURST, t)
-        self._patience = Bucket(FORGIVEN, PATIENCE, t)
+        self._flood = TokenBucket(RATE, BURST, t)
+        self._patience = TokenBucket(FORGIVEN, PATIENCE, t)
         self.dropped: Counter[str] = Counter()
         """Bad messages by their type."""
 

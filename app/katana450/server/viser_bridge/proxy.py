@@ -19,11 +19,11 @@ from websockets.typing import Subprotocol
 from katana450.errors import LeaseError
 from katana450.server.service.hub import Hub, key_of
 from katana450.server.viser_bridge.flow import Flow
-from katana450.server.viser_bridge.frames import HATCH_HEADER, Hatch
+from katana450.server.viser_bridge.frames import HATCH_HEADER, FrameSlot
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import Firewall, Ruling, Verdict
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
-from katana450.server.web.authenticator import NOT_YOU, Door, Visitor
+from katana450.server.web.authenticator import NOT_YOU, Authenticator, Identity
 from katana450.server.web.control_socket import PAGE
 from katana450.server.web.places import Places
 
@@ -51,7 +51,7 @@ REFUSALS_EVERY = 0.5
 class Proxy:
     """Joins browsers to viser, each by a connection of its own."""
 
-    def __init__(self, hub: Hub, door: Door, guard: Guard, port: int, key: str) -> None:
+    def __init__(self, hub: Hub, door: Authenticator, guard: Guard, port: int, key: str) -> None:
         """``port`` of viser on this machine, and the ``key`` to it."""
         self._hub = hub
         self._door = door
@@ -72,11 +72,11 @@ class Proxy:
             else:
                 await browser.close(1013)
 
-    async def _serve(self, browser: WebSocket, visitor: Visitor) -> None:
+    async def _serve(self, browser: WebSocket, visitor: Identity) -> None:
         page = browser.query_params.get("page", "")
         # Without our page around it viser can be looked at, and no more.
         key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
-        hatch = Hatch()
+        hatch = FrameSlot()
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
@@ -110,7 +110,7 @@ class _Line:
         guard: Guard,
         browser: WebSocket,
         upstream: ClientConnection,
-        hatch: Hatch,
+        hatch: FrameSlot,
         key: str,
     ) -> None:
         self._hub = hub

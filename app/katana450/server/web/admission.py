@@ -13,7 +13,7 @@ from starlette.websockets import WebSocket
 
 from katana450.server.api.fields import ROOT
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import Door
+from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.places import Places
 
 SOCKETS, SOCKETS_EACH = 256, 32
@@ -33,7 +33,7 @@ TOO_MUCH = 4429
 RETRY = {"Retry-After": "1"}
 
 
-def identity(door: Door, asked: HTTPConnection) -> str | None:
+def identity(door: Authenticator, asked: HTTPConnection) -> str | None:
     """Whose budget and places ``asked`` takes from: of a link or cookie, else of an address.
 
     None for a stranger where the door asks for a link.
@@ -63,7 +63,7 @@ async def refuse(socket: WebSocket, why: str) -> None:
 class Admission:
     """Middleware that refuses more than there are places for."""
 
-    def __init__(self, app: ASGIApp, door: Door, acceptor: Acceptor) -> None:
+    def __init__(self, app: ASGIApp, door: Authenticator, acceptor: Acceptor) -> None:
         self._app = app
         self._door = door
         self._acceptor = acceptor

@@ -29,7 +29,7 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 @dataclass(frozen=True)
-class Visitor:
+class Identity:
     """Somebody who may come in. ``session`` tells browsers apart; ``name`` is that of the link."""
 
     session: str
@@ -92,7 +92,7 @@ def public_origin(url: str) -> str:
     return f"{parts.scheme}://{parts.netloc.lower()}"
 
 
-class Door:
+class Authenticator:
     """Knows visitors by their cookies."""
 
     def __init__(self, access: AccessFile | None, port: int, address: Address) -> None:
@@ -107,36 +107,36 @@ class Door:
         """Whether one needs a link."""
         return self._access is not None
 
-    def visitor(self, cookies: Mapping[str, str]) -> Visitor | None:
+    def visitor(self, cookies: Mapping[str, str]) -> Identity | None:
         """Who sends these cookies, if they may come in."""
         value = cookies.get(self._cookie, "")
         if self._access is not None:
             known = self._access.check(value, time.time())
-            return None if known is None else Visitor(known[0], known[1].name, known[1].role)
+            return None if known is None else Identity(known[0], known[1].name, known[1].role)
         if len(value) != SESSION_SIZE:
             return None
-        return Visitor(value, None, Role.ADMIN)
+        return Identity(value, None, Role.ADMIN)
 
     def program(
         self, name: str, authorization: str = "", cookies: Mapping[str, str] | None = None
-    ) -> Visitor | None:
+    ) -> Identity | None:
         """Who sends this Authorization header or these cookies, if they may come in.
 
         ``name``: what the program calls itself; behind that of the link where one is asked for.
         """
         name = name if name.isprintable() and 0 < len(name) <= LONGEST_NAME else "Program"
         if self._access is None:
-            return Visitor(secrets.token_urlsafe(16), name, Role.ADMIN)
+            return Identity(secrets.token_urlsafe(16), name, Role.ADMIN)
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() == "bearer":
             known = self._access.check(token.strip(), time.time())
-            found = None if known is None else Visitor(known[0], known[1].name, known[1].role)
+            found = None if known is None else Identity(known[0], known[1].name, known[1].role)
         else:
             found = self.visitor(cookies or {})
         return None if found is None else replace(found, name=f"{found.name}, {name}")
 
     async def while_welcome(
-        self, visitor: Callable[[], Visitor | None], work: Coroutine[Any, Any, None]
+        self, visitor: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
     ) -> bool:
         """Do ``work`` as long as there is a ``visitor``; whether it came to its own end."""
         task = asyncio.create_task(work)

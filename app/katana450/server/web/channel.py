@@ -19,11 +19,11 @@ from katana450.errors import InputError, LeaseError
 from katana450.server.api import requests
 from katana450.server.api.fields import Id
 from katana450.server.service.budget import Budget, BusyError
-from katana450.server.service.dispatcher import Desk
+from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub, Window
 from katana450.server.web.admission import TOO_MUCH
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -87,15 +87,17 @@ class SocketLine:
             await self._socket.close(code, why)
 
 
-class Conversation(ABC):
+class Channel(ABC):
     """One window's; what is told unasked is its kind's."""
 
-    def __init__(self, hub: Hub, line: Line, budget: Budget, *, often: Bucket, bad: Bucket) -> None:
+    def __init__(
+        self, hub: Hub, line: Line, budget: Budget, *, often: TokenBucket, bad: TokenBucket
+    ) -> None:
         """``budget``: of whoever asks, and of all their other windows. ``often``: how much may be
         asked here. ``bad``: how much of it may be nonsense."""
         self.hub = hub
         self.budget = budget
-        self._desk = Desk(hub)
+        self._desk = Dispatcher(hub)
         self._line = line
         self._often = often
         self._bad = bad

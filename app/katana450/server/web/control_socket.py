@@ -14,9 +14,9 @@ from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub, Window
-from katana450.server.web.authenticator import NOT_YOU, Door
-from katana450.server.web.channel import Conversation, Line, SocketLine
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.authenticator import NOT_YOU, Authenticator
+from katana450.server.web.channel import Channel, Line, SocketLine
+from katana450.server.web.token_bucket import TokenBucket
 
 PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
 """The name a page gives itself; nobody else can guess it."""
@@ -32,13 +32,17 @@ BAD_AT_MOST = 4
 """Requests that are none; at one more the socket is closed."""
 
 
-class ControlSocket(Conversation):
+class ControlSocket(Channel):
     """One page's: it is told what is new of the status, on a slow line less often."""
 
     def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
         t = hub.clock()
         super().__init__(
-            hub, line, budget, often=Bucket(RATE, BURST, t), bad=Bucket(0.0, BAD_AT_MOST, t)
+            hub,
+            line,
+            budget,
+            often=TokenBucket(RATE, BURST, t),
+            bad=TokenBucket(0.0, BAD_AT_MOST, t),
         )
         self._told: dict[str, Any] = {}
         self._looked_at = float("-inf")
@@ -64,7 +68,7 @@ class ControlSocket(Conversation):
         return {"is": "status", **news}, PUSH_EVERY
 
 
-async def serve(hub: Hub, door: Door, budgets: Budgets, socket: WebSocket) -> None:
+async def serve(hub: Hub, door: Authenticator, budgets: Budgets, socket: WebSocket) -> None:
     """Answer a request for a control socket."""
     visitor = door.visitor(socket.cookies)
     page = socket.query_params.get("page", "")

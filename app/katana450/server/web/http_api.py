@@ -19,11 +19,11 @@ from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests, schema
 from katana450.server.api.fields import ROOT, Id
 from katana450.server.service.budget import FIXED_HTTP, Budget, Budgets, BusyError
-from katana450.server.service.dispatcher import Desk, driver_key
+from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub, Window
-from katana450.server.web import program_socket as program
+from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
-from katana450.server.web.authenticator import Door, Visitor
+from katana450.server.web.authenticator import Authenticator, Identity
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 from katana450.server.web.uploads import Uploads
 
@@ -48,11 +48,11 @@ LONGEST_PAUSE = 0.5
 class Api:
     """Its routes."""
 
-    def __init__(self, hub: Hub, door: Door, budgets: Budgets) -> None:
+    def __init__(self, hub: Hub, door: Authenticator, budgets: Budgets) -> None:
         self._hub = hub
         self._budgets = budgets
         self._door = door
-        self._desk = Desk(hub)
+        self._desk = Dispatcher(hub)
         self._uploads = Uploads(hub, door, self._visitor)
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
@@ -63,7 +63,7 @@ class Api:
             return Response(schema.openapi_json(), media_type="application/json")
 
         async def socket(socket: WebSocket) -> None:
-            await program.serve_socket(self._hub, self._door, self._budgets, socket)
+            await program_socket.serve_socket(self._hub, self._door, self._budgets, socket)
 
         return [
             *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
@@ -124,7 +124,7 @@ class Api:
     def _budget(self, request: Request) -> Budget:
         return self._budgets.of(identity(self._door, request) or address_of(request))
 
-    def _visitor(self, request: Request) -> Visitor:
+    def _visitor(self, request: Request) -> Identity:
         headers = request.headers
         visitor = self._door.program(
             headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
@@ -133,13 +133,13 @@ class Api:
             raise HTTPException(401, "A token is asked for; `katana450 access give` makes one.")
         return visitor
 
-    def _window(self, request: Request, visitor: Visitor) -> Window:
+    def _window(self, request: Request, visitor: Identity) -> Window:
         """That of the program that asks; it closes when nothing is heard of it for a while."""
         key = self._key(request, visitor)
         known = self._posting.pop(key, None)
         if known is None:
             session, _, page = key.partition("/")
-            visitor = Visitor(session, visitor.name, visitor.role)
+            visitor = Identity(session, visitor.name, visitor.role)
             window = self._hub.join(visitor, page, lambda _notice: None)
             assert window.person.key == key
         else:
@@ -149,7 +149,7 @@ class Api:
         self._posting[key] = (window, timer)
         return window
 
-    def _key(self, request: Request, visitor: Visitor) -> str:
+    def _key(self, request: Request, visitor: Identity) -> str:
         """What ties the requests of one program together."""
         session = visitor.session if self._door.asks else "programs"
         return f"{session}/{request.headers.get(KEY, '')}"

@@ -17,7 +17,7 @@ from starlette.websockets import WebSocket
 from katana450.arm.control.lease import BEAT
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
-from katana450.server.service import serialize as tell
+from katana450.server.service import serialize
 from katana450.server.service.budget import Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.heartbeats import Arrival
@@ -25,10 +25,10 @@ from katana450.server.service.hub import Hub, Window
 from katana450.server.service.interfaces import Arm
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import address_of, identity, refuse
-from katana450.server.web.authenticator import NOT_YOU, Door, Visitor
-from katana450.server.web.channel import NONSENSE, Conversation, GoneError, Line, SocketLine
+from katana450.server.web.authenticator import NOT_YOU, Authenticator, Identity
+from katana450.server.web.channel import NONSENSE, Channel, GoneError, Line, SocketLine
 from katana450.server.web.places import Places
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -54,12 +54,12 @@ LINES, LINES_EACH = 16, 8
 TOO_MUCH_ASKED = "Too much is asked by your programs together. Wait a moment, and ask less often."
 
 
-class Program(Conversation):
+class Program(Channel):
     """One program's: it is told the state as often as it wants."""
 
     def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
         t = hub.clock()
-        often, bad = Bucket(RATE, BURST, t), Bucket(FORGIVEN, MISTAKES, t)
+        often, bad = TokenBucket(RATE, BURST, t), TokenBucket(FORGIVEN, MISTAKES, t)
         super().__init__(hub, line, budget, often=often, bad=bad)
         self._window: Window | None = None
         self._complained = -math.inf
@@ -99,7 +99,7 @@ class Program(Conversation):
 
     def _state(self, arm: Arm) -> answers.State:
         """With the fields that are watched; those of a thing that is gone are left out."""
-        now = tell.state(self.hub)
+        now = serialize.state(self.hub)
         values: list[answers.Value] = []
         for each in self._watched:
             with suppress(InputError):
@@ -116,11 +116,11 @@ class Program(Conversation):
         )
 
 
-async def serve_socket(hub: Hub, door: Door, budgets: Budgets, socket: WebSocket) -> None:
+async def serve_socket(hub: Hub, door: Authenticator, budgets: Budgets, socket: WebSocket) -> None:
     """Answer a program that asks for a websocket."""
     name = socket.query_params.get("name", "")
 
-    def visitor() -> Visitor | None:
+    def visitor() -> Identity | None:
         return door.program(name, socket.headers.get("authorization", ""), socket.cookies)
 
     budget = budgets.of(identity(door, socket) or address_of(socket))
@@ -135,7 +135,7 @@ class Lines:
     """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
     the connection, so that a page's request, which begins otherwise, gets nowhere."""
 
-    def __init__(self, hub: Hub, door: Door, budgets: Budgets) -> None:
+    def __init__(self, hub: Hub, door: Authenticator, budgets: Budgets) -> None:
         self._hub = hub
         self._door = door
         self._budgets = budgets
@@ -183,7 +183,7 @@ class Lines:
     async def _converse(
         self, line: _TcpLine, hello: requests.Hello, client: tuple[str, int]
     ) -> None:
-        def visitor() -> Visitor | None:
+        def visitor() -> Identity | None:
             return self._door.program(hello.name, f"Bearer {hello.token}")
 
         found = visitor()
@@ -215,7 +215,11 @@ class Lines:
 
 
 async def _serve(
-    hub: Hub, door: Door, budget: Budget, line: Line, visitor: Callable[[], Visitor | None]
+    hub: Hub,
+    door: Authenticator,
+    budget: Budget,
+    line: Line,
+    visitor: Callable[[], Identity | None],
 ) -> None:
     found = visitor()
     if found is None:

@@ -20,15 +20,13 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
-from katana450.server.web import control_socket
-from katana450.server.web import security as headers
-from katana450.server.web import static_files as files
+from katana450.server.web import control_socket, security, static_files
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
-from katana450.server.web.authenticator import Address, Door, Visitor
+from katana450.server.web.authenticator import Address, Authenticator, Identity
 from katana450.server.web.bodies import body_of
 from katana450.server.web.http_api import Api
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -44,15 +42,20 @@ class _Entry(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def application(
-    hub: Hub, door: Door, budgets: Budgets, proxy: Proxy, address: Address, acceptor: Acceptor
+    hub: Hub,
+    door: Authenticator,
+    budgets: Budgets,
+    proxy: Proxy,
+    address: Address,
+    acceptor: Acceptor,
 ) -> ASGIApp:
     """Everything that answers at the port."""
-    static = files.load()
+    static = static_files.load()
     index = static.pop("index.html")
     viser = viser_page.load()
-    viser_file = files.File.of(viser.html, files.TYPES[".html"])
-    page_policy, viser_policy = headers.page_policy(), headers.viser_policy(viser.script_hashes)
-    tries = Bucket(TRIES, AT_ONCE, hub.clock())
+    viser_file = static_files.File.of(viser.html, static_files.TYPES[".html"])
+    page_policy, viser_policy = security.page_policy(), security.viser_policy(viser.script_hashes)
+    tries = TokenBucket(TRIES, AT_ONCE, hub.clock())
 
     async def page(request: Request) -> Response:
         return index.answer(request, page_policy)
@@ -112,10 +115,10 @@ def application(
         *Api(hub, door, budgets).routes(),
     ]
     admission = Admission(Starlette(routes=routes), door, acceptor)
-    return headers.Threshold(admission, address)
+    return security.SecurityMiddleware(admission, address)
 
 
-def _known(door: Door, request: Request) -> Visitor:
+def _known(door: Authenticator, request: Request) -> Identity:
     visitor = door.visitor(request.cookies)
     if visitor is None:
         raise HTTPException(401, "Come in by the front page.")

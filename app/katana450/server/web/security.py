@@ -62,7 +62,7 @@ def _policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
     return "; ".join((*parts, *ends))
 
 
-class Threshold:
+class SecurityMiddleware:
     """Around the application: turns away what was not meant for it, and adds the headers."""
 
     def __init__(self, app: ASGIApp, address: Address) -> None:

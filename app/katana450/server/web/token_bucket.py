@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-class Bucket:
+class TokenBucket:
     """Tokens that come back with time; an event takes some, or is refused when they are gone."""
 
     def __init__(self, rate: float, size: float, t: float) -> None:

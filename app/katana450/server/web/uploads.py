@@ -19,7 +19,7 @@ from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.web.admission import identity
-from katana450.server.web.authenticator import Door, Visitor
+from katana450.server.web.authenticator import Authenticator, Identity
 from katana450.server.web.bodies import (
     NOT_NOW,
     NOT_UNDERSTOOD,
@@ -29,7 +29,7 @@ from katana450.server.web.bodies import (
     body_of,
 )
 from katana450.server.web.places import Places
-from katana450.server.web.token_bucket import Bucket
+from katana450.server.web.token_bucket import TokenBucket
 
 RATE, AT_ONCE = 0.5, 10.0
 """Files a second, and at once, of everybody together."""
@@ -48,12 +48,14 @@ T = TypeVar("T")
 class Uploads:
     """The routes. What comes is kept for a while, and used by a request that names its key."""
 
-    def __init__(self, hub: Hub, door: Door, visitor: Callable[[Request], Visitor]) -> None:
+    def __init__(
+        self, hub: Hub, door: Authenticator, visitor: Callable[[Request], Identity]
+    ) -> None:
         """``visitor``: who asks, or the HTTPException that turns them away."""
         self._hub = hub
         self._door = door
         self._visitor = visitor
-        self._often = Bucket(RATE, AT_ONCE, hub.clock())
+        self._often = TokenBucket(RATE, AT_ONCE, hub.clock())
         self._reading = asyncio.Lock()
         self._places = Places(WAITING, WAITING_EACH)
 

@@ -32,7 +32,7 @@ from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
 from katana450.server.web.access_links import AccessFile
-from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Door, public_origin
+from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator, public_origin
 from katana450.server.web.channel import ARRIVAL
 from katana450.server.web.listen import reaches_beyond
 from katana450.server.web.program_socket import Lines
@@ -88,7 +88,7 @@ class Gateway:
                 time.monotonic, settings.silence, meshes, owner_silence=settings.owner_silence
             )
             self.steering = Steering(self._hub.performer, lambda: self._loop)
-            door = Door(access, self.port, self.address)
+            door = Authenticator(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
             acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
             app = application(self._hub, door, budgets, proxy, self.address, acceptor)

@@ -79,7 +79,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Around:
+class WaterEnvironment:
     """All that holds or catches water."""
 
     cup: Cup

@@ -16,7 +16,7 @@ from katana450.maths.kinematics.velocity import singular_values
 
 
 @dataclass(frozen=True, eq=False)
-class Badge:
+class BranchMetrics:
     """One way to stand at a pose, and what speaks for and against it.
 
     q: (n,) the joint angles there [rad]. within_limits: whether the arm can go there.
@@ -35,14 +35,14 @@ class Badge:
     smallest_singular_value: float
 
     @staticmethod
-    def of(chain: Chain, found: Solution | Projection, q: npt.ArrayLike) -> Badge:
+    def of(chain: Chain, found: Solution | Projection, q: npt.ArrayLike) -> BranchMetrics:
         """That of `found`, seen from `q` (n,) [rad].
 
         Between two postures inside the limits the straight way in joint space is inside too, so
         distance and time are of a way the arm can go.
         """
         way = np.abs(found.q - chain.check_q(q))
-        return Badge(
+        return BranchMetrics(
             branch=found.branch,
             q=found.q,
             within_limits=chain.within_limits(found.q),
@@ -54,9 +54,9 @@ class Badge:
         )
 
 
-def branches(chain: Chain, T: npt.ArrayLike, q: npt.ArrayLike) -> tuple[Badge, ...]:
+def branches(chain: Chain, T: npt.ArrayLike, q: npt.ArrayLike) -> tuple[BranchMetrics, ...]:
     """Every branch of the pose `T` (4, 4) = T_S_tool [m] seen from `q` (5,) [rad].
 
     In the order of BRANCHES; `T` as for `inverse`, and errors as of it.
     """
-    return tuple(Badge.of(chain, solution, q) for solution in inverse(chain, T, q_hint=q))
+    return tuple(BranchMetrics.of(chain, solution, q) for solution in inverse(chain, T, q_hint=q))

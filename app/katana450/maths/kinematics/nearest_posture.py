@@ -31,7 +31,7 @@ _SLOW: Final = 0.9
 """A step beside the roll axis that leaves so much of the error is on its way to no solution."""
 
 
-class Stance(NamedTuple):
+class NearestPosture(NamedTuple):
     """The canonical angles `alpha` on `branch`, what they miss, and what holds them there.
 
     searches: how many it took to find them.
@@ -48,7 +48,7 @@ class Stance(NamedTuple):
 
 def nearest_stance(
     limited: LimitedArm, asked: Asked, branch: Branch | None, hint: Five | None
-) -> Stance:
+) -> NearestPosture:
     """That inside the limits of `limited` which is nearest to `asked`.
 
     branch: the one to stay on; None takes the one that comes nearest, and of equals the one nearest
@@ -67,7 +67,7 @@ def nearest_stance(
 
 def _reached(
     limited: LimitedArm, asked: Asked, branch: Branch | None, hint: Five | None
-) -> Stance | None:
+) -> NearestPosture | None:
     best = _solved(limited, asked, branch, hint)
     if best is not None and limited.arm.off_axis > 0.0:
         return _shifted(limited, asked, best, branch, hint)
@@ -76,7 +76,7 @@ def _reached(
 
 def _faced(
     limited: LimitedArm, asked: Asked, branch: Branch | None, hint: Five | None
-) -> Stance | None:
+) -> NearestPosture | None:
     """The stance with the pitch kept, whichever way round the tool faces; None if there is none.
 
     The yaw does not count, so a roll axis with the asked pitch may point away from axis 1 or
@@ -90,7 +90,7 @@ def _faced(
     return _nearest(limited, asked, kept or found, hint) if found else None
 
 
-def _exact(stance: Stance) -> bool:
+def _exact(stance: NearestPosture) -> bool:
     return (
         stance.position_error <= tolerances.SAME_POSITION
         and stance.rotation_error <= tolerances.SAME_ROTATION
@@ -98,15 +98,19 @@ def _exact(stance: Stance) -> bool:
 
 
 def _shifted(
-    limited: LimitedArm, asked: Asked, best: Stance, branch: Branch | None, hint: Five | None
-) -> Stance:
+    limited: LimitedArm,
+    asked: Asked,
+    best: NearestPosture,
+    branch: Branch | None,
+    hint: Five | None,
+) -> NearestPosture:
     """The stance with a tool point beside the roll axis, from that with the point on the axis.
 
     The two part by what the orientation misses, so the point on the axis is moved by that and the
     rest solved again, as long as the tool point comes nearer. It ends on the asked point where the
     arm reaches it; beyond reach it ends near the nearest one, not always on it.
     """
-    reached: Stance | None = best
+    reached: NearestPosture | None = best
     least, searches = math.inf, 1
     while reached is not None and searches < _TURNS:
         tool = limited.arm.tool_point(reached.alpha)
@@ -126,9 +130,9 @@ def _shifted(
 
 def _solved(
     limited: LimitedArm, asked: Asked, branch: Branch | None, hint: Five | None
-) -> Stance | None:
+) -> NearestPosture | None:
     planar = limited.planar(branch)
-    found: list[Stance] = []
+    found: list[NearestPosture] = []
     for approach in (False, True):
         for each, arm in planar:
             found.extend(_stances(limited, asked, each, arm, hint, approach))
@@ -146,7 +150,7 @@ def _stances(
     planar: PlanarArm,
     hint: Five | None,
     approach: bool,
-) -> Iterator[Stance]:
+) -> Iterator[NearestPosture]:
     arm, limits = limited.arm, limited.limits
     search = approaching if approach else reaching
     outward, _, up = asked.beside
@@ -174,7 +178,7 @@ def _stances(
                 break
         if found is not None:
             alpha = (theta1, *found.posture[:3], found.psi)
-            yield Stance(
+            yield NearestPosture(
                 alpha=alpha if hint is None else limited.turned(alpha, hint),
                 branch=branch,
                 position_error=math.hypot(pu - u, pv - v, asked.y * c - asked.x * s - d),
@@ -228,7 +232,9 @@ def _fitted(interval: Interval, theta: float) -> tuple[float, bool]:
     return min(interval, key=lambda end: abs(wrapped(end - theta))), True
 
 
-def _nearest(limited: LimitedArm, asked: Asked, found: list[Stance], hint: Five | None) -> Stance:
+def _nearest(
+    limited: LimitedArm, asked: Asked, found: list[NearestPosture], hint: Five | None
+) -> NearestPosture:
     found = _least(found, [stance.position_error for stance in found], tolerances.SAME_POSITION)
     if asked.reading is Reading.POSITION:
         pitch = [limited.arm.pitch(s.alpha) - asked.pitch(s.alpha[0]) for s in found]
@@ -239,6 +245,6 @@ def _nearest(limited: LimitedArm, asked: Asked, found: list[Stance], hint: Five 
     return min(found, key=lambda s: max(abs(a - b) for a, b in zip(hint, s.alpha, strict=True)))
 
 
-def _least(found: list[Stance], errors: list[float], same: float) -> list[Stance]:
+def _least(found: list[NearestPosture], errors: list[float], same: float) -> list[NearestPosture]:
     least = min(errors) + same
     return [stance for stance, error in zip(found, errors, strict=True) if error <= least]

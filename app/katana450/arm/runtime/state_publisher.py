@@ -7,9 +7,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from katana450.arm.control.ledger import Entry
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.state import State
-from katana450.arm.runtime.lateness import Lateness
+from katana450.arm.runtime.loop_timing import LoopTiming
 
 KEPT = 500
 """Entries of the ledger that are kept."""
@@ -23,10 +23,10 @@ class Snapshot:
     ticket: int
 
 
-class Board:
+class StatePublisher:
     """One thread pins up, any look."""
 
-    def __init__(self, first: Snapshot, lateness: Lateness) -> None:
+    def __init__(self, first: Snapshot, lateness: LoopTiming) -> None:
         self._snapshot = first
         self._ledger: deque[Entry] = deque(maxlen=KEPT)
         self._pinned = threading.Condition()

@@ -12,7 +12,7 @@ LOOKED_AT = 1000
 
 
 @dataclass(frozen=True)
-class Lateness:
+class LoopTiming:
     """How much later than due the ticks came.
 
     Attributes:
@@ -45,11 +45,11 @@ class Punctuality:
         self._lost += late > self._period
 
     @property
-    def lateness(self) -> Lateness:
+    def lateness(self) -> LoopTiming:
         """Of the last ticks."""
         late = np.array(self._late.copy())
         if late.size == 0:
-            return Lateness(self._period)
+            return LoopTiming(self._period)
         p50, p99 = np.quantile(late, (0.5, 0.99)).tolist()
         most = float(late.max())
-        return Lateness(self._period, late.size, p50, p99, most, self._lost)
+        return LoopTiming(self._period, late.size, p50, p99, most, self._lost)

@@ -7,7 +7,7 @@ from argparse import Namespace
 from datetime import datetime
 
 from katana450.arm.robot.props import load_props
-from katana450.cli.performance import planned, played
+from katana450.cli.clocked_run import planned, played
 from katana450.cli.version import version
 from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.program import Program

@@ -11,8 +11,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.runtime.board import Board
 from katana450.arm.runtime.mailbox import CommandSink
+from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.errors import KatanaError
 
 log = logging.getLogger(__name__)
@@ -27,11 +27,11 @@ WAITING = (cmd.Pause, cmd.Resume)
 """Commands that decide when the arm moves, not where."""
 
 
-class Navigator:
+class PlanningWorker:
     """Between whoever commands and the arm: a branch is taken on a planned way, clear from end to
     end; all else goes on at once, and ends the work on a way."""
 
-    def __init__(self, session: Session, board: Board, arm: CommandSink) -> None:
+    def __init__(self, session: Session, board: StatePublisher, arm: CommandSink) -> None:
         self._session = session
         self._board = board
         self._arm = arm

@@ -20,7 +20,7 @@ from katana450.assembly.robot_session import described
 from katana450.cli.progress import progress
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.export.trajectory_file import load_motion
-from katana450.extensions.programs.bench import Rig
+from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.program import Program, compiled
@@ -28,7 +28,7 @@ from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import Script, parse
 from katana450.extensions.programs.script_files import text_of
 from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.report.trace import Rehearsal
+from katana450.extensions.report.trace import Simulation
 from katana450.settings import Settings
 
 DEMOS = {"circle": CircleDemo, "pour": PourDemo}
@@ -67,16 +67,16 @@ def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Pl
     """``seed``: of the ways round what is in between. ``speed``: share of the script's own."""
     settings = replace(Settings(), bare=script.bare)
     model, session, _ = described(settings, urdf, None)
-    rig = Rig(session, model.T_base_shoulder, seed)
+    rig = PlanContext(session, model.T_base_shoulder, seed)
     program = compiled(script, rig, _at_rest(session), speed)
     return Planned(script, program, model, session)
 
 
-def played(plan: Planned) -> Rehearsal:
+def played(plan: Planned) -> Simulation:
     """Run to its end, with a bar. Raises KatanaError where it does not get there."""
     session = plan.session
     driver = SimulatedDriver(plan.model.arm, session.ready, gripper=0.0)
-    rehearsal = Rehearsal(plan.program, session, driver, Settings().rate)
+    rehearsal = Simulation(plan.program, session, driver, Settings().rate)
     done, total = 0, 1000
     ticks = progress(range(total), total, plan.script.name)
     for share in rehearsal.ticks():
