@@ -20,7 +20,9 @@ import numpy as np
 
 from katana450.arm.control.state import Status
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.clearance import advance
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import World, obstacle
@@ -56,9 +58,9 @@ class Row(NamedTuple):
     remark: str
 
 
-def world_on_table(model: RobotModel) -> World:
+def world_on_table(robot: Robot) -> World:
     """The arm's bodies above the table."""
-    world, _ = world_of(model)
+    world, _ = world_of(robot)
     if world is None:
         raise SystemExit("The robot description has no collision shapes.")
     return world.with_obstacles([obstacle("table", np.eye(4), half_space())])
@@ -67,9 +69,9 @@ def world_on_table(model: RobotModel) -> World:
 class RawMeshes:
     """The visible triangles of each link, without hulls, for the pairs of a world but the table."""
 
-    def __init__(self, model: RobotModel, world: World) -> None:
+    def __init__(self, robot: Robot, world: World) -> None:
         self._world = world
-        bodies = {body.name: body for body in model.bodies}
+        bodies = {body.name: body for body in robot.links}
         self._meshes = {}
         for number, part in enumerate(world.parts):
             if part.name in bodies:
@@ -124,10 +126,10 @@ def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
     return 1e6 * best
 
 
-def nearest_rows(model: RobotModel, world: World, postures: FloatArray) -> list[Row]:
+def nearest_rows(robot: Robot, world: World, postures: FloatArray) -> list[Row]:
     """The ways to find the nearest pair."""
     every = np.arange(len(world.first))
-    raw = RawMeshes(model, world)
+    raw = RawMeshes(robot, world)
     ways: dict[str, tuple[Callable[[FloatArray], object], int]] = {
         "katana450 `nearest`": (world.nearest, TURNS),
         "coal, the same hulls, every pair": (lambda x: world.at(x).distances(every).min(), TURNS),
@@ -148,10 +150,10 @@ def nearest_rows(model: RobotModel, world: World, postures: FloatArray) -> list[
     ]
 
 
-def tick_rows(model: RobotModel, world: World) -> list[Row]:
+def tick_rows(arm: MountedArm, world: World) -> list[Row]:
     """What one tick of each drive takes."""
     rows = []
-    speed = np.append(model.arm.chain.speed, model.arm.gripper.speed)
+    speed = np.append(arm.chain.speed, arm.gripper.speed)
     for name, ends in DRIVES.items():
         x, goal = (np.append(np.radians(end), 0.0) for end in ends)
         took = []
@@ -184,18 +186,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.collision", description=__doc__)
     parser.add_argument("--postures", type=int, default=100, help="how many (default: 100)")
     count = parser.parse_args(arguments).postures
-    model = load()
+    robot = load()
+    arm = robot.require_arm()
     start = time.perf_counter()
-    world = world_on_table(model)
+    world = world_on_table(robot)
     built = time.perf_counter() - start
-    chain, gripper = model.arm.chain, model.arm.gripper
+    chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
     postures = np.random.default_rng(SEED).uniform(lower, upper, (count, len(lower)))
     print(f"{count} postures of seed {SEED}; load average {os.getloadavg()[0]:.1f}.")
     print(f"Bodies read and pairs found in {built:.2f} s.\n")
-    print(table("the nearest pair", nearest_rows(model, world, postures)))
+    print(table("the nearest pair", nearest_rows(robot, world, postures)))
     print()
-    print(table("one tick of a drive", tick_rows(model, world)))
+    print(table("one tick of a drive", tick_rows(arm, world)))
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Machine, Row, Tables
 from benchmarks.kinematics_task import FloatArray, Task
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
@@ -70,7 +70,7 @@ BATCH = (
 
 def seeded_task(poses: int, seed: int) -> tuple[Chain, Task]:
     """The arm of the URDF with its default tool, and `poses` poses it can reach."""
-    chain = load().arm.chain
+    chain = load().require_arm().chain
     q = np.random.default_rng(seed).uniform(chain.lower, chain.upper, (poses, chain.n))
     points = np.array([screws.point_on(S) for S in chain.S.T] + [chain.M[:3, 3]])
     task = Task(

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import Limiter, Limits, Motion
 from katana450.maths.motion.pursuit import stream_step
@@ -227,7 +227,7 @@ PEERS: dict[str, Follower] = {"ours": ours, "ruckig": ruckigs, "smoothed": smoot
 
 def axis_1() -> Limiter:
     """A limiter of the Katana's first axis alone."""
-    limits = load().arm.limits
+    limits = load().require_arm().limits
     return Limiter(
         Limits(limits.lower[:1], limits.upper[:1], limits.speed[:1],
                limits.acceleration[:1], limits.jerk[:1])

@@ -25,8 +25,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.collision import standing_around, world_of
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
@@ -58,13 +59,14 @@ def quiet_server() -> viser.ViserServer:
         return viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
 
 
-def loop_of(model: RobotModel, settings: Settings) -> tuple[ControlLoop, Session, Mailbox, Hand]:
-    world, _ = world_of(model)
+def loop_of(robot: Robot, settings: Settings) -> tuple[ControlLoop, Session, Mailbox, Hand]:
+    arm = robot.require_arm()
+    world, _ = world_of(robot)
     assert world is not None
     world = world.with_obstacles(standing_around(load_props()))
-    session = Session(model.arm, model.ready(settings.ready), world)
+    session = Session(arm, arm.ready(settings.ready), world)
     mailbox, clock = Mailbox(session.check), Hand()
-    driver = SimulatedDriver(model.arm, session.ready, gripper=0.0)
+    driver = SimulatedDriver(arm, session.ready, gripper=0.0)
     return ControlLoop(session, driver, mailbox, clock, settings.rate), session, mailbox, clock
 
 
@@ -105,11 +107,11 @@ def timed(show: Callable[[], None]) -> float:
 
 def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     """Measure one drive, and print."""
-    settings, model = Settings(), load()
-    loop, session, mailbox, clock = loop_of(model, settings)
+    settings, robot = Settings(), load()
+    loop, session, mailbox, clock = loop_of(robot, settings)
     server, bare = quiet_server(), quiet_server()
-    view = View(server, model, loop.board, mailbox, session, settings.frame_rate)
-    nodes = BareNodes(bare, model.arm.chain.n)
+    view = View(server, robot, loop.board, mailbox, session, settings.frame_rate)
+    nodes = BareNodes(bare, session.arm.chain.n)
     ours: list[float] = []
     floor: list[float] = []
     began = time.perf_counter()

@@ -10,7 +10,9 @@ import pytest
 
 from katana450.arm.control.arm import Arm
 from katana450.arm.control.session import Session
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
 
 LONG = "KATANA450_LONG" in os.environ
@@ -35,15 +37,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
-def model() -> RobotModel:
+def robot() -> Robot:
     """The robot of the URDF file."""
     return load()
 
 
 @pytest.fixture(scope="session")
-def arm(model: RobotModel) -> Arm:
+def arm(robot: Robot) -> MountedArm:
     """Its arm."""
-    return model.arm
+    return robot.require_arm()
 
 
 @pytest.fixture

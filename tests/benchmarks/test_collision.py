@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.collision import DRIVES, RawMeshes, main, tick_rows, world_on_table
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 
 
 def test_it_prints_both_tables(capsys: pytest.CaptureFixture[str]) -> None:
@@ -17,17 +18,17 @@ def test_it_prints_both_tables(capsys: pytest.CaptureFixture[str]) -> None:
         assert drive in printed
 
 
-def test_raw_meshes_are_no_nearer_than_the_hulls(model: RobotModel) -> None:
-    world = world_on_table(model)
-    raw = RawMeshes(model, world)
+def test_raw_meshes_are_no_nearer_than_the_hulls(robot: Robot) -> None:
+    world = world_on_table(robot)
+    raw = RawMeshes(robot, world)
     for x in np.random.default_rng(1).uniform(-0.5, 0.5, (5, 6)):
         contact = world.nearest(x)
         assert contact is not None
         assert raw.nearest(x) >= contact.distance - 1e-6
 
 
-def test_drives_end_as_their_names_say(model: RobotModel) -> None:
-    rows = {row.name: row.remark for row in tick_rows(model, world_on_table(model))}
+def test_drives_end_as_their_names_say(robot: Robot, arm: MountedArm) -> None:
+    rows = {row.name: row.remark for row in tick_rows(arm, world_on_table(robot))}
     assert rows == {
         "through free space": "ok",
         "into the table": "blocked",

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import Status
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import GHOST_COLOURS
@@ -40,15 +40,16 @@ PIXEL = 2e-3
 class Robot:
     """What a page shows and was sent of the arm."""
 
-    def __init__(self, page: ViserPage, model: RobotModel) -> None:
+    def __init__(self, page: ViserPage) -> None:
         self.page = page
         self.since = 0.0
         """Only what was sent from this time on counts: another server may have spoken before."""
-        self._model = model
+        described = load()
+        self._arm = described.require_arm()
         self.path: dict[str, str] = {}
-        for body in model.bodies:
-            above = "/arm" if body.parent is None else self.path[body.parent]
-            self.path[body.name] = f"{above}/{body.name}"
+        for link in described.links:
+            above = "/arm" if link.parent is None else self.path[link.parent]
+            self.path[link.name] = f"{above}/{link.name}"
 
     @property
     def q(self) -> FloatArray:
@@ -58,7 +59,7 @@ class Robot:
 
     def reported(self, tool: str = "tcp") -> FloatArray:
         """The tool's pose in the base frame by the product of exponentials of those joints."""
-        return self._model.T_base_shoulder @ forward(self._model.arm.chain_to(tool), self.q)
+        return self._arm.T_base_shoulder @ forward(self._arm.chain_to(tool), self.q)
 
     def sent(self, link: str = "tcp") -> FloatArray:
         """The link's pose in the base frame as the frames on the wire add up to it."""
@@ -107,9 +108,9 @@ def server() -> Iterator[AppServer]:
 
 
 @pytest.fixture(scope="module")
-def window(server: AppServer, windows: Windows, model: RobotModel) -> Iterator[Robot]:
+def window(server: AppServer, windows: Windows) -> Iterator[Robot]:
     with windows.open(server.url, nodes=("/arm", MOVE)) as page:
-        yield Robot(page, model)
+        yield Robot(page)
 
 
 @pytest.fixture
@@ -195,7 +196,7 @@ def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artef
     robot.page.keep(artefacts / "app-slider.png")
 
 
-def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot, model: RobotModel) -> None:
+def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot) -> None:
     node, since = robot.path["pan_link"], time.time()
     robot.page.drag_slider("Axis 1", 120.0)
     robot.settle()
@@ -204,7 +205,7 @@ def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot, model: Rob
     halves = [math.atan2(m.body["wxyz"][3], m.body["wxyz"][0]) for m in turns]
     angles = 2.0 * np.unwrap(halves, period=math.pi)
     steps, whole = np.abs(np.diff(angles)), abs(angles[-1] - angles[0])
-    speed = model.arm.chain.speed[0]
+    speed = load().require_arm().chain.speed[0]
     took = turns[-1].time - turns[0].time
     assert len(turns) > 20
     # Frames jitter on their way; over all of them the speed is the joint's, and none is a leap.
@@ -304,9 +305,9 @@ def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None
 
 
 def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(
-    robot: Robot, server: AppServer, open_page: OpenPage, model: RobotModel
+    robot: Robot, server: AppServer, open_page: OpenPage
 ) -> None:
-    other = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
+    other = Robot(open_page(server.url, nodes=("/arm", MOVE)))
     robot.page.drag_slider("Axis 1", -50.0)
     robot.settle()
     other.settle()
@@ -338,11 +339,9 @@ def come_back(robot: Robot, server: AppServer) -> None:
 
 
 @pytest.mark.long
-def test_killed_in_mid_drag_the_app_comes_back_whole_and_at_rest(
-    open_page: OpenPage, model: RobotModel
-) -> None:
+def test_killed_in_mid_drag_the_app_comes_back_whole_and_at_rest(open_page: OpenPage) -> None:
     with AppServer() as server:
-        robot = Robot(open_page(server.url, nodes=("/arm", MOVE)), model)
+        robot = Robot(open_page(server.url, nodes=("/arm", MOVE)))
         robot.page.drag_slider("Axis 1", 70.0)
         robot.settle()
         with robot.page.grip_arrow(MOVE, "z") as grip:

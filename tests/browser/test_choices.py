@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.cli.main import main
 from katana450.extensions.export.reachability_file import load_map
 from katana450.maths.kinematics.forward import forward
@@ -41,9 +41,9 @@ def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
 
 
 def test_a_person_looks_at_the_branches_and_takes_one(
-    page: ViserPage, model: RobotModel, artefacts: Path
+    page: ViserPage, arm: MountedArm, artefacts: Path
 ) -> None:
-    chain = model.arm.chain
+    chain = arm.chain
 
     def now(key: str) -> str:
         return page.text_of(f".k450 [data-now={key}]")
@@ -66,7 +66,7 @@ def test_a_person_looks_at_the_branches_and_takes_one(
     )
     assert np.allclose(
         page.node_pose("/velocity")[:3, 3],
-        (model.T_base_shoulder @ forward(chain, READY))[:3, 3],
+        (arm.T_base_shoulder @ forward(chain, READY))[:3, 3],
         atol=1e-5,
     )
     # Looking moved nothing.

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.client import Client, connect
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
@@ -93,7 +93,7 @@ def stage(windows: Windows) -> Iterator[Stage]:
 
 
 def test_a_circle_is_looked_at_run_and_traced(
-    stage: Stage, model: RobotModel, artefacts: Path
+    stage: Stage, arm: MountedArm, artefacts: Path
 ) -> None:
     page = stage.page
     page.choose("Script", CIRCLE)
@@ -114,7 +114,7 @@ def test_a_circle_is_looked_at_run_and_traced(
     assert program(stage.wait_for("done")).why == ""
     page.wait_until(lambda: "done" in page.text_of(".k450.program"), "the panel to say so")
     page.screenshot(artefacts / "demo-circle.png")
-    centre = model.T_base_shoulder @ (0.15, 0.0, -0.11, 1.0)
+    centre = arm.T_base_shoulder @ (0.15, 0.0, -0.11, 1.0)
     away = stage.line("/path/traced") - centre[:3]
     assert np.abs(np.linalg.norm(away, axis=1) - 0.1).max() < 1e-5
     assert np.abs(away[:, 0]).max() < 1e-5

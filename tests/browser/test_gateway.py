@@ -17,7 +17,6 @@ import pytest
 from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
-from katana450.arm.robot.model import RobotModel
 from katana450.resources import STATIC
 from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
@@ -287,11 +286,11 @@ def camera(page: ViserPage) -> Any:
 
 
 def test_a_killed_server_is_told_at_once_and_the_page_comes_back(
-    open_page: OpenPage, model: RobotModel, artefacts: Path
+    open_page: OpenPage, artefacts: Path
 ) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm", MOVE))
-        robot = Robot(page, model)
+        robot = Robot(page)
         started = camera(page)
         page.page.mouse.move(300, 500)
         page.page.mouse.down()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import AHEAD, LOOKS, Preset
@@ -47,9 +47,9 @@ def pair(windows: Windows) -> Iterator[tuple[ViserPage, ViserPage]]:
 
 
 def test_each_window_looks_from_where_its_person_asks(
-    pair: tuple[ViserPage, ViserPage], model: RobotModel, artefacts: Path
+    pair: tuple[ViserPage, ViserPage], arm: MountedArm, artefacts: Path
 ) -> None:
-    chain = model.arm.chain
+    chain = arm.chain
     page, other = pair
     others = seen_from(other)
     for preset, look in LOOKS.items():
@@ -60,7 +60,7 @@ def test_each_window_looks_from_where_its_person_asks(
     page.click_button(Preset.TOOL.value)
 
     def on_tool(q: FloatArray) -> FloatArray:
-        T = model.T_base_shoulder @ forward(chain, q)
+        T = arm.T_base_shoulder @ forward(chain, q)
         ahead: FloatArray = T[:3, 3] + AHEAD * T[:3, 0]
         return ahead
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Route
 
-from katana450.arm.robot.mechanism import Mechanism, camera
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.camera import camera
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.vrml import vrml_files
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
@@ -41,7 +42,7 @@ TURN = """async turns => {
 def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
     """The file is opened at the first pose; then its joints are turned to the others."""
     assert SCRIPT is not None
-    script, katana = SCRIPT, load_mechanism(URDF_PATH)[0]
+    script, katana = SCRIPT, load(URDF_PATH)
     page = browser.new_page(viewport={"width": SIZE, "height": SIZE})
     world = vrml_files(katana, katana.values(POSES[0]))["katana450.wrl"]
 
@@ -71,7 +72,7 @@ def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
         page.close()
 
 
-def turns(katana: Mechanism, pose: tuple[float, ...]) -> dict[str, list[float]]:
+def turns(katana: Robot, pose: tuple[float, ...]) -> dict[str, list[float]]:
     """Axis and angle of each joint; at zero all frames of the Katana are parallel."""
     values = katana.values(pose)
     return {name: [*joint.axis.tolist(), values[name]] for name, joint in katana.joints.items()}

@@ -15,7 +15,7 @@ import distributed
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.cli import cluster
 from katana450.cli.main import main
 from katana450.errors import ConfigurationError
@@ -148,11 +148,11 @@ def test_a_scheduler_without_workers_is_told(
 
 
 def test_a_scheduler_that_dies_is_told(
-    scheduler: tuple[subprocess.Popen[str], str], model: RobotModel
+    scheduler: tuple[subprocess.Popen[str], str], arm: MountedArm
 ) -> None:
     """The last test of this file, because nobody is left to answer after it."""
     process, address = scheduler
-    reachability = Reachability(model.arm.chain, model.T_base_shoulder, 0.0, 4, 4)
+    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.0, 4, 4)
     survey = Survey(reachability, voxel=0.05, samples=0, seed=0)
     chunks = survey.grid.chunks(50)
     with cluster.connected(address) as connection:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.script import parse
 from katana450.maths.kinematics.forward import forward
@@ -67,7 +67,7 @@ def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
         rows = list(csv.DictReader(file))
     on_circle = [row for row in rows if row["task"] == "circle"]
     assert len(on_circle) > 200
-    flange = load().arm.chain_to("flange")
+    flange = load().require_arm().chain_to("flange")
     for row in on_circle:
         q = [math.radians(float(row[f"theta{axis}_deg"])) for axis in range(1, 6)]
         x, y, z = 1e3 * forward(flange, q)[:3, 3]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.cli.main import main
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -104,14 +104,14 @@ def test_ik_with_badges_says_what_each_solution_costs() -> None:
 
 
 @pytest.mark.parametrize("decimals", [6, 5, 4])
-def test_ik_takes_printed_poses(model: RobotModel, decimals: int) -> None:
+def test_ik_takes_printed_poses(arm: MountedArm, decimals: int) -> None:
     """2,000 of 2,000, each answered within what the rounding implies.
 
     Next to a stretched elbow a rounded point can be out of reach at its orientation, which then
     gives way by more than the rounding; ``residual_rad`` reports that.
     """
-    chain = model.arm.chain
-    poses = [forward(chain, q) for q in random_postures(model, 2000)]
+    chain = arm.chain
+    poses = [forward(chain, q) for q in random_postures(arm, 2000)]
     answers = ask("ik", [{"T": pose.round(decimals).tolist()} for pose in poses])
     assert [answer["error"] for answer in answers if "error" in answer] == []
     rounding = 0.5 * 10.0**-decimals
@@ -131,8 +131,8 @@ def test_ik_takes_printed_poses(model: RobotModel, decimals: int) -> None:
     assert beyond <= 20
 
 
-def random_postures(model: RobotModel, count: int) -> FloatArray:
-    chain = model.arm.chain
+def random_postures(arm: MountedArm, count: int) -> FloatArray:
+    chain = arm.chain
     return np.random.default_rng(450).uniform(chain.lower, chain.upper, (count, chain.n))
 
 
@@ -147,12 +147,12 @@ def test_ik_refuses_a_skewed_rotation_with_the_figure() -> None:
     assert "off orthonormal by 0.001 (allowed: 1e-03)" in answer["error"]
 
 
-def test_the_base_frame_is_the_shoulder_frame_moved(model: RobotModel) -> None:
+def test_the_base_frame_is_the_shoulder_frame_moved(arm: MountedArm) -> None:
     q = [0.3, -0.9, 0.8, 0.4, 1.0]
     request = {"q": q, "tool": "grasp"}
     (shoulder,) = ask("fk", [request])
     (base,) = ask("fk", [request], "--frame", "base")
-    assert np.allclose(model.T_base_shoulder @ np.array(shoulder["T"]), base["T"], atol=1e-15)
+    assert np.allclose(arm.T_base_shoulder @ np.array(shoulder["T"]), base["T"], atol=1e-15)
     (answer,) = ask("ik", [base | {"tool": "grasp"}], "--frame", "base")
     assert any(np.allclose(s["q"], q) for s in answer["solutions"])
 

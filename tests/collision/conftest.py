@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import World, obstacle
 from katana450.maths.geometry.arrays import FloatArray
 
 
 @pytest.fixture(scope="session")
-def bare(model: RobotModel) -> World:
+def bare(robot: Robot) -> World:
     """The arm without anything round it."""
-    world, notes = world_of(model)
+    world, notes = world_of(robot)
     assert world is not None
     assert notes == ()
     return world
@@ -28,9 +29,9 @@ def world(bare: World) -> World:
 
 
 @pytest.fixture(scope="session")
-def limits(model: RobotModel) -> tuple[FloatArray, FloatArray]:
+def limits(arm: MountedArm) -> tuple[FloatArray, FloatArray]:
     """Lower and upper limits (6,) [rad] of the joints and the fingers."""
-    chain, gripper = model.arm.chain, model.arm.gripper
+    chain, gripper = arm.chain, arm.gripper
     return np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
 
 

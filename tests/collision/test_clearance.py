@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
 from katana450.maths.collision.linkage import Linkage, Mover
 from katana450.maths.collision.shape import box, cylinder
@@ -127,11 +127,11 @@ def test_the_same_step_is_the_same_to_the_bit(world: World, postures: FloatArray
 
 
 def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
-    model: RobotModel, world: World, limits: tuple[FloatArray, FloatArray]
+    arm: MountedArm, world: World, limits: tuple[FloatArray, FloatArray]
 ) -> None:
     """From goal to goal, most of them in the table or in the arm itself; also between the ticks."""
     rng = np.random.default_rng(10)
-    speed = np.append(model.arm.chain.speed, model.arm.gripper.speed)
+    speed = np.append(arm.chain.speed, arm.gripper.speed)
     x = np.append(np.radians((0.0, -68.0, 85.0, 8.0, 0.0)), 0.0)
     stops = 0
     for goal in rng.uniform(*limits, (25, 6)):

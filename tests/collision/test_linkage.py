@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import yourdfpy
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.linkage import GROUND
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
@@ -13,14 +13,14 @@ from katana450.resources import URDF_PATH
 
 
 def test_every_part_is_where_the_description_has_it(
-    model: RobotModel, bare: World, postures: FloatArray
+    robot: Robot, bare: World, postures: FloatArray
 ) -> None:
-    robot = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
+    urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
     for x in postures[:20]:
-        robot.update_cfg(model.joint_angles(x[:-1], float(x[-1])))
+        urdf.update_cfg(robot.joint_values(x[:-1], float(x[-1])))
         T = bare.linkage.poses(x)
         for part in bare.parts:
-            expected = robot.get_transform(part.name, "base_link")
+            expected = urdf.get_transform(part.name, "base_link")
             np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
 
 

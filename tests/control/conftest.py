@@ -8,7 +8,7 @@ import pytest
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.shape import cylinder, half_space
 from katana450.maths.collision.world import World, obstacle
 from katana450.maths.geometry import se3
@@ -21,9 +21,9 @@ def state(session: Session) -> State:
 
 
 @pytest.fixture(scope="session")
-def world(model: RobotModel) -> World:
+def world(robot: Robot) -> World:
     """The arm on its table, a cup before it."""
-    found, _ = world_of(model)
+    found, _ = world_of(robot)
     assert found is not None
     cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
     cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))

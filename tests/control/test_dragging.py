@@ -17,7 +17,7 @@ from katana450.arm.control.arm import NO_GRIPPER, Arm
 from katana450.arm.control.choices import wish
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status, ToolTarget
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
@@ -212,7 +212,7 @@ def test_thousands_of_drags(arm: Arm, session: Session, reading: Reading) -> Non
 def others() -> Iterator[tuple[str, Chain]]:
     """Arms with offsets of every kind, and tool points beside their roll axis."""
     for name in ("pincherx_150", "youbot_arm"):
-        yield name, load(ARMS / f"{name}.urdf").arm.chain
+        yield name, load(ARMS / f"{name}.urdf").require_arm().chain
     for seed in (1, 2, 3):
         rng = np.random.default_rng(seed)
         chain, _ = random_member(rng, lateral=seed != 1)

@@ -15,8 +15,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.arm.control.things import MOST, Form, Thing
 from katana450.arm.robot.collision import hand_of, table, things_of, world_of
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
@@ -37,14 +38,14 @@ the palm would be in the cup if the grasp frame came any nearer."""
 
 
 @pytest.fixture(scope="module")
-def session(model: RobotModel) -> Session:
-    world, _ = world_of(model)
+def session(robot: Robot, arm: MountedArm) -> Session:
+    world, _ = world_of(robot)
     assert world is not None
     return Session(
-        model.arm,
-        model.ready(Settings().ready),
+        arm,
+        arm.ready(Settings().ready),
         world.with_obstacles((table(),)),
-        hand=hand_of(model, world),
+        hand=hand_of(robot, world),
         things=things_of(load_props()),
     )
 
@@ -67,15 +68,15 @@ def cup_of(session: Session, state: State) -> tuple[Thing, FloatArray]:
 
 
 def before_cup(
-    session: Session, model: RobotModel, state: State, back: float, beside: float = 0.0
+    session: Session, arm: MountedArm, state: State, back: float, beside: float = 0.0
 ) -> FloatArray:
     """(5,) joints with the grasp frame ``back`` [m] before the cup's axis, along the tool.
 
     beside: [m] to the left of it.
     """
-    chain = model.arm.chain_to("grasp")
+    chain = arm.chain_to("grasp")
     _, T = cup_of(session, state)
-    p = T[:3, 3] - model.T_base_shoulder[:3, 3] + [0.0, 0.0, HEIGHT]
+    p = T[:3, 3] - arm.T_base_shoulder[:3, 3] + [0.0, 0.0, HEIGHT]
     azimuth = np.arctan2(p[1], p[0])
     out = np.array((np.cos(azimuth), np.sin(azimuth), 0.0))
     p = p - back * (np.cos(PITCH) * out - np.sin(PITCH) * np.array((0.0, 0.0, 1.0)))
@@ -91,16 +92,14 @@ def before_cup(
 
 
 @pytest.fixture(scope="module")
-def holding(session: Session, model: RobotModel) -> State:
+def holding(session: Session, arm: MountedArm) -> State:
     """With the cup between the fingers, on the table."""
     state = session.begin(session.ready, 0.0, 0.0)
     state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
-    before = before_cup(session, model, state, BEFORE)
-    state = run(
-        session, state, cmd.Follow(plan_to(model.arm, session.world_at(state), state, before))
-    )
-    at = before_cup(session, model, state, AT)
-    state = run(session, state, cmd.Follow(plan_to(model.arm, session.world_at(state), state, at)))
+    before = before_cup(session, arm, state, BEFORE)
+    state = run(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, before)))
+    at = before_cup(session, arm, state, AT)
+    state = run(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, at)))
     np.testing.assert_allclose(state.q, at, rtol=0, atol=1e-9)
     return run(session, state, cmd.SetGripper(-0.44))
 
@@ -121,29 +120,29 @@ def test_fingers_that_close_on_the_cup_hold_it_where_it_stands(
     assert holding.status.value == "ok"
 
 
-def lifted(session: Session, model: RobotModel, state: State, by: float) -> State:
+def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
     """With the tool ``by`` [m] higher, pitch and roll as they are."""
-    chain = model.arm.chain_to("grasp")
+    chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, state.q)
     up = replace(at, position=at.position + np.array((0.0, 0.0, by)))
     way = ToolPath(chain, ToolLine(at, up), state.branch, state.q)
     return run(
         session,
         state,
-        cmd.Follow(plan_along(model.arm, session.world_at(state), state, [way])),
+        cmd.Follow(plan_along(arm, session.world_at(state), state, [way])),
     )
 
 
 def test_what_is_held_goes_with_the_hand_and_is_looked_at_for_contacts(
-    session: Session, model: RobotModel, holding: State
+    session: Session, arm: MountedArm, holding: State
 ) -> None:
-    up = lifted(session, model, holding, 0.12)
+    up = lifted(session, arm, holding, 0.12)
     _, T = cup_of(session, holding)
     _, T_up = cup_of(session, up)
     np.testing.assert_allclose(T_up[:3, :3], T[:3, :3], rtol=0, atol=1e-9)
     np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-9)
     # Back down by more than there is room for: cup, not fingers, meets the table.
-    chain = model.arm.chain_to("grasp")
+    chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, up.q)
     down = run(session, up, cmd.MoveTool(at.position - [0.0, 0.0, 0.2]))
     (met,) = (f for f in down.findings if f.reason is Reason.CONTACT)
@@ -171,9 +170,9 @@ def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
 
 
 def test_fingers_that_open_let_the_cup_stand_on_the_table(
-    session: Session, model: RobotModel, holding: State
+    session: Session, arm: MountedArm, holding: State
 ) -> None:
-    up = lifted(session, model, holding, 0.03)
+    up = lifted(session, arm, holding, 0.03)
     _, T_up = cup_of(session, up)
     left = run(session, up, cmd.SetGripper(OPEN))
     cup, T = cup_of(session, left)
@@ -183,19 +182,19 @@ def test_fingers_that_open_let_the_cup_stand_on_the_table(
     assert T[2, 3] == 0.0
     np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=1e-12)
     # And what stands between open fingers may be left behind.
-    back = before_cup(session, model, left, BEFORE)
+    back = before_cup(session, arm, left, BEFORE)
     away = run(session, left, cmd.SetJoints(back))
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
 def test_one_finger_that_touches_holds_nothing_and_says_which_does_not(
-    session: Session, model: RobotModel
+    session: Session, arm: MountedArm
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
     for back in (BEFORE, AT):
-        q = before_cup(session, model, state, back, beside=0.008)
-        plan = plan_to(model.arm, session.world_at(state), state, q)
+        q = before_cup(session, arm, state, back, beside=0.008)
+        plan = plan_to(arm, session.world_at(state), state, q)
         state = run(session, state, cmd.Follow(plan))
     closed = run(session, state, cmd.SetGripper(-0.44))
     assert not cup_of(session, closed)[0].held

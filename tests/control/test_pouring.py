@@ -12,8 +12,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.control.things import Thing
 from katana450.arm.robot.collision import hand_of, table, things_of, world_of
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.water import around_of
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
@@ -25,15 +26,15 @@ FULL = counted(200.0 * ML)
 
 
 @pytest.fixture(scope="module")
-def session(model: RobotModel) -> Session:
-    world, _ = world_of(model)
+def session(robot: Robot, arm: MountedArm) -> Session:
+    world, _ = world_of(robot)
     assert world is not None
     props = load_props()
     return Session(
-        model.arm,
-        model.ready(Settings().ready),
+        arm,
+        arm.ready(Settings().ready),
         world.with_obstacles((table(),)),
-        hand=hand_of(model, world),
+        hand=hand_of(robot, world),
         things=things_of(props),
         around=around_of(props),
     )

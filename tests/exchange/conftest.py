@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from katana450.arm.robot.mechanism import Mechanism
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"
@@ -23,10 +23,10 @@ GANTRY_POSE = (0.3, 2.0, -0.6)
 
 
 @pytest.fixture(scope="session")
-def katana() -> Mechanism:
-    return load_mechanism(URDF_PATH)[0]
+def katana() -> Robot:
+    return load(URDF_PATH)
 
 
 @pytest.fixture(scope="session")
-def gantry() -> Mechanism:
-    return load_mechanism(GANTRY)[0]
+def gantry() -> Robot:
+    return load(GANTRY)

@@ -11,7 +11,7 @@ import trimesh
 import yourdfpy
 from PIL import Image, ImageDraw
 
-from katana450.arm.robot.mechanism import FIELD_OF_VIEW, Camera
+from katana450.arm.robot.camera import FIELD_OF_VIEW, Camera
 
 SIZE = 800
 """Pixels of a picture's edge."""

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mechanism import Mechanism, camera
+from katana450.arm.robot.camera import camera
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.c_source import c_files
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
@@ -29,9 +30,9 @@ FRAME = 1.0 / 30.0
 """[s] Of processor that a picture may take."""
 
 
-def written(folder: Path, mechanism: Mechanism, pose: tuple[float, ...]) -> Path:
+def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
     folder.mkdir(exist_ok=True)
-    for name, content in c_files(mechanism, mechanism.values(pose)).items():
+    for name, content in c_files(robot, robot.values(pose)).items():
         (folder / name).write_bytes(content)
     return folder
 
@@ -43,7 +44,7 @@ def processor() -> float:
 
 
 @pytest.fixture(scope="module")
-def viewer(tmp_path_factory: pytest.TempPathFactory, katana: Mechanism) -> Path:
+def viewer(tmp_path_factory: pytest.TempPathFactory, katana: Robot) -> Path:
     """The Katana's, built by gcc."""
     folder = written(tmp_path_factory.mktemp("c"), katana, POSES[1])
     before = processor()
@@ -65,7 +66,7 @@ def joined(pose: tuple[float, ...]) -> str:
 @needs(*VIEWER)
 @pytest.mark.parametrize("pose", POSES)
 def test_it_draws_what_we_do(
-    tmp_path: Path, viewer: Path, katana: Mechanism, pose: tuple[float, ...]
+    tmp_path: Path, viewer: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     ours = silhouette(placed(URDF_PATH, katana.values(pose)), camera(katana))
     theirs = seen(shot(viewer, tmp_path / "a.ppm", "--pose", joined(pose)))
@@ -73,7 +74,7 @@ def test_it_draws_what_we_do(
 
 
 @needs(*VIEWER, "clang", "cmake")
-def test_clang_and_cmake_build_any_mechanism(tmp_path: Path, gantry: Mechanism) -> None:
+def test_clang_and_cmake_build_any_mechanism(tmp_path: Path, gantry: Robot) -> None:
     folder = written(tmp_path / "c", gantry, GANTRY_POSE)
     words = ("-DCMAKE_C_COMPILER=clang", "-DCMAKE_C_FLAGS=-Werror")
     run("cmake", "-S", folder, "-B", tmp_path / "build", *words)
@@ -85,7 +86,7 @@ def test_clang_and_cmake_build_any_mechanism(tmp_path: Path, gantry: Mechanism) 
 
 
 @needs("clang", "/usr/include/GL/freeglut.h")
-def test_clang_has_nothing_to_say_of_the_arm(tmp_path: Path, katana: Mechanism) -> None:
+def test_clang_has_nothing_to_say_of_the_arm(tmp_path: Path, katana: Robot) -> None:
     sources = sorted(written(tmp_path / "c", katana, ()).glob("*.c"))
     assert len(sources) == 12
     words = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only")
@@ -105,7 +106,7 @@ def test_a_picture_is_quick(viewer: Path) -> None:
 
 
 @needs(*VIEWER)
-def test_it_follows_a_running_server(tmp_path: Path, viewer: Path, katana: Mechanism) -> None:
+def test_it_follows_a_running_server(tmp_path: Path, viewer: Path, katana: Robot) -> None:
     with AppServer((*APP, "--lines", "0")) as server:
         deadline = time.monotonic() + 20.0
         while not (found := re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)):
@@ -138,9 +139,7 @@ wait $viewer
 
 
 @needs(*VIEWER, "xdotool")
-def test_keys_and_mouse_move_joints_and_camera(
-    tmp_path: Path, viewer: Path, katana: Mechanism
-) -> None:
+def test_keys_and_mouse_move_joints_and_camera(tmp_path: Path, viewer: Path, katana: Robot) -> None:
     run(*SCREEN, "bash", "-c", HANDS, viewer, f"{SIZE}x{SIZE}", folder=tmp_path)
     pose = np.add(POSES[1], (0.2, -0.15, 0.0, 0.0, 0.0, 0.0))
     meshes, view = placed(URDF_PATH, katana.values(pose.tolist())), camera(katana)
@@ -170,7 +169,7 @@ def test_words_it_does_not_know_are_refused(
         run(*SCREEN, viewer, *words)
 
 
-def test_the_arrays_are_the_papers(katana: Mechanism) -> None:
+def test_the_arrays_are_the_papers(katana: Robot) -> None:
     """Three arrays a link that say the same as its shapes."""
     files = c_files(katana, katana.values(()))
     total = 0
@@ -199,7 +198,7 @@ def test_the_arrays_are_the_papers(katana: Mechanism) -> None:
     assert total == 48_942
 
 
-def test_names_of_a_robot_cannot_break_the_c(gantry: Mechanism) -> None:
+def test_names_of_a_robot_cannot_break_the_c(gantry: Robot) -> None:
     files = c_files(gantry, gantry.values(()))
     assert {"left_finger.c", "right_finger.c"} <= set(files)
     assert b'#define ROBOT_NAME "gantry 2"' in files["robot.h"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.c_source import c_files
 from tests.exchange.conftest import GANTRY_POSE
 from tests.exchange.tools import needs, run
@@ -75,7 +75,7 @@ int main()
 @needs("gcc", "g++")
 @pytest.mark.parametrize("compiler", ["gcc -std=c99", "g++ -std=c++98"], ids=["C", "C++"])
 def test_cplusplus_program_draws_the_exported_robot(
-    tmp_path: Path, gantry: Mechanism, compiler: str
+    tmp_path: Path, gantry: Robot, compiler: str
 ) -> None:
     files = c_files(gantry, gantry.values(GANTRY_POSE))
     (tmp_path / "GL").mkdir()

@@ -14,7 +14,7 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.maths.geometry import so3
@@ -27,25 +27,25 @@ UPRIGHT = so3.rotation_x(-np.pi / 2.0)
 
 @pytest.mark.parametrize("which", ["katana", "gantry"])
 def test_trimesh_finds_every_link_where_the_urdf_has_it(
-    which: str, katana: Mechanism, gantry: Mechanism
+    which: str, katana: Robot, gantry: Robot
 ) -> None:
-    path, mechanism, pose = (
+    path, robot, pose = (
         (URDF_PATH, katana, POSES[2]) if which == "katana" else (GANTRY, gantry, GANTRY_POSE)
     )
-    values = mechanism.values(pose)
-    ((name, content),) = glb_files(mechanism, values).items()
+    values = robot.values(pose)
+    ((name, content),) = glb_files(robot, values).items()
     assert name == ("katana450.glb" if which == "katana" else "gantry_2.glb")
     scene = trimesh.load_scene(io.BytesIO(content), file_type="glb")
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     urdf.update_cfg({name: values[name] for name in urdf.actuated_joint_names})
-    for link in mechanism.links:
+    for link in robot.links:
         T, _ = scene.graph[link.name]
         expected = urdf.get_transform(link.name)
         np.testing.assert_allclose(T[:3, 3], UPRIGHT @ expected[:3, 3], atol=1e-6)
         np.testing.assert_allclose(T[:3, :3], UPRIGHT @ expected[:3, :3], atol=1e-6)
         if link.parent is not None:
             assert scene.graph.transforms.parents[link.name] == link.parent
-    shapes = [shape for link in mechanism.links for shape in link.shapes]
+    shapes = [shape for link in robot.links for shape in link.shapes]
     assert sum(len(mesh.faces) for mesh in scene.geometry.values()) == sum(
         len(shape.faces) for shape in shapes
     )
@@ -53,7 +53,7 @@ def test_trimesh_finds_every_link_where_the_urdf_has_it(
     assert found == {shape.material.name for shape in shapes}
 
 
-def test_colours_and_normals_come_through(katana: Mechanism) -> None:
+def test_colours_and_normals_come_through(katana: Robot) -> None:
     """Against the mesh files that the URDF names."""
     ((_, content),) = glb_files(katana, katana.values(())).items()
     ours = trimesh.load_scene(io.BytesIO(content), file_type="glb")
@@ -89,7 +89,7 @@ def floats(told: dict[str, Any], body: bytes, number: int) -> npt.NDArray[np.flo
     return values.reshape(accessor["count"], -1)
 
 
-def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Mechanism) -> None:
+def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "m.csv").write_text("t,rail,turn,grip\n0,0,0,0\n1,0.4,5,-1\n3,-0.4,4,0.5\n")
     motion = load_motion(tmp_path / "m.csv", gantry)
     ((_, content),) = glb_files(gantry, gantry.values(()), motion).items()
@@ -127,7 +127,7 @@ def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Mechanism) -> No
 
 
 @needs("tovrmlx3d")
-def test_another_program_reads_it_with_its_motion(tmp_path: Path, katana: Mechanism) -> None:
+def test_another_program_reads_it_with_its_motion(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,2\n")
     motion = load_motion(tmp_path / "m.csv", katana)
     ((name, content),) = glb_files(katana, katana.values(()), motion).items()

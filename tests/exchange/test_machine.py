@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.robot.machine import load_machine
-from katana450.assembly.robot_session import Described, Jointed, recognised
+from katana450.arm.robot.loader import load
+from katana450.assembly.robot_session import recognised
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
@@ -26,15 +26,15 @@ ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 
 def test_what_follows_binds_what_it_follows() -> None:
-    machine = load_machine(GANTRY, "why")
-    joints = machine.joints
+    robot = load(GANTRY)
+    joints = robot.joint_group
     assert joints.names == ("rail", "turn", "grip")
     assert joints.slides == (True, False, False)
     # Of "grip too" = 0.1 - grip in (-2, 2) and "out" = -0.04 + ... nothing is nearer than its own.
     np.testing.assert_allclose(joints.lower, (-0.4, -math.pi, -1.0))
     np.testing.assert_allclose(joints.upper, (0.4, math.pi, 0.5))
     assert joints.speed[1] == 1.0
-    assert any("'turn' has no speed of its own: 1 rad/s" in note for note in machine.notes)
+    assert any("'turn' has no speed of its own: 1 rad/s" in note for note in robot.joint_notes)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -43,20 +43,20 @@ def test_no_posture_inside_the_limits_takes_any_joint_beyond_its_own(
 ) -> None:
     path = tmp_path / "tree.urdf"
     path.write_text(tree(seed, 6 + seed))
-    machine = load_machine(path, "why")
-    joints, random = machine.joints, np.random.default_rng(seed)
+    robot = load(path)
+    joints, random = robot.joint_group, np.random.default_rng(seed)
     for share in (0.0, 1.0, random.uniform(size=joints.n)):
-        values = machine.values(joints.lower + share * (joints.upper - joints.lower))
+        values = robot.joint_values(joints.lower + share * (joints.upper - joints.lower), 0.0)
         for name, value in values.items():
-            joint = machine.mechanism.joints[name]
+            joint = robot.joints[name]
             assert joint.lower - 1e-12 <= value <= joint.upper + 1e-12
 
 
 def test_a_way_is_that_of_the_link_that_goes_farthest() -> None:
-    machine = load_machine(GANTRY, "why")
+    robot = load(GANTRY)
     q = np.zeros(3)
-    assert machine.way(q, q) == 0.0
-    assert machine.way(q, np.array((0.25, 0.0, 0.0))) == pytest.approx(0.25)
+    assert robot.distance(q, q) == 0.0
+    assert robot.distance(q, np.array((0.25, 0.0, 0.0))) == pytest.approx(0.25)
 
 
 LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
@@ -76,26 +76,26 @@ def test_what_cannot_be_driven_is_told(tmp_path: Path, text: str, said: str) -> 
     path = tmp_path / "r.urdf"
     path.write_text(text)
     with pytest.raises(RobotDescriptionError, match=said):
-        load_machine(path, "why")
+        assert load(path).joint_group
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_can_be_driven_can_be_exported(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "tree.urdf"
     path.write_text(tree(seed))
-    machine = load_machine(path, "why")
-    mechanism, values = machine.mechanism, machine.values(machine.joints.upper)
+    robot = load(path)
+    values = robot.joint_values(robot.joint_group.upper, 0.0)
     made = (
-        vrml_files(mechanism, values),
-        c_files(mechanism, values),
-        glb_files(mechanism, values, None),
+        vrml_files(robot, values),
+        c_files(robot, values),
+        glb_files(robot, values, None),
         package_files(path),
     )
     for files in made:
         assert files
         assert all(files.values())
     world = read_world(made[0]["tree.wrl"].decode())
-    assert set(machine.joints.names) <= set(world.named())
+    assert set(robot.joint_group.names) <= set(world.named())
 
 
 def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_path: Path) -> None:
@@ -107,14 +107,14 @@ def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_pat
     path = tmp_path / "skewed.urdf"
     path.write_text(before + re.sub(r'<axis xyz="[^"]*"/>', skewed, after, count=1))
     found = recognised(Settings(), path, None)
-    assert isinstance(found, Jointed)
-    why = found.machine.joints.why
+    assert found.robot.arm is None
+    why = found.robot.why
+    assert found.robot.joint_group.why == why
     assert "axis 3 must be parallel to axis 2 and is 12 deg off" in why
     assert f"Joints only. {why}" in found.notes
     with pytest.raises(InputError, match="12 deg off"):
         found.session.check(cmd.SetPose(np.eye(4)))
-    straight = recognised(Settings(), ARMS / "pincherx_150.urdf", None)
-    assert isinstance(straight, Described)
+    assert recognised(Settings(), ARMS / "pincherx_150.urdf", None).robot.arm is not None
     # Whoever names a tool wants to send it somewhere.
     with pytest.raises(RobotDescriptionError, match="12 deg off"):
-        recognised(Settings(), path, found.machine.mechanism.links[-1].name)
+        recognised(Settings(), path, found.robot.links[-1].name)

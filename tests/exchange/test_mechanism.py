@@ -1,4 +1,4 @@
-"""A mechanism is what its URDF says, as yourdfpy reads it; what it cannot be is refused."""
+"""The tree of a robot is what its URDF says, as yourdfpy reads it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.arm.robot.mechanism import FIELD_OF_VIEW, Mechanism, camera
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.export.names import distinct
 from katana450.resources import URDF_PATH
@@ -22,16 +23,16 @@ ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 @pytest.mark.parametrize("path", [URDF_PATH, *sorted(ARMS.glob("*.urdf"))])
 def test_links_are_where_yourdfpy_has_them(path: Path) -> None:
-    mechanism, notes = load_mechanism(path)
+    robot = load(path)
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
-    assert notes == ()
-    assert set(mechanism.driven) == set(urdf.actuated_joint_names)
+    assert robot.notes == ()
+    assert set(robot.driven) == set(urdf.actuated_joint_names)
     rng = np.random.default_rng(9)
     for _ in range(10):
-        ends = [(mechanism.joints[n].lower, mechanism.joints[n].upper) for n in mechanism.driven]
+        ends = [(robot.joints[n].lower, robot.joints[n].upper) for n in robot.driven]
         pose = [rng.uniform(max(low, -4.0), min(high, 4.0)) for low, high in ends]
-        urdf.update_cfg(dict(zip(mechanism.driven, pose, strict=True)))
-        frames = mechanism.frames(mechanism.values(pose))
+        urdf.update_cfg(dict(zip(robot.driven, pose, strict=True)))
+        frames = robot.frames(robot.values(pose))
         for link in urdf.link_map:
             np.testing.assert_allclose(frames[link], urdf.get_transform(link), atol=1e-12)
 
@@ -40,7 +41,7 @@ def test_a_follower_of_a_follower_follows_who_is_driven(tmp_path: Path) -> None:
     direct = '<mimic joint="grip" multiplier="-0.1" offset="-0.04"/>'
     chained = '<mimic joint="grip too" multiplier="0.1" offset="-0.05"/>'
     (tmp_path / "other.urdf").write_text(GANTRY.read_text().replace(direct, chained))
-    gantry, _ = load_mechanism(tmp_path / "other.urdf")
+    gantry = load(tmp_path / "other.urdf")
     assert gantry.driven == ("rail", "turn", "grip")
     values = gantry.values((0.1, 20.0, -0.5))
     assert values["grip too"] == pytest.approx(0.6)
@@ -51,7 +52,7 @@ def test_a_follower_of_a_follower_follows_who_is_driven(tmp_path: Path) -> None:
     np.testing.assert_allclose(slid[:3, 3], [0.0, 0.0, 0.16 - values["out"]], atol=1e-15)
 
 
-def test_every_shape_is_there_with_its_material(katana: Mechanism) -> None:
+def test_every_shape_is_there_with_its_material(katana: Robot) -> None:
     shapes = [shape for link in katana.links for shape in link.shapes]
     assert sum(len(shape.faces) for shape in shapes) == 48_942
     colours = {shape.material.name: shape.material.colour for shape in shapes}
@@ -62,7 +63,7 @@ def test_every_shape_is_there_with_its_material(katana: Mechanism) -> None:
         np.testing.assert_allclose(np.linalg.norm(shape.normals, axis=1), 1.0, atol=1e-6)
 
 
-def test_what_brings_no_normals_keeps_its_edges(gantry: Mechanism) -> None:
+def test_what_brings_no_normals_keeps_its_edges(gantry: Robot) -> None:
     shapes = {link.name: link.shapes for link in gantry.links}
     (box,), (ball,) = shapes["cart"], shapes["thumb"]
     for shape, most in ((box, 1e-6), (ball, math.radians(10.0))):
@@ -102,7 +103,7 @@ def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) 
         assert shape in text
         text = text.replace(shape, mesh)
     (tmp_path / "other.urdf").write_text(text)
-    shapes = {link.name: link.shapes for link in load_mechanism(tmp_path / "other.urdf")[0].links}
+    shapes = {link.name: link.shapes for link in load(tmp_path / "other.urdf").links}
     (cart,), (thumb,) = shapes["cart"], shapes["thumb"]
     assert cart.material.colour == pytest.approx((0.8, 0.1, 0.2), abs=0.01)
     assert thumb.material.colour == pytest.approx((0.1, 0.4, 0.7), abs=0.01)
@@ -113,8 +114,8 @@ def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) 
 
 
 def test_an_arm_without_shapes_is_drawn_as_rods() -> None:
-    mechanism, _ = load_mechanism(ARMS / "pincherx_150.urdf")
-    links = {link.name: link for link in mechanism.links}
+    robot = load(ARMS / "pincherx_150.urdf")
+    links = {link.name: link for link in robot.links}
     assert not links["fingertips"].shapes
     # The elbow stands 50 mm before the shoulder and 150 mm above it.
     (rod,) = links["upper_arm"].shapes
@@ -122,7 +123,7 @@ def test_an_arm_without_shapes_is_drawn_as_rods() -> None:
     assert rod.vertices[:, 0].max() == pytest.approx(0.05, abs=0.009)
 
 
-def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Mechanism) -> None:
+def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Robot) -> None:
     view = camera(katana)
     way = (view.target - view.eye) / np.linalg.norm(view.target - view.eye)
     for pose in POSES:
@@ -142,7 +143,7 @@ def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Mechanism) -> 
     ],
 )
 def test_a_pose_it_cannot_have_is_refused(
-    katana: Mechanism, pose: tuple[float, ...], said: str
+    katana: Robot, pose: tuple[float, ...], said: str
 ) -> None:
     with pytest.raises(InputError, match=said):
         katana.values(pose)
@@ -167,18 +168,18 @@ def test_what_cannot_be_exported_is_refused(
     changed = text.replace(before, after.replace("CIRCLE", '<mimic joint="out"/>'))
     (tmp_path / "other.urdf").write_text(changed)
     with pytest.raises(RobotDescriptionError, match=said):
-        load_mechanism(tmp_path / "other.urdf")
+        load(tmp_path / "other.urdf").check_complete()
 
 
 def test_a_mesh_that_is_not_there_is_told(tmp_path: Path) -> None:
     text = GANTRY.read_text().replace('<sphere radius="0.05"/>', '<mesh filename="no.stl"/>')
     (tmp_path / "other.urdf").write_text(text)
-    assert "no.stl" in load_mechanism(tmp_path / "other.urdf")[1][0]
+    assert "no.stl" in load(tmp_path / "other.urdf").notes[0]
     (tmp_path / "other.urdf").write_text("no markup")
     with pytest.raises(RobotDescriptionError, match="is not a robot description"):
-        load_mechanism(tmp_path / "other.urdf")
+        load(tmp_path / "other.urdf")
     with pytest.raises(RobotDescriptionError, match="There is no robot description"):
-        load_mechanism(tmp_path / "nowhere.urdf")
+        load(tmp_path / "nowhere.urdf")
 
 
 def test_names_become_identifiers_and_stay_apart() -> None:

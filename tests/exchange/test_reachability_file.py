@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
 from katana450.extensions.export.reachability_file import FORMAT, load_map, write_npz, write_ply
 from katana450.extensions.reachability.colors import share_colors
@@ -23,8 +23,8 @@ FOUND = ReachabilityMap(POINTS, SHARE, cloud=np.array([[0.3, 0.0, 0.2]]))
 
 
 @pytest.fixture(scope="module")
-def survey(model: RobotModel) -> Survey:
-    reachability = Reachability(model.arm.chain, model.T_base_shoulder, 0.05, 36, 24)
+def survey(arm: MountedArm) -> Survey:
+    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.05, 36, 24)
     return Survey(reachability, voxel=0.02, samples=1, seed=3)
 
 

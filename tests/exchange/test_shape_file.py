@@ -16,7 +16,7 @@ from trimesh.exchange.gltf import export_gltf
 
 from katana450.arm.control import things
 from katana450.arm.control.things import Form, Thing
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.vrml import world_of
@@ -149,7 +149,7 @@ def test_every_format_says_the_same(kind: str) -> None:
         assert set(shape.colours[:, 3]) == {255 if format is Format.OBJ else 128}
 
 
-def placed(mechanism: Mechanism, values: dict[str, float]) -> tuple[Numbers, int]:
+def placed(mechanism: Robot, values: dict[str, float]) -> tuple[Numbers, int]:
     """(n, 9) corners of every triangle in the root, and how many."""
     frames = mechanism.frames(values)
     rows = [
@@ -162,7 +162,7 @@ def placed(mechanism: Mechanism, values: dict[str, float]) -> tuple[Numbers, int
 
 
 @pytest.mark.parametrize("which", ["arm", "gantry"])
-def test_what_we_write_is_read_back(which: str, katana: Mechanism, gantry: Mechanism) -> None:
+def test_what_we_write_is_read_back(which: str, katana: Robot, gantry: Robot) -> None:
     mechanism, pose = (katana, POSES[1]) if which == "arm" else (gantry, GANTRY_POSE)
     values = mechanism.values(pose)
     expected, count = placed(mechanism, values)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import WIDEST_TURN, load_motion
 
@@ -25,7 +25,7 @@ def csv_of(table: dict[str, list[float]]) -> str:
     return "\n".join([",".join(table), *(", ".join(map(repr, row)) for row in rows), ""])
 
 
-def test_csv_and_json_say_the_same(tmp_path: Path, katana: Mechanism) -> None:
+def test_csv_and_json_say_the_same(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "a.csv").write_text(csv_of(TABLE))
     (tmp_path / "a.json").write_text(json.dumps(TABLE))
     one, two = (load_motion(tmp_path / name, katana) for name in ("a.csv", "a.json"))
@@ -38,7 +38,7 @@ def test_csv_and_json_say_the_same(tmp_path: Path, katana: Mechanism) -> None:
         np.testing.assert_array_equal(motion.values["axis_2"], np.zeros(3))
 
 
-def test_joints_go_by_their_own_names_too(tmp_path: Path, gantry: Mechanism) -> None:
+def test_joints_go_by_their_own_names_too(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "a.csv").write_text("t,turn,theta1\n0,0,0\n1,9,0.4\n")
     motion = load_motion(tmp_path / "a.csv", gantry)
     np.testing.assert_array_equal(motion.values["turn"], [0.0, 9.0])
@@ -46,7 +46,7 @@ def test_joints_go_by_their_own_names_too(tmp_path: Path, gantry: Mechanism) -> 
     np.testing.assert_allclose(motion.values["out"], -0.1 * motion.values["grip"] - 0.04)
 
 
-def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Mechanism) -> None:
+def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Robot) -> None:
     (tmp_path / "a.csv").write_text("t,turn\n0,0\n1,9\n3,8.5\n4,-9\n")
     motion = load_motion(tmp_path / "a.csv", gantry)
     t, values = motion.keys("turn")
@@ -80,14 +80,14 @@ def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Mech
     ],
 )
 def test_what_is_no_motion_is_refused(
-    tmp_path: Path, katana: Mechanism, name: str, text: str, said: str
+    tmp_path: Path, katana: Robot, name: str, text: str, said: str
 ) -> None:
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=said):
         load_motion(tmp_path / name, katana)
 
 
-def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, katana: Mechanism) -> None:
+def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "a.csv").write_bytes(b"\xff\xfe\x00")
     for name in ("a.csv", "b.csv"):
         with pytest.raises(InputError, match="cannot be read"):

@@ -20,7 +20,7 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.urdf_package import Maintainer, package_files
@@ -131,7 +131,7 @@ print("\\n" + json.dumps({
 
 @needs_pybullet
 def test_pybullet_loads_the_same_robot(
-    tmp_path: Path, urdf: Path, katana: Mechanism, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, urdf: Path, katana: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pose = (0.4, -1.187, 1.484, 0.14, 0.5, 0.2, 0.2)
     monkeypatch.setenv("PYTHONPATH", os.fspath(pybullet() or ""))
@@ -163,7 +163,7 @@ def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
     assert there == {*files, "meshes/materials.mtl"}
 
 
-def test_visuals_have_the_surfaces_and_colours_of_the_arm(urdf: Path, katana: Mechanism) -> None:
+def test_visuals_have_the_surfaces_and_colours_of_the_arm(urdf: Path, katana: Robot) -> None:
     """As trimesh reads OBJ and MTL, and as the URDF says."""
     root = ET.parse(urdf).getroot()
     written = {

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree  # type: ignore[import-untyped]
 
-from katana450.arm.robot.mechanism import Mechanism, camera
+from katana450.arm.robot.camera import camera
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.export.vrml import DIGITS, part_world, vrml_files, world_of
@@ -96,7 +97,7 @@ def test_any_world_is_read_back_as_it_was_written(nodes: list[Node], name: str) 
     assert read_world(world_text(world)) == world
 
 
-def test_the_arm_and_its_motion_are_read_back(tmp_path: Path, katana: Mechanism) -> None:
+def test_the_arm_and_its_motion_are_read_back(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "m.csv").write_text("t,theta1,theta5\n0,0,0\n2,2.5,1\n")
     motion = load_motion(tmp_path / "m.csv", katana)
     world = world_of(katana, katana.values(POSES[1]), motion)
@@ -138,13 +139,13 @@ def field(node: Node, name: str, default: tuple[float, ...]) -> Matrix:
 
 @pytest.mark.parametrize("which", ["katana", "gantry"])
 def test_the_transforms_put_every_point_where_the_urdf_does(
-    which: str, katana: Mechanism, gantry: Mechanism
+    which: str, katana: Robot, gantry: Robot
 ) -> None:
-    path, mechanism, pose = (
+    path, robot, pose = (
         (URDF_PATH, katana, POSES[2]) if which == "katana" else (GANTRY, gantry, GANTRY_POSE)
     )
-    values = mechanism.values(pose)
-    read = read_world(world_text(world_of(mechanism, values)))
+    values = robot.values(pose)
+    read = read_world(world_text(world_of(robot, values)))
     upright = so3.rotation_x(-np.pi / 2.0)
     points = np.concatenate([points for _, points in placed_points(read)])
     expected = np.concatenate([mesh.vertices @ upright.T for _, mesh in placed(path, values)])
@@ -152,7 +153,7 @@ def test_the_transforms_put_every_point_where_the_urdf_does(
         assert cKDTree(others).query(some)[0].max() < 10.0**-DIGITS
 
 
-def test_parts_stand_where_they_are_at_zero(katana: Mechanism) -> None:
+def test_parts_stand_where_they_are_at_zero(katana: Robot) -> None:
     whole = dict(placed_points(world_of(katana, katana.values(()))))
     for link in katana.links:
         if link.shapes:
@@ -160,7 +161,7 @@ def test_parts_stand_where_they_are_at_zero(katana: Mechanism) -> None:
             np.testing.assert_array_equal(parts[link.name], whole[link.name])
 
 
-def test_every_link_with_a_shape_has_a_file(gantry: Mechanism) -> None:
+def test_every_link_with_a_shape_has_a_file(gantry: Robot) -> None:
     files = vrml_files(gantry, gantry.values(()))
     parts = ("floor", "cart", "mast", "left_finger", "right_finger", "thumb")
     assert sorted(files) == sorted(["gantry_2.wrl", *(f"parts/{part}.wrl" for part in parts)])
@@ -211,7 +212,7 @@ def test_comments_commas_and_bare_values_are_understood() -> None:
 
 
 @needs("tovrmlx3d")
-def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Mechanism) -> None:
+def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Robot) -> None:
     (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,0.2\n")
     motion = load_motion(tmp_path / "m.csv", katana)
     (tmp_path / "whole.wrl").write_text(world_text(world_of(katana, katana.values(()), motion)))
@@ -226,12 +227,12 @@ def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Mech
 @needs("tovrmlx3d")
 @pytest.mark.parametrize("which", ["katana", "gantry"])
 def test_another_program_accepts_parts(
-    which: str, tmp_path: Path, katana: Mechanism, gantry: Mechanism
+    which: str, tmp_path: Path, katana: Robot, gantry: Robot
 ) -> None:
-    mechanism = katana if which == "katana" else gantry
-    links = [link for link in mechanism.links if link.shapes]
+    robot = katana if which == "katana" else gantry
+    links = [link for link in robot.links if link.shapes]
     for link in links[-3:]:
-        (tmp_path / "part.wrl").write_text(world_text(part_world(mechanism, link)))
+        (tmp_path / "part.wrl").write_text(world_text(part_world(robot, link)))
         converted = run("tovrmlx3d", tmp_path / "part.wrl")
         assert converted.count("IndexedFaceSet {") == len(link.shapes)
 
@@ -248,7 +249,7 @@ def picture(folder: Path, content: bytes, name: str = "scene.wrl", time: float =
 @needs("view3dscene", "xvfb-run", "xauth")
 @pytest.mark.parametrize("pose", POSES)
 def test_another_program_draws_what_we_do(
-    tmp_path: Path, katana: Mechanism, pose: tuple[float, ...]
+    tmp_path: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     values = katana.values(pose)
     ours = silhouette(placed(URDF_PATH, values), camera(katana))
@@ -257,7 +258,7 @@ def test_another_program_draws_what_we_do(
 
 
 @needs("view3dscene", "xvfb-run", "xauth")
-def test_the_motion_plays_by_itself(tmp_path: Path, gantry: Mechanism) -> None:
+def test_the_motion_plays_by_itself(tmp_path: Path, gantry: Robot) -> None:
     end = ",".join(map(str, GANTRY_POSE))
     (tmp_path / "m.csv").write_text(f"t,rail,turn,grip\n0,0,0,0\n3,{end}\n")
     motion = load_motion(tmp_path / "m.csv", gantry)

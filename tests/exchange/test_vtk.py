@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.trajectory_file import Motion, load_motion
 from katana450.extensions.export.vrml import vrml_files, world_of
@@ -41,7 +41,7 @@ print(json.dumps([low, high]))
 
 
 @pytest.fixture
-def motion(tmp_path: Path, gantry: Mechanism) -> Motion:
+def motion(tmp_path: Path, gantry: Robot) -> Motion:
     names = gantry.driven
     lines = (
         ",".join(("t", *names)),
@@ -53,7 +53,7 @@ def motion(tmp_path: Path, gantry: Mechanism) -> Motion:
     return load_motion(tmp_path / "m.csv", gantry)
 
 
-def test_every_number_has_a_digit_before_its_point(katana: Mechanism) -> None:
+def test_every_number_has_a_digit_before_its_point(katana: Robot) -> None:
     """VTK reads .0122 as 0."""
     numbers = 0
     for content in vrml_files(katana, katana.values((0.01, -0.02, 0.03))).values():
@@ -64,7 +64,7 @@ def test_every_number_has_a_digit_before_its_point(katana: Mechanism) -> None:
     assert numbers > 100_000
 
 
-def test_static_pose_is_the_first_sample_of_the_motion(gantry: Mechanism, motion: Motion) -> None:
+def test_static_pose_is_the_first_sample_of_the_motion(gantry: Robot, motion: Motion) -> None:
     start = gantry.values(GANTRY_POSE)
     assert motion.start == pytest.approx(start)
     rest = gantry.values(())
@@ -88,7 +88,7 @@ def nodes(glb: bytes) -> list[object]:
 
 @pytest.mark.long
 @pytest.mark.skipif(vtk_folder() is None, reason=f"not here; pip brings {VTK}")
-def test_vtk_reads_the_arm_as_large_as_it_is(tmp_path: Path, katana: Mechanism) -> None:
+def test_vtk_reads_the_arm_as_large_as_it_is(tmp_path: Path, katana: Robot) -> None:
     files = vrml_files(katana, katana.values(()))
     (tmp_path / "arm.wrl").write_bytes(next(files[name] for name in files if "/" not in name))
     (tmp_path / "bounds.py").write_text(BOUNDS)

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
 from katana450.cli.main import main
 from katana450.client import AsyncClient, Client, RefusedError, aconnect, connect
@@ -35,28 +36,26 @@ THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
 
 
 def test_a_program_drives_the_joints_and_knows_when_they_are_there(
-    program: Client, model: RobotModel
+    program: Client, arm: MountedArm
 ) -> None:
     there = program.joints(THERE)
     assert there.status == "ok"
     assert there.why == ""
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(
-        np.array(there.T), forward(model.arm.chain, THERE), rtol=0, atol=1e-12
-    )
+    np.testing.assert_allclose(np.array(there.T), forward(arm.chain, THERE), rtol=0, atol=1e-12)
     assert there.holder == program.welcome.name == "Test"
     described = program.look(answers.Arm)
-    assert described.joints == list(model.arm.chain.names)
+    assert described.joints == list(arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
-    np.testing.assert_array_equal(described.T_base_shoulder, model.T_base_shoulder)
+    np.testing.assert_array_equal(described.T_base_shoulder, arm.T_base_shoulder)
 
 
 @pytest.mark.parametrize("frame", list(requests.Frame))
 def test_a_pose_may_be_in_either_frame(
-    program: Client, model: RobotModel, frame: requests.Frame
+    program: Client, arm: MountedArm, frame: requests.Frame
 ) -> None:
-    T = forward(model.arm.chain, THERE)
-    asked = T if frame is requests.Frame.SHOULDER else model.T_base_shoulder @ T
+    T = forward(arm.chain, THERE)
+    asked = T if frame is requests.Frame.SHOULDER else arm.T_base_shoulder @ T
     there = program.go(requests.Pose(T=asked.tolist(), frame=frame))
     np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=1e-9)
     p = asked[:3, 3] + [0.0, 0.0, 0.02]
@@ -105,7 +104,9 @@ def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
             program.ask(request)
 
 
-def test_a_state_tells_what_follows_from_the_posture(program: Client, model: RobotModel) -> None:
+def test_a_state_tells_what_follows_from_the_posture(
+    program: Client, robot: Robot, arm: MountedArm
+) -> None:
     q = THERE + np.array((0.3, 0.0, 0.0, 0.0, 0.0))
     program.joints(q)
     time.sleep(0.3)
@@ -113,8 +114,8 @@ def test_a_state_tells_what_follows_from_the_posture(program: Client, model: Rob
     assert state.told > state.t + 0.2
     assert (state.setpoint, state.tool_speed) == (state.q, 0.0)
     assert (state.touching, state.held) == ([], None)
-    assert state.holding == pytest.approx(holding_torques(model.arm.chain, q, loads_of(model)))
-    distances = limit_distances(model.arm.chain, q)
+    assert state.holding == pytest.approx(holding_torques(arm.chain, q, loads_of(robot)))
+    distances = limit_distances(arm.chain, q)
     assert state.margins is not None
     assert state.margins.limit == pytest.approx(distances.min())
     assert state.margins.axis == distances.argmin() + 1

@@ -17,8 +17,8 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Halt, Reason, State
 from katana450.arm.control.things import Environment
-from katana450.arm.robot.machine import Machine
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import LeaseError
@@ -40,8 +40,8 @@ class FakeArm:
     """Remembers what it was told; moves when the test says so."""
 
     # What a hub does not ask for.
-    model: RobotModel | Machine
-    robot: RobotModel
+    robot: Robot
+    arm: MountedArm
     nodes: Nodes
     ready: FloatArray
     lateness: LoopTiming

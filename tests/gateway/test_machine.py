@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.robot.machine import Machine, load_machine
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
 from katana450.server.api import answers, requests
@@ -34,8 +35,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def machine(path: Path) -> Machine:
-    return load_machine(path, "why")
+def robot(path: Path) -> Robot:
+    return load(path)
 
 
 @pytest.fixture(scope="module")
@@ -44,29 +45,29 @@ def server(path: Path) -> Iterator[AppServer]:
         yield server
 
 
-def somewhere(machine: Machine, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    joints = machine.joints
+def somewhere(robot: Robot, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    joints = robot.joint_group
     return np.random.default_rng(seed).uniform(0.9 * joints.lower, 0.9 * joints.upper)
 
 
-def test_it_has_what_the_test_is_about(machine: Machine) -> None:
-    mechanism, joints = machine.mechanism, machine.joints
+def test_it_has_what_the_test_is_about(robot: Robot) -> None:
+    joints = robot.joint_group
     assert any(joints.slides)
     assert not all(joints.slides)
-    assert len(mechanism.joints) > joints.n
-    assert any(len(mechanism.children(link)) > 1 for link in mechanism.links)
+    assert len(robot.joints) > joints.n
+    assert any(len(robot.children(link)) > 1 for link in robot.links)
 
 
 def test_every_link_is_where_another_program_has_it(
-    program: Client, machine: Machine, path: Path
+    program: Client, robot: Robot, path: Path
 ) -> None:
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
     for seed in range(3):
-        q = somewhere(machine, seed)
+        q = somewhere(robot, seed)
         there = program.joints(q)
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
         # It is told driven joints alone, and works out by itself what follows them.
-        urdf.update_cfg(dict(zip(machine.joints.names, q.tolist(), strict=True)))
+        urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
         told = {link.name: link.T for link in program.look(answers.Links).links}
         assert set(told) == set(urdf.link_map)
         for name, T in told.items():
@@ -74,11 +75,11 @@ def test_every_link_is_where_another_program_has_it(
 
 
 def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
-    server: AppServer, program: Client, machine: Machine
+    server: AppServer, program: Client, robot: Robot
 ) -> None:
     told = program.look(answers.Arm)
-    assert told.joints == list(machine.joints.names)
-    assert told.slides == list(machine.joints.slides)
+    assert told.joints == list(robot.joint_group.names)
+    assert told.slides == list(robot.joint_group.slides)
     assert (told.tools, told.default_tool, told.gripper, told.T_base_shoulder) == (
         {},
         None,
@@ -102,30 +103,30 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
     status, _, body = ask(f"{server.url}/api/v1/branches")
     assert status == 409
     assert "Only its joints" in json.loads(body)["why"]
-    with pytest.raises(RefusedError, match=f"axis {machine.joints.n + 1}: this mechanism has"):
-        program.ask(requests.Joint(axis=machine.joints.n + 1, value=0.0))
+    with pytest.raises(RefusedError, match=f"axis {robot.joint_group.n + 1}: this mechanism has"):
+        program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
     with pytest.raises(RefusedError, match="driven joints, the command 2"):
         program.ask(requests.Joints(q=[0.0, 0.0]))
     assert "Joints only." in server.output
 
 
 def test_what_is_beyond_a_limit_is_cut_and_told_in_its_own_unit(
-    program: Client, machine: Machine
+    program: Client, robot: Robot
 ) -> None:
-    slide = machine.joints.slides.index(True)
+    slide = robot.joint_group.slides.index(True)
     there = program.go(requests.Joint(axis=slide + 1, value=2.0))
-    assert there.q[slide] == machine.joints.upper[slide]
+    assert there.q[slide] == robot.joint_group.upper[slide]
     (finding,) = there.findings
     assert (finding.reason, finding.unit, finding.axis) == ("slide limit", "m", slide + 1)
-    assert finding.amount == machine.joints.upper[slide]
+    assert finding.amount == robot.joint_group.upper[slide]
     assert there.why.endswith(" mm.")
 
 
 def test_stop_pause_and_lease_are_those_of_an_arm(
-    server: AppServer, program: Client, machine: Machine
+    server: AppServer, program: Client, robot: Robot
 ) -> None:
     program.ask(requests.Speed(value=0.05))
-    far = np.where(np.arange(machine.joints.n) == 0, machine.joints.lower, 0.0)
+    far = np.where(np.arange(robot.joint_group.n) == 0, robot.joint_group.lower, 0.0)
     program.ask(requests.Joints(q=far.tolist()))
     with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
@@ -146,25 +147,27 @@ def test_stop_pause_and_lease_are_those_of_an_arm(
         program.joints(far)
 
 
-def test_its_world_is_named_too(program: Client, machine: Machine) -> None:
-    slide = machine.joints.names[machine.joints.slides.index(True)]
-    axis = machine.mechanism.axis(machine.mechanism.joints[slide])
+def test_its_world_is_named_too(program: Client, robot: Robot) -> None:
+    slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
+    axis = robot.axis(robot.joints[slide])
     program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert program.look(answers.State).q[machine.joints.names.index(slide)] == pytest.approx(0.05)
+    assert program.look(answers.State).q[robot.joint_group.names.index(slide)] == pytest.approx(
+        0.05
+    )
     program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
     world = {node.node: node for node in program.look(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
     program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
 
-def test_a_slider_moves_it_in_its_own_unit(server: AppServer, machine: Machine) -> None:
+def test_a_slider_moves_it_in_its_own_unit(server: AppServer, robot: Robot) -> None:
     async def act() -> None:
         async with opened(server.url) as (peer, control):
-            name = machine.joints.names[machine.joints.slides.index(True)]
-            index = machine.joints.names.index(name)
+            name = robot.joint_group.names[robot.joint_group.slides.index(True)]
+            index = robot.joint_group.names.index(name)
             label = f"{index + 1}. {name}"
             props = peer.controls[label]["props"]
-            assert props["max"] == pytest.approx(1e3 * machine.joints.upper[index], abs=0.01)
+            assert props["max"] == pytest.approx(1e3 * robot.joint_group.upper[index], abs=0.01)
             assert "mm" in props["hint"]
             assert "Go to pose" not in peer.controls
             await peer.set(label, value=60.0)

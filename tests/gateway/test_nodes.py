@@ -6,6 +6,7 @@ import json
 import math
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.looks import Trait
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.control.things import Form, Thing
 from katana450.arm.robot.bare import bare
-from katana450.arm.robot.mechanism import Mechanism
-from katana450.arm.robot.model import RobotModel
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import described
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
@@ -30,12 +32,13 @@ from katana450.extensions.export.vrml_node import FIELDS
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
-from katana450.server.service.vrml_nodes import Body, Nodes, body_of
+from katana450.server.service.vrml_nodes import Nodes
 from katana450.settings import Settings
 from tests.browser.server import AppServer
 from tests.exchange.conftest import GANTRY
 from tests.gateway.client import ask
 from tests.gateway.lines import Lines, post, speaking
+from tests.robot.public_arms import PX150, J, written
 
 THERE = {"axis_1": 0.4, "axis_2": -1.0, "axis_3": 1.3, "axis_4": 0.3, "axis_5": -0.5}
 AXES = {"axis_1": (0, 0, 1), "axis_5": (1, 0, 0)}
@@ -43,18 +46,13 @@ AXES = {"axis_1": (0, 0, 1), "axis_5": (1, 0, 0)}
 
 
 @pytest.fixture(scope="module")
-def katana() -> Mechanism:
-    return load_mechanism(URDF_PATH)[0]
+def rules(arm: MountedArm) -> Session:
+    return Session(arm, np.array(Settings().ready))
 
 
 @pytest.fixture(scope="module")
-def rules(model: RobotModel) -> Session:
-    return Session(model.arm, np.array(Settings().ready))
-
-
-@pytest.fixture(scope="module")
-def nodes(model: RobotModel, katana: Mechanism, rules: Session) -> Nodes:
-    return Nodes(katana, body_of(model, katana), rules.surroundings)
+def nodes(robot: Robot, rules: Session) -> Nodes:
+    return Nodes(robot, rules.surroundings)
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +76,10 @@ def get(nodes: Nodes, state: State, node: str, field: str) -> Any:
 
 
 def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
-    nodes: Nodes, state: State, katana: Mechanism, model: RobotModel
+    nodes: Nodes, state: State, robot: Robot
 ) -> None:
-    angles = model.joint_angles(state.q, state.gripper)
-    file = world_of(katana, angles).named()
+    angles = robot.joint_values(state.q, state.gripper)
+    file = world_of(robot, angles).named()
     told = {node.node: node for node in nodes.world(state).nodes}
     things = {name for name, node in told.items() if node.of.startswith("thing")}
     assert told.keys() - things <= file.keys()
@@ -97,7 +95,7 @@ def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
     assert {name for name, node in file.items() if node.kind in dressed} == {
         name for name, node in told.items() if node.kind in dressed
     } - things
-    assert set(katana.joints) <= told.keys()
+    assert set(robot.joints) <= told.keys()
     # Names that are no identifiers, or taken, are made so.
     assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= things
 
@@ -221,31 +219,30 @@ def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
         nodes.command(held, [setting("left_cube", "translation", [0, 0, 0])])
 
 
-def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(
-    model: RobotModel, katana: Mechanism
-) -> None:
+def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(robot: Robot) -> None:
     session = described(Settings(), URDF_PATH, None).session
-    nodes = Nodes(katana, body_of(model, katana), session.surroundings)
+    nodes = Nodes(robot, session.surroundings)
     begun = session.begin(session.ready, 0.0, 0.0)
     nodes.command(begun, [setting("cup", "translation", [0.5, -0.5, 0.0])])
     with pytest.raises(InputError, match="nothing carries it there"):
         nodes.command(begun, [setting("cup", "translation", [1.5, 0.0, 0.0])])
 
 
-def test_a_bare_arm_has_no_names_for_the_gripper(model: RobotModel, katana: Mechanism) -> None:
-    stripped = bare(model)
-    session = Session(stripped.arm, stripped.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
-    nodes = Nodes(katana, body_of(stripped, katana), session.surroundings)
+def test_a_bare_arm_has_no_names_for_the_gripper(robot: Robot) -> None:
+    stripped = bare(robot)
+    arm = stripped.require_arm()
+    session = Session(arm, arm.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
+    nodes = Nodes(stripped, session.surroundings)
     told = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
     assert "axis_5" in told
     assert not {name for name in told if "finger" in name or "gripper" in name}
 
 
-def test_what_slides_has_a_translation_along_its_axis(session: Session) -> None:
-    gantry = load_mechanism(GANTRY)[0]
-    body = Body({"rail": 0}, None, lambda _: {"rail": 0.2}, frozenset(["cart", "mast"]))
-    nodes = Nodes(gantry, body, session.surroundings)
-    state = session.begin(session.ready, 0.0, 0.0)
+def test_what_slides_has_a_translation_along_its_axis() -> None:
+    gantry = load(GANTRY)
+    session = JointSession(gantry.joint_group, gantry.distance)
+    nodes = Nodes(gantry, session.surroundings)
+    state = session.begin(np.array((0.2, 0.0, 0.0)), 0.0, 0.0)
     along = np.array((math.cos(0.3), math.sin(0.3), 0.0))
     np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)
     said = nodes.command(state, [setting("rail", "translation", (-0.1 * along).tolist())])
@@ -253,10 +250,18 @@ def test_what_slides_has_a_translation_along_its_axis(session: Session) -> None:
     np.testing.assert_allclose(said.values, ((0, -0.1),), rtol=0, atol=1e-15)
     with pytest.raises(InputError, match=r"rail slides along 0\.955336 0\.29552 0"):
         nodes.command(state, [setting("rail", "translation", [0.1, 0.1, 0.1])])
-    with pytest.raises(InputError, match="stays at zero"):
-        nodes.command(
-            state, [setting("turn", "rotation", [*gantry.axis(gantry.joints["turn"]), 1])]
-        )
+
+
+def test_joint_that_rests_has_its_value_and_cannot_be_set(tmp_path: Path) -> None:
+    pan = J("pan", "revolute", "base", "camera", axis=(0.0, 1.0, 0.0), limits=(0.3, 0.8))
+    robot = load(written(tmp_path, "arm", [*PX150, pan]))
+    arm = robot.require_arm()
+    session = Session(arm, arm.ready(Settings().ready))
+    nodes = Nodes(robot, session.surroundings)
+    state = session.begin(session.ready, 0.0, 0.0)
+    assert get(nodes, state, "pan", "rotation") == [0.0, 1.0, 0.0, 0.3]
+    with pytest.raises(InputError, match="pan stays where it is"):
+        nodes.command(state, [setting("pan", "rotation", [0.0, 1.0, 0.0, 0.5])])
 
 
 def arrived(lines: Lines, ticket: int) -> None:

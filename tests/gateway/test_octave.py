@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer
@@ -38,9 +38,9 @@ def told_by(server: AppServer, script: str) -> dict[str, Any]:
     return told
 
 
-def check_kinematics(model: RobotModel, angles: list[float], asked: list[list[float]]) -> None:
+def check_kinematics(arm: MountedArm, angles: list[float], asked: list[list[float]]) -> None:
     """Octave's joint angles on the circle against ours."""
-    chain = model.arm.chain_to("tcp")
+    chain = arm.chain_to("tcp")
     for angle, q in zip(angles, asked, strict=True):
         p = np.array((0.150, 0.100 * math.sin(angle), -0.110 + 0.100 * math.cos(angle)))
         target = ToolTarget(p, math.radians(75.0 - 13.0 * math.cos(angle)), 0.0)
@@ -49,11 +49,11 @@ def check_kinematics(model: RobotModel, angles: list[float], asked: list[list[fl
 
 
 @pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
-def test_octave_goes_round_the_papers_circle(model: RobotModel, server: AppServer) -> None:
+def test_octave_goes_round_the_papers_circle(arm: MountedArm, server: AppServer) -> None:
     told = told_by(server, "circle")
     # Where both have the tip at the start, each by its own kinematics.
     assert told["start_error_mm"] < 1e-11
-    check_kinematics(model, told["angles"], told["asked"])
+    check_kinematics(arm, told["angles"], told["asked"])
     # How many states there are, and how far the arm lags behind the stream, is the machine's.
     assert told["states"] > 20
     assert told["largest_error_mm"] < 100.0
@@ -61,10 +61,10 @@ def test_octave_goes_round_the_papers_circle(model: RobotModel, server: AppServe
 
 @pytest.mark.skipif(OCTAVE is None, reason=octave.MISSING)
 def test_octave_turns_the_vrml_world_by_name_and_reads_it_back(
-    model: RobotModel, server: AppServer
+    arm: MountedArm, server: AppServer
 ) -> None:
     told = told_by(server, "places = 6; circle_by_name")
     assert len(told["angles"]) == 6
-    check_kinematics(model, told["angles"], told["asked"])
+    check_kinematics(arm, told["angles"], told["asked"])
     np.testing.assert_allclose(told["heard"], told["asked"], rtol=0, atol=1e-9)
     assert told["colour"] == [0.1, 0.5, 0.9]

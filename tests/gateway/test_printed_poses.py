@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.client import Client, RefusedError
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
@@ -19,9 +19,9 @@ THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
 
 @pytest.mark.parametrize("decimals", [6, 5, 4])
 def test_a_printed_pose_is_taken_and_its_rounding_reported(
-    program: Client, model: RobotModel, decimals: int
+    program: Client, arm: MountedArm, decimals: int
 ) -> None:
-    T = forward(model.arm.chain, THERE)
+    T = forward(arm.chain, THERE)
     rounding = 0.5 * 10.0**-decimals
     printed = T.round(decimals).tolist()
     accepted = program.ask(requests.Pose(T=printed))

@@ -15,7 +15,7 @@ import pytest
 import trimesh
 
 from katana450.arm.control.lease import Role
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.initial_scene import furnished
 from katana450.assembly.robot_session import described
 from katana450.client import Client, RefusedError, connect
@@ -111,9 +111,7 @@ def test_the_server_begins_with_its_scene_and_objects(server: AppServer, arm: Cl
     assert "ring: 576 triangles" in server.output
 
 
-def test_a_mesh_is_placed_fixed_to_the_hand_and_met(
-    arm: Client, ring: Path, model: RobotModel
-) -> None:
+def test_a_mesh_is_placed_fixed_to_the_hand_and_met(arm: Client, ring: Path, robot: Robot) -> None:
     told = arm.upload(ring)
     assert told.name == "ring 2"
     assert told.triangles == 576
@@ -130,7 +128,8 @@ def test_a_mesh_is_placed_fixed_to_the_hand_and_met(
     on_tool[:3, 3] = (-0.05, 0.0, 0.06)
     arm.ask(requests.Attach(name="it", to=requests.Mount.HAND, T=_rows(on_tool)))
     until(lambda: things(arm)["it"].fixed)
-    T = model.T_base_shoulder @ forward(model.arm.chain, np.array(arm.look(answers.State).q))
+    mounted = robot.require_arm()
+    T = mounted.T_base_shoulder @ forward(mounted.chain, np.array(arm.look(answers.State).q))
     np.testing.assert_allclose(things(arm)["it"].T, T @ on_tool, atol=1e-9)
     arm.ask(requests.Place(name="it", colour="#ff0000", hidden=True))
     until(lambda: things(arm)["it"].hidden)

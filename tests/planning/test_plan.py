@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control.arm import Arm
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.shape import box, half_space
@@ -32,9 +32,9 @@ def bounds(arm: Arm) -> Bounds:
 
 
 @pytest.fixture(scope="module")
-def bare(model: RobotModel) -> World:
+def bare(robot: Robot) -> World:
     """The arm without anything round it."""
-    found, _ = world_of(model)
+    found, _ = world_of(robot)
     assert found is not None
     return found
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import described
 from katana450.extensions.programs import runner
 from katana450.extensions.programs.bench import PlanContext
@@ -25,10 +25,10 @@ TICK = 0.01
 class Stage:
     """A session on a clock of its own, and programs run on it."""
 
-    def __init__(self, model: RobotModel, *, bare: bool = False) -> None:
+    def __init__(self, arm: MountedArm, *, bare: bool = False) -> None:
         """``bare``: without its gripper."""
         self.session = described(replace(Settings(), bare=bare), URDF_PATH, None).session
-        self.rig = PlanContext(self.session, model.T_base_shoulder)
+        self.rig = PlanContext(self.session, arm.T_base_shoulder)
 
     def begin(self) -> State:
         return self.session.begin(self.session.ready, 0.0, 0.0)
@@ -62,8 +62,8 @@ class Stage:
 
 
 @pytest.fixture(scope="session")
-def stage(model: RobotModel) -> Stage:
-    return Stage(model)
+def stage(arm: MountedArm) -> Stage:
+    return Stage(arm)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.runner import Phase
@@ -16,9 +16,9 @@ from tests.programs.conftest import Stage
 
 @pytest.mark.parametrize("tool", ["flange", "tcp"])
 def test_the_circle_keeps_every_limit_at_every_tick(
-    model: RobotModel, stage: Stage, tool: str
+    arm: MountedArm, stage: Stage, tool: str
 ) -> None:
-    staged = Stage(model, bare=True) if tool == "flange" else stage
+    staged = Stage(arm, bare=True) if tool == "flange" else stage
     demo = CircleDemo(tool=tool)
     run, states = staged.play(
         compiled(parse(demo.text), staged.rig, staged.begin()), staged.begin()

@@ -9,8 +9,8 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import described
 from katana450.extensions.render.stage import Stage
 from katana450.resources import URDF_PATH
@@ -20,7 +20,7 @@ from katana450.settings import Settings
 class Workshop(NamedTuple):
     """An arm, its rules, and its shapes."""
 
-    model: RobotModel
+    robot: Robot
     session: Session
     stage: Stage
 
@@ -37,5 +37,5 @@ class Workshop(NamedTuple):
 
 @pytest.fixture(scope="session")
 def workshop() -> Workshop:
-    model, session, _ = described(Settings(), URDF_PATH, None)
-    return Workshop(model, session, Stage(model, session, load_props()))
+    robot, session, _ = described(Settings(), URDF_PATH, None)
+    return Workshop(robot, session, Stage(robot, session, load_props()))

@@ -10,9 +10,11 @@ import pytest
 import trimesh
 
 from katana450.arm.control.things import Form, Thing
-from katana450.arm.robot.mechanism import FIELD_OF_VIEW, Material, Mechanism, Shape, camera
-from katana450.arm.robot.mechanism import Camera as Viewpoint
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.camera import Camera as Viewpoint
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, Shape
 from katana450.extensions.render.camera import Camera
 from katana450.extensions.render.line import tube
 from katana450.extensions.render.picture import Picture, picture
@@ -35,8 +37,8 @@ UP = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, 0.5))
 
 
 @pytest.fixture(scope="module")
-def katana() -> Mechanism:
-    return load_mechanism(URDF_PATH)[0]
+def katana() -> Robot:
+    return load(URDF_PATH)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture
 
 @pytest.mark.parametrize("pose", POSES)
 def test_the_arm_covers_what_pillow_says(
-    workshop: Workshop, katana: Mechanism, pose: tuple[float, ...]
+    workshop: Workshop, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     """Another program's projection of another reader's meshes, posed by that reader."""
     view: Viewpoint = camera(katana)

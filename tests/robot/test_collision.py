@@ -9,13 +9,14 @@ import pytest
 import trimesh
 
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 
 ARMS = Path(__file__).resolve().parent / "arms"
 PINCHER = ARMS / "pincherx_150.urdf"
 
 
-def with_forearm(tmp_path: Path, shapes: str) -> RobotModel:
+def with_forearm(tmp_path: Path, shapes: str) -> Robot:
     text = PINCHER.read_text(encoding="utf-8")
     assert '<link name="forearm"/>' in text
     path = tmp_path / "edited.urdf"
@@ -25,16 +26,16 @@ def with_forearm(tmp_path: Path, shapes: str) -> RobotModel:
 
 @pytest.mark.parametrize("arm", ["pincherx_150.urdf", "youbot_arm.urdf"])
 def test_an_arm_without_collision_shapes_has_no_world(arm: str) -> None:
-    model = load(ARMS / arm)
-    assert not model.collides
-    assert world_of(model) == (None, ())
+    robot = load(ARMS / arm)
+    assert not robot.collides
+    assert world_of(robot) == (None, ())
 
 
-def test_our_own_arm_has_every_link_in_it(model: RobotModel) -> None:
-    world, notes = world_of(model)
+def test_our_own_arm_has_every_link_in_it(robot: Robot) -> None:
+    world, notes = world_of(robot)
     assert notes == ()
     assert world is not None
-    shaped = [body for body in model.bodies if body.collisions]
+    shaped = [body for body in robot.links if body.collisions]
     assert [part.name for part in world.parts] == [body.name for body in shaped]
     assert [len(part.shapes) for part in world.parts] == [len(b.collisions) for b in shaped]
 

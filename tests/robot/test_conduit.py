@@ -10,10 +10,12 @@ import pytest
 import trimesh
 import yourdfpy
 
+from katana450.arm.robot.arm_reader import CONDUITS
 from katana450.arm.robot.conduit import GIVE
-from katana450.arm.robot.model import CONDUITS, RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.server.view.conduit import PROFILE, SIDES, ring
@@ -22,15 +24,15 @@ DENSE = 400
 SPARSE = 40
 
 
-def test_it_runs_from_the_base_to_the_wrist_over_every_bending_joint(model: RobotModel) -> None:
-    assert [each.hinge.joint for each in model.stretches] == [f"axis_{i}" for i in range(1, 5)]
-    assert [each.winds for each in model.stretches] == [True, False, False, False]
+def test_it_runs_from_the_base_to_the_wrist_over_every_bending_joint(arm: MountedArm) -> None:
+    assert [each.hinge.joint for each in arm.stretches] == [f"axis_{i}" for i in range(1, 5)]
+    assert [each.winds for each in arm.stretches] == [True, False, False, False]
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_it_leaves_one_fitting_and_arrives_at_the_other(model: RobotModel, number: int) -> None:
+def test_it_leaves_one_fitting_and_arrives_at_the_other(arm: MountedArm, number: int) -> None:
     """Where the URDF, read by other code, has the two links."""
-    stretch = model.stretches[number]
+    stretch = arm.stretches[number]
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
     hinge = stretch.hinge
     for angle in np.linspace(hinge.lower, hinge.upper, 13):
@@ -46,8 +48,8 @@ def test_it_leaves_one_fitting_and_arrives_at_the_other(model: RobotModel, numbe
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_its_ribs_keep_their_distance_and_it_never_leaps(model: RobotModel, number: int) -> None:
-    stretch = model.stretches[number]
+def test_its_ribs_keep_their_distance_and_it_never_leaps(arm: MountedArm, number: int) -> None:
+    stretch = arm.stretches[number]
     before = None
     for angle in np.linspace(stretch.hinge.lower, stretch.hinge.upper, 400):
         (points,), _ = stretch.courses([angle], DENSE)
@@ -84,20 +86,15 @@ POSTURES = (
 
 @pytest.mark.parametrize("posture", POSTURES)
 def test_it_is_clear_of_every_solid(
-    model: RobotModel, surfaces: dict[str, FloatArray], posture: tuple[int, ...]
+    robot: Robot, arm: MountedArm, surfaces: dict[str, FloatArray], posture: tuple[int, ...]
 ) -> None:
     """By random points on what is seen of the links, some 5 mm apart."""
-    angles = model.joint_angles(np.radians(posture), 0.0)
-    T: dict[str, FloatArray] = {}
-    for body in model.bodies:
-        above = np.eye(4) if body.parent is None else T[body.parent]
-        T[body.name] = above @ body.T_parent_body
-        if body.joint is not None:
-            T[body.name][:3, :3] @= so3.exp(body.axis * angles[body.joint])
+    angles = robot.joint_values(np.radians(posture), 0.0)
+    T = robot.frames(angles)
     solid = np.concatenate(
         [points @ T[name][:3, :3].T + T[name][:3, 3] for name, points in surfaces.items()]
     )
-    for stretch in model.stretches:
+    for stretch in arm.stretches:
         (points,), _ = stretch.courses([angles[stretch.hinge.joint]], SPARSE)
         along = np.linspace(0.0, 1.0, SPARSE) * stretch.length
         free = points[(along > FITTED) & (along < stretch.length - FITTED)]
@@ -106,7 +103,7 @@ def test_it_is_clear_of_every_solid(
 
 
 @pytest.fixture(scope="module")
-def surfaces(model: RobotModel) -> dict[str, FloatArray]:
+def surfaces(robot: Robot) -> dict[str, FloatArray]:
     """Points (n, 3) [m] on each link, in its frame."""
     return {
         body.name: np.concatenate(
@@ -115,7 +112,7 @@ def surfaces(model: RobotModel) -> dict[str, FloatArray]:
                 for each in body.visuals
             ]
         )
-        for body in model.bodies
+        for body in robot.links
         if body.visuals
     }
 
@@ -143,7 +140,7 @@ def test_a_broken_file_is_refused(tmp_path: Path, text: str, said: str) -> None:
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(text, encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=said) as refused:
-        load(urdf)
+        load(urdf).require_arm()
     assert CONDUITS in str(refused.value)
 
 
@@ -165,7 +162,7 @@ def test_a_conduit_that_is_none_is_refused(
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=said):
-        load(urdf)
+        load(urdf).require_arm()
 
 
 @pytest.mark.parametrize(
@@ -188,4 +185,4 @@ def test_ends_on_links_without_one_joint_between_are_refused(
     urdf.write_bytes(URDF_PATH.read_bytes())
     (tmp_path / CONDUITS).write_text(json.dumps(described), encoding="utf-8")
     with pytest.raises(RobotDescriptionError, match=said):
-        load(urdf)
+        load(urdf).require_arm()

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yourdfpy
 
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import recognised
 from katana450.errors import RobotDescriptionError
 from katana450.settings import Settings
@@ -87,7 +86,7 @@ def test_a_fault_that_only_the_reader_finds_ends_in_a_sentence_of_ours(
     def fail(*_: object, **__: object) -> None:
         raise ValueError("list.remove(x): x not in list")
 
-    monkeypatch.setattr(yourdfpy.URDF, "load", fail)
+    monkeypatch.setattr("katana450.arm.robot.loader.urdf_of", fail)
     path = written(tmp_path, "arm", PX150)
     with pytest.raises(
         RobotDescriptionError, match=r"arm.urdf cannot be read .*check_urdf"

@@ -9,30 +9,31 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
-from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 
 
-def test_the_axes_are_the_papers(model: RobotModel) -> None:
-    S = model.arm.chain.S
+def test_the_axes_are_the_papers(arm: MountedArm) -> None:
+    S = arm.chain.S
     assert np.allclose(S[:3].T, [[0, 0, 1], [0, 1, 0], [0, 1, 0], [0, 1, 0], [1, 0, 0]], atol=1e-12)
-    assert model.arm.chain.names == tuple(f"axis_{i}" for i in range(1, 6))
+    assert arm.chain.names == tuple(f"axis_{i}" for i in range(1, 6))
 
 
 @pytest.mark.parametrize(
     ("tool", "reach"), [("tcp", 0.6318), ("flange", 0.5173), ("grasp", 0.5978)]
 )
-def test_home_configurations_are_the_papers(model: RobotModel, tool: str, reach: float) -> None:
-    M = model.arm.tools[tool]
+def test_home_configurations_are_the_papers(arm: MountedArm, tool: str, reach: float) -> None:
+    M = arm.tools[tool]
     assert np.allclose(M[:3, :3], np.eye(3), atol=1e-12)
     assert np.allclose(M[:3, 3], [reach, 0.0, 0.0], atol=1e-9)
 
 
-def test_limits_and_speeds_are_the_manufacturers(model: RobotModel) -> None:
-    chain = model.arm.chain
+def test_limits_and_speeds_are_the_manufacturers(arm: MountedArm) -> None:
+    chain = arm.chain
     lower = [-173.35, -124.25, -117.70, -116.50, -164.50]
     upper = [165.65, 7.75, 127.30, 107.50, 171.50]
     assert np.allclose(np.degrees(chain.lower), lower, atol=1e-9)
@@ -40,52 +41,47 @@ def test_limits_and_speeds_are_the_manufacturers(model: RobotModel) -> None:
     assert np.allclose(chain.speed, [2.209, 1.191, 1.191, 2.209, 2.209], atol=5e-4)
 
 
-def test_the_shoulder_frame_stands_where_axes_1_and_2_cross(model: RobotModel) -> None:
-    assert np.allclose(model.T_base_shoulder[:3, :3], np.eye(3))
-    assert np.allclose(model.T_base_shoulder[:3, 3], [0.0, 0.0, 0.2745])
+def test_the_shoulder_frame_stands_where_axes_1_and_2_cross(arm: MountedArm) -> None:
+    assert np.allclose(arm.T_base_shoulder[:3, :3], np.eye(3))
+    assert np.allclose(arm.T_base_shoulder[:3, 3], [0.0, 0.0, 0.2745])
 
 
-def test_the_chain_agrees_with_yourdfpy_everywhere(model: RobotModel) -> None:
+def test_the_chain_agrees_with_yourdfpy_everywhere(robot: Robot, arm: MountedArm) -> None:
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
     rng = np.random.default_rng(1)
     for _ in range(50):
-        q = rng.uniform(model.arm.chain.lower, model.arm.chain.upper)
-        gripper = rng.uniform(model.arm.gripper.lower, model.arm.gripper.upper)
-        angles = model.joint_angles(q, gripper)
+        q = rng.uniform(arm.chain.lower, arm.chain.upper)
+        gripper = rng.uniform(arm.gripper.lower, arm.gripper.upper)
+        angles = robot.joint_values(q, gripper)
         urdf.update_cfg({name: angles[name] for name in urdf.actuated_joint_names})
-        for tool in model.arm.tools:
-            T = model.T_base_shoulder @ forward(model.arm.chain_to(tool), q)
+        for tool in arm.tools:
+            T = arm.T_base_shoulder @ forward(arm.chain_to(tool), q)
             assert np.allclose(T, urdf.get_transform(tool), atol=1e-12)
 
 
-def test_the_bodies_the_view_draws_stand_where_yourdfpy_has_them(model: RobotModel) -> None:
+def test_the_links_the_view_draws_stand_where_yourdfpy_has_them(robot: Robot) -> None:
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
     q = np.array([0.4, -1.0, 0.7, 0.5, 1.1])
-    angles = model.joint_angles(q, 0.2)
+    angles = robot.joint_values(q, 0.2)
     urdf.update_cfg({name: angles[name] for name in urdf.actuated_joint_names})
-    poses: dict[str | None, np.ndarray] = {None: np.eye(4)}
-    for body in model.bodies:
-        T = poses[body.parent] @ body.T_parent_body
-        if body.joint is not None:
-            T[:3, :3] = T[:3, :3] @ so3.exp(body.axis * angles[body.joint])
-        poses[body.name] = T
-        assert np.allclose(T, urdf.get_transform(body.name), atol=1e-12), body.name
+    for name, T in robot.frames(angles).items():
+        assert np.allclose(T, urdf.get_transform(name), atol=1e-12), name
 
 
-def test_both_fingers_follow_one_joint(model: RobotModel) -> None:
-    angles = model.joint_angles(np.zeros(5), 0.2)
+def test_both_fingers_follow_one_joint(robot: Robot, arm: MountedArm) -> None:
+    angles = robot.joint_values(np.zeros(5), 0.2)
     fingers = {name: angle for name, angle in angles.items() if name.startswith("finger")}
     assert len(fingers) == 2
     assert all(abs(angle) == 0.2 for angle in fingers.values())
-    assert model.arm.gripper.lower == pytest.approx(-0.44)
-    assert model.arm.gripper.upper == pytest.approx(0.30)
+    assert arm.gripper.lower == pytest.approx(-0.44)
+    assert arm.gripper.upper == pytest.approx(0.30)
 
 
-def test_every_mesh_is_there(model: RobotModel) -> None:
-    meshes = [visual.glb for body in model.bodies for visual in body.visuals]
+def test_every_mesh_is_there(robot: Robot) -> None:
+    meshes = [visual.glb for body in robot.links for visual in body.visuals]
     assert len(meshes) == 10
     assert all(mesh is not None and mesh.read_bytes()[:4] == b"glTF" for mesh in meshes)
-    assert model.notes == ()
+    assert robot.notes == robot.require_arm().notes == ()
 
 
 def edited(tmp_path: Path, old: str, new: str) -> Path:
@@ -98,9 +94,9 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 
 def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
     """Nothing of the robot is typed a second time: a longer arm in the file is a longer arm."""
-    changed = load(edited(tmp_path, 'xyz="0.190', 'xyz="0.290'))
-    assert changed.arm.tools["tcp"][0, 3] == pytest.approx(0.7318)
-    assert math.isclose(changed.arm.chain.S[5, 2], 0.290)  # v of axis 3: -omega x r
+    changed = load(edited(tmp_path, 'xyz="0.190', 'xyz="0.290')).require_arm()
+    assert changed.tools["tcp"][0, 3] == pytest.approx(0.7318)
+    assert math.isclose(changed.chain.S[5, 2], 0.290)  # v of axis 3: -omega x r
 
 
 @pytest.mark.parametrize(
@@ -123,7 +119,7 @@ def test_a_file_that_will_not_do_is_refused_with_a_reason(
 
 def test_a_finger_that_mimics_nothing_is_driven_with_the_other(tmp_path: Path) -> None:
     other = load(edited(tmp_path, '<mimic joint="finger_right_joint"', '<dynamics friction="0"'))
-    angles = other.joint_angles(np.zeros(5), 0.2)
+    angles = other.joint_values(np.zeros(5), 0.2)
     assert (angles["finger_right_joint"], angles["finger_left_joint"]) == (0.2, 0.2)
 
 

@@ -6,7 +6,6 @@ import json
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,8 @@ import yourdfpy
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
-from katana450.arm.robot.model import RobotModel, load
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.arm import arm_of
@@ -40,51 +39,52 @@ def path(request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture
-def other(path: Path) -> RobotModel:
-    return load(path)
+def other(path: Path) -> MountedArm:
+    return load(path).require_arm()
 
 
 def test_the_pincher_is_that_of_its_manual() -> None:
-    model = load(PINCHER)
+    arm = load(PINCHER).require_arm()
     # The manual's home configuration and screw axes, in its base frame.
     M = se3.from_rotation_translation(np.eye(3), [0.358575, 0.0, 0.25457])
-    np.testing.assert_allclose(model.T_base_shoulder @ model.arm.chain.M, M, atol=1e-12)
-    heights = -np.array([0.10457, 0.25457, 0.25457]) + model.T_base_shoulder[2, 3]
-    np.testing.assert_allclose(model.arm.chain.S[3, 1:4], heights, atol=1e-12)
-    np.testing.assert_allclose(model.arm.chain.S[5, 1:4], [0.0, 0.05, 0.2], atol=1e-12)
-    arm = arm_of(model.arm.chain)
-    assert arm.l1 == pytest.approx(math.hypot(0.05, 0.15))
-    assert arm.shifts[1] == pytest.approx(-math.atan2(0.15, 0.05))
-    assert (arm.a, arm.d, arm.tilt) == (0.0, 0.0, 0.0)
+    np.testing.assert_allclose(arm.T_base_shoulder @ arm.chain.M, M, atol=1e-12)
+    heights = -np.array([0.10457, 0.25457, 0.25457]) + arm.T_base_shoulder[2, 3]
+    np.testing.assert_allclose(arm.chain.S[3, 1:4], heights, atol=1e-12)
+    np.testing.assert_allclose(arm.chain.S[5, 1:4], [0.0, 0.05, 0.2], atol=1e-12)
+    canonical = arm_of(arm.chain)
+    assert canonical.l1 == pytest.approx(math.hypot(0.05, 0.15))
+    assert canonical.shifts[1] == pytest.approx(-math.atan2(0.15, 0.05))
+    assert (canonical.a, canonical.d, canonical.tilt) == (0.0, 0.0, 0.0)
 
 
 def test_the_youbot_is_that_of_its_manual() -> None:
-    model = load(YOUBOT)
-    arm = arm_of(model.arm.chain)
-    assert [arm.a, arm.l1, arm.l2, arm.l3] == pytest.approx([0.033, 0.155, 0.135, 0.2175])
-    assert arm.d == 0.0
-    assert arm.signs[0] == -1.0
-    assert arm.signs[1] == -arm.signs[2] == arm.signs[3]
-    np.testing.assert_allclose(model.T_base_shoulder[:3, 3], [0.0, 0.0, 0.147], atol=1e-15)
-    assert list(model.arm.tools) == ["tip"]
-    assert model.notes == ("Joint 'left' is taken for that of a gripper; 'tip' is the tool.",)
-    assert model.fingers == {"left": (1.0, 0.0), "right": (1.0, 0.0)}
-    assert (model.arm.gripper.lower, model.arm.gripper.upper) == (0.0, 0.0115)
+    arm = load(YOUBOT).require_arm()
+    canonical = arm_of(arm.chain)
+    lengths = [canonical.a, canonical.l1, canonical.l2, canonical.l3]
+    assert lengths == pytest.approx([0.033, 0.155, 0.135, 0.2175])
+    assert canonical.d == 0.0
+    assert canonical.signs[0] == -1.0
+    assert canonical.signs[1] == -canonical.signs[2] == canonical.signs[3]
+    np.testing.assert_allclose(arm.T_base_shoulder[:3, 3], [0.0, 0.0, 0.147], atol=1e-15)
+    assert list(arm.tools) == ["tip"]
+    assert arm.notes == ("Joint 'left' is taken for that of a gripper; 'tip' is the tool.",)
+    assert arm.fingers == {"left": (1.0, 0.0), "right": (1.0, 0.0)}
+    assert (arm.gripper.lower, arm.gripper.upper) == (0.0, 0.0115)
 
 
-def test_the_chain_agrees_with_yourdfpy(path: Path, other: RobotModel) -> None:
+def test_the_chain_agrees_with_yourdfpy(path: Path, other: MountedArm) -> None:
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
-    chain = other.arm.chain
+    chain = other.chain
     rng = np.random.default_rng(3)
     for q in rng.uniform(chain.lower, chain.upper, size=(20, 5)):
         held = dict.fromkeys(urdf.actuated_joint_names, 0.0)
         urdf.update_cfg(held | dict(zip(chain.names, q.tolist(), strict=True)))
-        expected = urdf.get_transform(other.arm.default_tool)
+        expected = urdf.get_transform(other.default_tool)
         np.testing.assert_allclose(other.T_base_shoulder @ forward(chain, q), expected, atol=1e-12)
 
 
-def test_every_pose_it_takes_is_solved_and_left_alone(other: RobotModel) -> None:
-    chain = other.arm.chain
+def test_every_pose_it_takes_is_solved_and_left_alone(other: MountedArm) -> None:
+    chain = other.chain
     rng = np.random.default_rng(4)
     exact = 0
     for q in rng.uniform(chain.lower, chain.upper, size=(300, 5)):
@@ -104,8 +104,8 @@ def test_every_pose_it_takes_is_solved_and_left_alone(other: RobotModel) -> None
     assert exact >= 600
 
 
-def test_it_stands_ready_with_room_to_move(other: RobotModel) -> None:
-    chain = other.arm.chain
+def test_it_stands_ready_with_room_to_move(other: MountedArm) -> None:
+    chain = other.chain
     q = other.ready(Settings().ready)
     assert (q > chain.lower).all()
     assert (q < chain.upper).all()
@@ -114,9 +114,9 @@ def test_it_stands_ready_with_room_to_move(other: RobotModel) -> None:
     assert abs(tool[1, 3]) < 1e-12
 
 
-def test_dragging_keeps_what_the_hand_does_not_move(other: RobotModel) -> None:
-    chain = other.arm.chain
-    session = Session(other.arm, other.ready(Settings().ready))
+def test_dragging_keeps_what_the_hand_does_not_move(other: MountedArm) -> None:
+    chain = other.chain
+    session = Session(other, other.ready(Settings().ready))
     state = session.begin(session.ready, 0.0, 0.0)
     start = forward(chain, state.goal)[:3, 3]
     pitch, roll = pitch_and_roll(chain, state.goal)
@@ -134,15 +134,16 @@ def test_dragging_keeps_what_the_hand_does_not_move(other: RobotModel) -> None:
 
 
 def test_links_without_shapes_are_drawn_as_rods() -> None:
-    bodies = {body.name: body for body in load(YOUBOT).bodies}
+    robot = load(YOUBOT)
+    bodies = {body.name: body for body in robot.links}
     (rod,) = bodies["upper_arm"].visuals
     np.testing.assert_allclose(rod.mesh.bounds[:, 2], [0.0, 0.155], atol=1e-9)
     (box,) = bodies["turret"].visuals
     assert box.colour == (255, 102, 0)
     np.testing.assert_allclose(box.mesh.extents, [0.1, 0.08, 0.06], atol=1e-12)
     np.testing.assert_allclose(box.mesh.bounds.mean(axis=0), [0.0165, 0.0, 0.0], atol=1e-12)
-    assert not bodies["foot"].moves
-    assert bodies["tip"].moves
+    assert "foot" not in robot.moving
+    assert "tip" in robot.moving
 
 
 def test_it_is_served(path: Path) -> None:
@@ -151,7 +152,7 @@ def test_it_is_served(path: Path) -> None:
         assert "Traceback" not in server.output
 
 
-def test_its_kinematics_are_answered_a_line(path: Path, other: RobotModel) -> None:
+def test_its_kinematics_are_answered_a_line(path: Path, other: MountedArm) -> None:
     def ask(command: str, request: object, *options: str) -> dict[str, object]:
         done = subprocess.run(
             [sys.executable, "-m", "katana450", command, "--urdf", str(path), *options],
@@ -167,9 +168,9 @@ def test_its_kinematics_are_answered_a_line(path: Path, other: RobotModel) -> No
 
     q = [0.3, -0.2, 0.5, 0.4, 0.7]
     answer = ask("fk", {"q": q}, "--tool", "hand")
-    hand = load(path, "hand")
-    np.testing.assert_allclose(np.array(answer["T"]), forward(hand.arm.chain, q), atol=1e-15)
-    answer = ask("ik", {"T": forward(other.arm.chain, q).tolist()})
+    hand = load(path, "hand").require_arm()
+    np.testing.assert_allclose(np.array(answer["T"]), forward(hand.chain, q), atol=1e-15)
+    answer = ask("ik", {"T": forward(other.chain, q).tolist()})
     solutions = answer["solutions"]
     assert isinstance(solutions, list)
     assert any(np.allclose(s["q"], q) for s in solutions)
@@ -221,7 +222,7 @@ def test_an_arm_of_another_kind_is_refused_with_the_reason(
     tmp_path: Path, old: str, new: str, said: str
 ) -> None:
     with pytest.raises(RobotDescriptionError, match=said):
-        load(edited(tmp_path, old, new))
+        load(edited(tmp_path, old, new)).require_arm()
 
 
 def test_a_tool_that_cannot_be_is_refused() -> None:
@@ -238,23 +239,23 @@ def test_meshes_of_other_formats_are_read_and_absent_ones_told(tmp_path: Path) -
         '<geometry><mesh filename="package://pincher/{}.stl" scale="0.001 0.001 0.001"/>'
         "</geometry></visual></link>"
     )
-    model = load(edited(tmp_path, '<link name="forearm"/>', shape.format("box")))
-    (visual,) = next(body for body in model.bodies if body.name == "forearm").visuals
+    robot = load(edited(tmp_path, '<link name="forearm"/>', shape.format("box")))
+    (visual,) = next(body for body in robot.links if body.name == "forearm").visuals
     np.testing.assert_allclose(visual.mesh.extents, [0.02, 0.01, 0.03], atol=1e-9)
     np.testing.assert_allclose(visual.mesh.bounds.mean(axis=0), [0.1, 0.0, 0.0], atol=1e-9)
-    assert model.notes == ()
+    assert robot.notes == ()
     absent = load(edited(tmp_path, '<link name="forearm"/>', shape.format("none")))
     assert [note for note in absent.notes if "none.stl" in note]
 
 
 def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None:
-    own = load()
+    own = load().require_arm()
     text = (ROOT / "robot_description" / "katana450.urdf").read_text(encoding="utf-8")
     path = tmp_path / "edited.urdf"
     path.write_text(text.replace('"shoulder_frame"', '"elsewhere"'), encoding="utf-8")
-    other = load(path)
+    other = load(path).require_arm()
     np.testing.assert_allclose(other.T_base_shoulder, own.T_base_shoulder, atol=1e-15)
-    np.testing.assert_allclose(so3.log(other.arm.chain.M[:3, :3]), 0.0, atol=1e-15)
+    np.testing.assert_allclose(so3.log(other.chain.M[:3, :3]), 0.0, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -267,14 +268,13 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
         ("<?xml version='1.0' encoding='klingon'?><robot/>", "its XML is broken, unknown encoding"),
     ],
 )
-@pytest.mark.parametrize("read", [load, load_mechanism])
 def test_what_is_no_robot_description_is_told_as_it_is(
-    read: Callable[[Path], object], text: str, said: str, tmp_path: Path
+    text: str, said: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(text)
     with pytest.raises(RobotDescriptionError, match=said):
-        read(path)
+        load(path)
 
 
 def test_a_joint_behind_a_tool_that_nobody_named_is_told(tmp_path: Path) -> None:
@@ -282,11 +282,11 @@ def test_a_joint_behind_a_tool_that_nobody_named_is_told(tmp_path: Path) -> None
         <child link="more"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
     path = tmp_path / "six.urdf"
     path.write_text(PINCHER.read_text().replace("</robot>", more.format("jaw")))
-    (note,) = load(path).notes
+    (note,) = load(path).require_arm().notes
     assert note == "Joint 'jaw' is taken for that of a gripper; 'fingertips' is the tool."
-    assert load(path, "fingertips").notes == ()
+    assert load(path, "fingertips").require_arm().notes == ()
     # What no name calls a finger is an axis, until a person says where the tool is.
     path.write_text(PINCHER.read_text().replace("</robot>", more.format("sixth")))
     with pytest.raises(RobotDescriptionError, match=r"has 6 axes .* add --tool fingertips"):
-        load(path)
-    assert load(path, "fingertips").arm.gripper.moves
+        load(path).require_arm()
+    assert load(path, "fingertips").require_arm().gripper.moves

@@ -11,8 +11,9 @@ import pytest
 import trimesh
 
 from katana450.arm.robot.collision import standing_around, world_of
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, load_props
+from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
 from katana450.resources import PROPS_PATH
 from katana450.settings import Settings
@@ -76,7 +77,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
         load_props(tmp_path / "none.json")
 
 
-def test_what_stands_around_holds_the_props(model: RobotModel) -> None:
+def test_what_stands_around_holds_the_props(robot: Robot, arm: MountedArm) -> None:
     """Nothing of a prop's mesh is outside the shape that stands for it, nor the table above it."""
     props = load_props()
     table, cup, basin = standing_around(props)
@@ -89,9 +90,9 @@ def test_what_stands_around_holds_the_props(model: RobotModel) -> None:
         assert (local >= np.array(shape.low) - 2e-4).all()
         assert (local <= np.array(shape.high) + 2e-4).all()
         assert np.hypot(local[:, 0], local[:, 1]).max() <= vessel.outer_radius + 2e-4
-    world, _ = world_of(model)
+    world, _ = world_of(robot)
     assert world is not None
-    ready = np.append(model.ready(Settings().ready), 0.0)
+    ready = np.append(arm.ready(Settings().ready), 0.0)
     found = world.with_obstacles((table, cup, basin)).nearest(ready)
     assert found is not None
     assert found.distance > 0.03

@@ -7,7 +7,6 @@ import math
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +16,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason
 from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.robot.model import load
-from katana450.assembly.robot_session import Jointed, recognised
+from katana450.arm.robot.loader import load
+from katana450.assembly.robot_session import recognised
 from katana450.client.client import connect
 from katana450.errors import RobotDescriptionError
 from katana450.maths.kinematics.forward import forward
@@ -48,43 +47,41 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.mark.parametrize("name", KATANAS)
 def test_every_public_katana_is_an_arm_with_both_fingers_driven(tmp_path: Path, name: str) -> None:
-    model = load(written(tmp_path, name, KATANAS[name]))
-    assert model.arm.default_tool == "tool_frame"
-    gripper = model.arm.gripper
+    robot = load(written(tmp_path, name, KATANAS[name]))
+    arm = robot.require_arm()
+    assert arm.default_tool == "tool_frame"
+    gripper = arm.gripper
     assert (gripper.lower, gripper.upper, gripper.speed) == (-0.44, 0.30, 0.718834)
     assert not gripper.slides
-    angles = model.joint_angles(np.zeros(5), 0.2)
+    angles = robot.joint_values(np.zeros(5), 0.2)
     # The left finger's axis points the other way, so equal angles open both.
     assert (angles["r"], angles["l"]) == (0.2, 0.2)
-    assert [note for note in model.notes if "'r', 'l'" in note and "driven together" in note]
+    assert [note for note in arm.notes if "'r', 'l'" in note and "driven together" in note]
 
 
 def test_sliding_fingers_move_within_their_limits(tmp_path: Path) -> None:
     path = written(tmp_path, "px150", PX150)
-    model = load(path)
-    gripper = model.arm.gripper
+    robot = load(path)
+    arm = robot.require_arm()
+    gripper = arm.gripper
     assert (gripper.lower, gripper.upper, gripper.slides) == (0.015, 0.037, True)
-    assert model.joint_angles(np.zeros(5), 0.03) | {"waist": 0} == {
-        **dict.fromkeys(model.arm.chain.names, 0.0),
+    assert robot.joint_values(np.zeros(5), 0.03) | {"waist": 0} == {
+        **dict.fromkeys((*arm.chain.names, "gripper"), 0.0),
         "left_finger": 0.03,
         "right_finger": -0.03,
     }
-    driver = SimulatedDriver(model.arm, np.zeros(5), 0.0)
+    driver = SimulatedDriver(arm, np.zeros(5), 0.0)
     assert driver.start(0.0).gripper == 0.015
-    robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
-    robot.update_cfg(dict.fromkeys(model.arm.chain.names, 0.0) | {"left_finger": 0.03})
-    frames: dict[str | None, Any] = {None: np.eye(4)}
-    angles = model.joint_angles(np.zeros(5), 0.03)
-    for body in model.bodies:
-        T = frames[body.parent] @ body.T_parent_body
-        frames[body.name] = T if body.joint is None else T @ body.motion(angles[body.joint])
-        np.testing.assert_allclose(frames[body.name], robot.get_transform(body.name), atol=1e-12)
+    urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    urdf.update_cfg(dict.fromkeys(arm.chain.names, 0.0) | {"left_finger": 0.03})
+    for name, T in robot.frames(robot.joint_values(np.zeros(5), 0.03)).items():
+        np.testing.assert_allclose(T, urdf.get_transform(name), atol=1e-12)
 
 
 def test_a_session_drives_sliding_fingers_and_names_their_limit(tmp_path: Path) -> None:
-    model = load(written(tmp_path, "px150", PX150))
-    session = Session(model.arm, model.ready(Settings().ready))
-    state = session.begin(session.ready, model.arm.gripper.clamp(0.0), 0.0)
+    arm = load(written(tmp_path, "px150", PX150)).require_arm()
+    session = Session(arm, arm.ready(Settings().ready))
+    state = session.begin(session.ready, arm.gripper.clamp(0.0), 0.0)
     state = session.step(state, [cmd.SetGripper(0.05)], 0.01)
     assert [(f.reason, f.amount) for f in state.findings] == [(Reason.GRIPPER_SLIDE_LIMIT, 0.037)]
     for tick in range(2, 20):
@@ -113,21 +110,21 @@ def test_a_session_drives_sliding_fingers_and_names_their_limit(tmp_path: Path) 
 def test_fingers_of_every_kind_are_driven_together(
     tmp_path: Path, joints: list[J], expected: dict[str, tuple[float, float]]
 ) -> None:
-    model = load(written(tmp_path, "arm", [*PX150[:5], *joints]))
-    assert set(model.fingers) == set(expected)
-    assert next(iter(model.fingers)) == next(iter(expected))
+    arm = load(written(tmp_path, "arm", [*PX150[:5], *joints])).require_arm()
+    assert set(arm.fingers) == set(expected)
+    assert next(iter(arm.fingers)) == next(iter(expected))
     for name, follow in expected.items():
-        assert model.fingers[name] == pytest.approx(follow)
+        assert arm.fingers[name] == pytest.approx(follow)
 
 
 def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> None:
     pan = J("pan_tilt", "revolute", "base", "camera", axis=(0.0, 1.0, 0.0), limits=(0.3, 0.8))
-    model = load(written(tmp_path, "arm", [*PX150, pan]))
-    camera = next(body for body in model.bodies if body.name == "camera")
-    assert camera.joint is None
-    assert camera.T_parent_body[0, 0] == pytest.approx(math.cos(0.3))
-    assert "Joint 'pan_tilt' is revolute and stays at 0.3 rad." in model.notes
-    assert "Joint 'gripper' is continuous and stays at zero." in model.notes
+    robot = load(written(tmp_path, "arm", [*PX150, pan]))
+    camera = robot.frames(robot.joint_values(np.zeros(5), 0.0))["camera"]
+    assert camera[0, 0] == pytest.approx(math.cos(0.3))
+    assert "camera" not in robot.moving
+    assert "Joint 'pan_tilt' is revolute and stays at 0.3 rad." in robot.require_arm().notes
+    assert "Joint 'gripper' is continuous and stays at zero." in robot.require_arm().notes
 
 
 @pytest.mark.parametrize(
@@ -162,10 +159,10 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
 def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J], said: str) -> None:
     path = written(tmp_path, "arm", joints)
     with pytest.raises(RobotDescriptionError, match=said):
-        load(path)
-    robot = recognised(Settings(), path, None)
-    assert isinstance(robot, Jointed)
-    assert [note for note in robot.notes if note.startswith("Joints only. ") and "arm.urdf" in note]
+        load(path).require_arm()
+    found = recognised(Settings(), path, None)
+    assert found.robot.arm is None
+    assert [note for note in found.notes if note.startswith("Joints only. ") and "arm.urdf" in note]
 
 
 @pytest.mark.parametrize(
@@ -179,24 +176,24 @@ def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J],
     ids=["a wide range", "an endless one", "the link's name", "it slides"],
 )
 def test_a_last_joint_in_a_row_can_be_a_finger(tmp_path: Path, jaw: J) -> None:
-    model = load(written(tmp_path, "arm", [*PX150[:5], jaw]))
-    assert model.arm.chain.names == tuple(joint.name for joint in PX150[:5])
+    arm = load(written(tmp_path, "arm", [*PX150[:5], jaw])).require_arm()
+    assert arm.chain.names == tuple(joint.name for joint in PX150[:5])
 
 
 def test_a_joint_beside_a_tool_frame_is_a_finger(tmp_path: Path) -> None:
     frame = J("end", "fixed", "hand", "end_effector_link", (0.1, 0.0, 0.0))
     sixth = J("joint_6", "revolute", "hand", "link_6")
-    model = load(written(tmp_path, "arm", [*PX150[:5], frame, sixth]))
-    assert model.arm.default_tool == "end_effector_link"
-    assert model.arm.gripper.moves
+    arm = load(written(tmp_path, "arm", [*PX150[:5], frame, sixth])).require_arm()
+    assert arm.default_tool == "end_effector_link"
+    assert arm.gripper.moves
 
 
 def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
     wheels = [
         J(f"wheel_{n}", "continuous", "base", f"w{n}", axis=(0.0, 1.0, 0.0)) for n in range(4)
     ]
-    model = load(written(tmp_path, "rover", [*wheels, *PX150]))
-    assert model.arm.chain.names == ("waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate")
+    arm = load(written(tmp_path, "rover", [*wheels, *PX150])).require_arm()
+    assert arm.chain.names == ("waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate")
 
 
 def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) -> None:
@@ -217,9 +214,9 @@ def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) ->
 
 def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -> None:
     path = written(tmp_path, "so101", SO101)
-    model = load(path)
-    chain = model.arm.chain
-    (note,) = [note for note in model.notes if "exact arm" in note]
+    arm = load(path).require_arm()
+    chain = arm.chain
+    (note,) = [note for note in arm.notes if "exact arm" in note]
     assert "0.00021 deg" in note
     rng = np.random.default_rng(3)
     for q in rng.uniform(chain.lower, chain.upper, size=(300, 5)):
@@ -232,7 +229,7 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
     moved = []
     for q in rng.uniform(chain.lower, chain.upper, size=(100, 5)):
         robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)) | {"gripper": 0.0})
-        T = model.T_base_shoulder @ forward(chain, q)
+        T = arm.T_base_shoulder @ forward(chain, q)
         moved.append(T[:3, 3] - robot.get_transform("gripper_frame_link")[:3, 3])
     # Less than the last digit of the file, and as much as the note says.
     assert np.linalg.norm(moved, axis=1).max() < 1.5e-6

@@ -13,7 +13,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.control.things import Form, Thing
 from katana450.arm.robot.collision import hand_of, world_of
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.world import World
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.forward import forward
@@ -38,34 +40,41 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def model(path: Path) -> RobotModel:
+def robot(path: Path) -> Robot:
     return load(path)
 
 
 @pytest.fixture
-def world(model: RobotModel) -> World:
-    world, _ = world_of(model)
+def arm(robot: Robot) -> MountedArm:
+    return robot.require_arm()
+
+
+@pytest.fixture
+def world(robot: Robot) -> World:
+    world, _ = world_of(robot)
     assert world is not None
     return world
 
 
-def test_their_bodies_slide(path: Path, model: RobotModel, world: World) -> None:
+def test_their_bodies_slide(path: Path, arm: MountedArm, world: World) -> None:
     robot = yourdfpy.URDF.load(str(path), load_meshes=False)
     rng = np.random.default_rng(1)
     for _ in range(20):
-        q = rng.uniform(model.arm.chain.lower, model.arm.chain.upper)
+        q = rng.uniform(arm.chain.lower, arm.chain.upper)
         opened = float(rng.uniform(0.015, 0.037))
-        robot.update_cfg(dict(zip(model.arm.chain.names, q, strict=True)) | {"left_finger": opened})
+        robot.update_cfg(dict(zip(arm.chain.names, q, strict=True)) | {"left_finger": opened})
         T = world.linkage.poses(np.append(q, opened))
         for part in world.parts:
             expected = robot.get_transform(part.name)
             np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
 
 
-def test_no_distance_changes_more_than_their_bodies_travel(model: RobotModel, world: World) -> None:
+def test_no_distance_changes_more_than_their_bodies_travel(
+    robot: Robot, arm: MountedArm, world: World
+) -> None:
     ball = se3.from_rotation_translation(np.eye(3), np.array([0.3, 0.0, 0.2]))
     thing = Thing("box", Form.BOX, (0.02, 0.02, 0.02), ball, can_be_held=True)
-    session = Session(model.arm, np.zeros(5), world, hand=hand_of(model, world), things=(thing,))
+    session = Session(arm, np.zeros(5), world, hand=hand_of(robot, world), things=(thing,))
     around = session.world_at(session.begin(session.ready, 0.02, 0.0))
     assert around is not None
     pairs = np.arange(len(around.first))
@@ -95,16 +104,16 @@ def run(session: Session, state: State, *commands: cmd.Command) -> State:
     raise AssertionError(f"still on its way: {state.findings}")
 
 
-def test_they_hold_a_thing_and_let_go_of_it(model: RobotModel, world: World) -> None:
-    ready = model.ready(Settings().ready)
+def test_they_hold_a_thing_and_let_go_of_it(robot: Robot, arm: MountedArm, world: World) -> None:
+    ready = arm.ready(Settings().ready)
     fingers = np.array([-0.027575, 0.0, 0.0])
-    T = model.T_base_shoulder @ forward(model.arm.chain, ready)
+    T = arm.T_base_shoulder @ forward(arm.chain, ready)
     T[:3, 3] += T[:3, :3] @ fingers
     width = 0.05
     thing = Thing("block", Form.BOX, (0.02, width, 0.02), T, can_be_held=True)
-    session = Session(model.arm, ready, world, hand=hand_of(model, world), things=(thing,))
-    state = session.begin(ready, model.arm.gripper.upper, 0.0)
-    state = run(session, state, cmd.SetGripper(model.arm.gripper.lower))
+    session = Session(arm, ready, world, hand=hand_of(robot, world), things=(thing,))
+    state = session.begin(ready, arm.gripper.upper, 0.0)
+    state = run(session, state, cmd.SetGripper(arm.gripper.lower))
     (held,) = state.things
     assert held.held
     inside = 0.5 * (width + THICK)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.robot.bare import bare
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
@@ -16,32 +17,32 @@ from katana450.maths.kinematics.statics import GRAVITY, Load, holding_torques
 from katana450.resources import URDF_PATH
 
 
-def energy(model: RobotModel, q: FloatArray) -> float:
+def energy(robot: Robot, q: FloatArray) -> float:
     """[J] Of the weight, from where each mass is."""
-    moved = (np.eye(4), *joint_frames(model.arm.chain, q))
+    moved = (np.eye(4), *joint_frames(robot.require_arm().chain, q))
     return sum(
         GRAVITY * load.mass * float((moved[load.axes] @ [*load.centre, 1.0])[2])
-        for load in loads_of(model)
+        for load in loads_of(robot)
     )
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_they_are_the_slope_of_the_energy(model: RobotModel, seed: int) -> None:
-    chain = model.arm.chain
+def test_they_are_the_slope_of_the_energy(robot: Robot, arm: MountedArm, seed: int) -> None:
+    chain = arm.chain
     q = np.random.default_rng(seed).uniform(chain.lower, chain.upper)
     step = 1e-5
     slope = [
-        (energy(model, q + step * e) - energy(model, q - step * e)) / (2.0 * step)
+        (energy(robot, q + step * e) - energy(robot, q - step * e)) / (2.0 * step)
         for e in np.eye(chain.n)
     ]
-    np.testing.assert_allclose(holding_torques(chain, q, loads_of(model)), slope, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(holding_torques(chain, q, loads_of(robot)), slope, rtol=0, atol=1e-8)
 
 
-def test_mujoco_finds_the_same_from_the_file(model: RobotModel) -> None:
+def test_mujoco_finds_the_same_from_the_file(robot: Robot, arm: MountedArm) -> None:
     peer = mujoco.MjModel.from_xml_path(str(URDF_PATH))
     peer.opt.gravity[:] = (0.0, 0.0, -GRAVITY)
     data = mujoco.MjData(peer)
-    chain, random = model.arm.chain, np.random.default_rng(450)
+    chain, random = arm.chain, np.random.default_rng(450)
     for _ in range(10):
         q = random.uniform(chain.lower, chain.upper)
         for name, angle in zip(chain.names, q, strict=True):
@@ -49,27 +50,31 @@ def test_mujoco_finds_the_same_from_the_file(model: RobotModel) -> None:
         mujoco.mj_forward(peer, data)
         wanted = [float(data.joint(name).qfrc_bias[0]) for name in chain.names]
         np.testing.assert_allclose(
-            holding_torques(chain, q, loads_of(model)), wanted, rtol=0, atol=1e-6
+            holding_torques(chain, q, loads_of(robot)), wanted, rtol=0, atol=1e-6
         )
 
 
-def test_what_stands_upright_is_held_by_nobody_and_the_gripper_weighs(model: RobotModel) -> None:
-    chain = model.arm.chain
-    upright = holding_torques(chain, np.deg2rad((30.0, -90.0, 0.0, 0.0, 0.0)), loads_of(model))
-    stretched = holding_torques(chain, np.zeros(chain.n), loads_of(model))
+def test_what_stands_upright_is_held_by_nobody_and_the_gripper_weighs(
+    robot: Robot, arm: MountedArm
+) -> None:
+    chain = arm.chain
+    upright = holding_torques(chain, np.deg2rad((30.0, -90.0, 0.0, 0.0, 0.0)), loads_of(robot))
+    stretched = holding_torques(chain, np.zeros(chain.n), loads_of(robot))
     # Axis 1 is vertical; a shoulder that holds the arm out pulls up, against positive angles.
     assert abs(stretched[0]) < 1e-12
     assert stretched[1] < -5.0
     assert abs(upright[1]) < 0.1 * abs(stretched[1])
-    without = holding_torques(chain, np.zeros(chain.n), loads_of(bare(model)))
+    without = holding_torques(chain, np.zeros(chain.n), loads_of(bare(robot)))
     assert abs(without[1]) < abs(stretched[1]) - 0.5
-    total = sum(load.mass for load in loads_of(model) if load.axes)
+    total = sum(load.mass for load in loads_of(robot) if load.axes)
     assert 0.0 < total < 4.8
 
 
-def test_a_weight_on_the_base_is_nobodys_and_a_wrong_posture_is_refused(model: RobotModel) -> None:
-    chain = model.arm.chain
+def test_a_weight_on_the_base_is_nobodys_and_a_wrong_posture_is_refused(
+    robot: Robot, arm: MountedArm
+) -> None:
+    chain = arm.chain
     base = Load(0, 100.0, np.array((1.0, 1.0, 1.0)))
     assert not holding_torques(chain, np.zeros(chain.n), [base]).any()
     with pytest.raises(InputError):
-        holding_torques(chain, np.full(chain.n, np.nan), loads_of(model))
+        holding_torques(chain, np.full(chain.n, np.nan), loads_of(robot))

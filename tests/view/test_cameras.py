@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
-from katana450.maths.geometry import so3
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.cameras import FOV, LOOKS, Preset
 
@@ -17,9 +17,9 @@ ASPECT = 1.2
 
 
 @pytest.fixture(scope="module")
-def postures(model: RobotModel) -> FloatArray:
+def postures(arm: MountedArm) -> FloatArray:
     """(n, 5) [rad] at random, and stretched out to every side."""
-    chain = model.arm.chain
+    chain = arm.chain
     stretched = [
         (pan, shoulder, 0.0, 0.0, 0.0)
         for pan in np.linspace(chain.lower[0], chain.upper[0], 12)
@@ -29,23 +29,18 @@ def postures(model: RobotModel) -> FloatArray:
     return np.concatenate((stretched, random))
 
 
-def points_on(model: RobotModel, q: FloatArray) -> FloatArray:
+def points_on(robot: Robot, q: FloatArray) -> FloatArray:
     """Points (n, 3) [m] on the arm's hulls in the base frame, the fingers wide open."""
-    angles = model.joint_angles(q, model.arm.gripper.upper)
-    T: dict[str, FloatArray] = {}
+    T = robot.frames(robot.joint_values(q, robot.require_arm().gripper.upper))
     points = []
-    for body in model.bodies:
-        above = np.eye(4) if body.parent is None else T[body.parent]
-        T[body.name] = above @ body.T_parent_body
-        if body.joint is not None:
-            T[body.name][:3, :3] @= so3.exp(body.axis * angles[body.joint])
-        R, p = T[body.name][:3, :3], T[body.name][:3, 3]
-        points += [shape.mesh.vertices @ R.T + p for shape in body.collisions]
+    for link in robot.links:
+        R, p = T[link.name][:3, :3], T[link.name][:3, 3]
+        points += [shape.mesh.vertices @ R.T + p for shape in link.collisions]
     return np.concatenate(points)
 
 
 @pytest.mark.parametrize("preset", LOOKS)
-def test_no_pose_is_cut_off(model: RobotModel, postures: FloatArray, preset: Preset) -> None:
+def test_no_pose_is_cut_off(robot: Robot, postures: FloatArray, preset: Preset) -> None:
     look = LOOKS[preset]
     position, target = np.array(look.position), np.array(look.target)
     ahead = (target - position) / np.linalg.norm(target - position)
@@ -54,7 +49,7 @@ def test_no_pose_is_cut_off(model: RobotModel, postures: FloatArray, preset: Pre
     top = math.tan(0.5 * FOV)
     greatest = 0.0
     for q in postures:
-        points = points_on(model, q)
+        points = points_on(robot, q)
         if points[:, 2].min() < -0.02:
             continue  # through the table
         seen = points - position

@@ -13,7 +13,8 @@ import viser
 from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.looks import Looks, Trait
 from katana450.arm.control.state import State
-from katana450.arm.robot.machine import Machine, load_machine
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.looks import PERSONAL
@@ -26,14 +27,14 @@ from tests.exchange.trees import tree
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Machine:
+def robot(tmp_path: Path) -> Robot:
     path = tmp_path / "tree.urdf"
     path.write_text(tree(3, 10))
-    return load_machine(path, "It is <b>no</b> arm.")
+    return replace(load(path), why="It is <b>no</b> arm.")
 
 
-def standing(machine: Machine) -> State:
-    session = JointSession(machine.joints, machine.way)
+def standing(robot: Robot) -> State:
+    session = JointSession(robot.joint_group, robot.distance)
     return session.begin(session.ready, 0.0, 0.0)
 
 
@@ -47,28 +48,28 @@ def shown(server: viser.ViserServer, path: str) -> FloatArray:
     return T
 
 
-def test_every_link_is_shown_where_it_is(server: viser.ViserServer, machine: Machine) -> None:
-    nodes = MachineNodes(server, machine.mechanism)
-    joints, random = machine.joints, np.random.default_rng(1)
+def test_every_link_is_shown_where_it_is(server: viser.ViserServer, robot: Robot) -> None:
+    nodes = MachineNodes(server, robot)
+    joints, random = robot.joint_group, np.random.default_rng(1)
     for _ in range(3):
-        values = machine.values(random.uniform(joints.lower, joints.upper))
+        values = robot.joint_values(random.uniform(joints.lower, joints.upper), 0.0)
         nodes.move(values)
-        for name, T in machine.mechanism.frames(values).items():
+        for name, T in robot.frames(values).items():
             np.testing.assert_allclose(shown(server, nodes.path[name]), T, rtol=0, atol=1e-9)
 
 
 def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
-    machine = load_machine(GANTRY, "why")
-    nodes = MachineNodes(server, machine.mechanism)
+    robot = load(GANTRY)
+    nodes = MachineNodes(server, robot)
     blue = Looks().having("cart", Trait.COLOUR, (0.0, 0.0, 1.0))
-    PaintNodes(server, nodes).follow(replace(standing(machine), looks=blue))
+    PaintNodes(server, nodes).follow(replace(standing(robot), looks=blue))
     assert not nodes.shapes["cart"][0].visible
     coat: Any = server.scene._handle_from_node_name[f"{nodes.path['cart']}/paint0"]
     assert tuple(coat.color) == (0, 0, 255)
 
 
 def test_the_panel_has_a_slider_a_joint_and_says_why(
-    server: viser.ViserServer, machine: Machine
+    server: viser.ViserServer, robot: Robot
 ) -> None:
     said: list[Any] = []
 
@@ -76,13 +77,13 @@ def test_the_panel_has_a_slider_a_joint_and_says_why(
         said.append(command)
         return len(said)
 
-    state = standing(machine)
-    MachinePanel(server.gui, machine.joints, put, state)
+    state = standing(robot)
+    MachinePanel(server.gui, robot.joint_group, put, state)
     controls = {
         handle.label: handle for handle in server.gui._gui_input_handle_from_uuid.values()
         if isinstance(handle, viser.GuiSliderHandle)
     }  # fmt: skip
-    joints = machine.joints
+    joints = robot.joint_group
     labels = [f"{axis + 1}. {name}" for axis, name in enumerate(joints.names)]
     assert set(controls) == {*labels, "Speed"}
     for axis, label in enumerate(labels):

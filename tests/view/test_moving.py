@@ -14,7 +14,8 @@ from katana450.arm.control.commands import Command, SetJoints
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.conduit import Stretch
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import so3
 from katana450.server.view.branches import INTERVAL, BranchList
 from katana450.server.view.conduit import poses
@@ -22,26 +23,26 @@ from katana450.server.view.controls import Clickable
 from katana450.server.view.scene import FrameTree
 
 
-def test_every_link_is_turned_as_its_joint_is(model: RobotModel, server: viser.ViserServer) -> None:
-    tree = FrameTree(server, "/tree", model)
+def test_every_link_is_turned_as_its_joint_is(robot: Robot, server: viser.ViserServer) -> None:
+    tree = FrameTree(server, "/tree", robot)
     node = {handle.name: handle for handle in server.scene._handle_from_node_name.values()}
     random = np.random.default_rng(450)
     for _ in range(20):
-        angles = model.joint_angles(random.uniform(-4.0, 4.0, 5), random.uniform(-1.0, 1.0))
+        angles = robot.joint_values(random.uniform(-4.0, 4.0, 5), random.uniform(-1.0, 1.0))
         tree.move(angles)
-        for body in model.bodies:
-            R = body.T_parent_body[:3, :3]
-            if body.joint is not None:
-                R = R @ so3.exp(body.axis * angles[body.joint])
-            shown = so3.from_quaternion(node[tree.path[body.name]].wxyz)
+        for link in robot.links:
+            R = link.T_parent_link[:3, :3]
+            if link.joint is not None:
+                R = R @ so3.exp(link.joint.axis * angles[link.joint.name])
+            shown = so3.from_quaternion(node[tree.path[link.name]].wxyz)
             np.testing.assert_allclose(shown, R, atol=1e-12)
 
 
 @pytest.mark.parametrize("number", range(4))
 def test_rings_stand_across_the_conduit_also_between_the_angles_worked_out(
-    model: RobotModel, number: int
+    arm: MountedArm, number: int
 ) -> None:
-    stretch: Stretch = model.stretches[number]
+    stretch: Stretch = arm.stretches[number]
     rings = poses(stretch, 30)
     between = 0.5 * (rings[1:] + rings[:-1])
     for angles, shown in (
@@ -57,7 +58,7 @@ def test_rings_stand_across_the_conduit_also_between_the_angles_worked_out(
 
 
 def test_branches_are_looked_for_once_a_second_while_the_arm_moves(
-    model: RobotModel, server: viser.ViserServer, session: Session
+    robot: Robot, server: viser.ViserServer, session: Session
 ) -> None:
     looked: list[State] = []
 
@@ -69,7 +70,7 @@ def test_branches_are_looked_for_once_a_second_while_the_arm_moves(
         return
 
     rest = session.begin(session.ready, 0.0, 0.0)
-    branches = BranchList(server, model, find, listen, rest)
+    branches = BranchList(server, robot, find, listen, rest)
     looked.clear()
     state = session.step(rest, [SetJoints(session.ready + 0.3)], 0.01)
     times = np.arange(0.0, 3.0 * INTERVAL, 0.1)

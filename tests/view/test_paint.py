@@ -10,8 +10,8 @@ import viser
 from katana450.arm.control.looks import Looks, Trait
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.resources import URDF_PATH
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.scene import ArmNodes
@@ -20,9 +20,9 @@ from katana450.server.view.scene import ArmNodes
 class Shown:
     """A scene of arm and paint."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel, session: Session) -> None:
+    def __init__(self, server: viser.ViserServer, robot: Robot, session: Session) -> None:
         self.server = server
-        self.arm = ArmNodes(server, model)
+        self.arm = ArmNodes(server, robot)
         self.paint = PaintNodes(server, self.arm)
         self.state = session.begin(session.ready, 0.0, 0.0)
         self.show()
@@ -42,8 +42,8 @@ class Shown:
 
 
 @pytest.fixture
-def shown(server: viser.ViserServer, model: RobotModel, session: Session) -> Shown:
-    return Shown(server, model, session)
+def shown(server: viser.ViserServer, robot: Robot, session: Session) -> Shown:
+    return Shown(server, robot, session)
 
 
 def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
@@ -59,8 +59,8 @@ def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
     glass = Looks().having("pan_link", Trait.TRANSPARENCY, 0.75)
     shown.show(looks=glass)
     # Of a paint that nobody mixed: the colour of most of what the link is made of.
-    mechanism, _ = load_mechanism(URDF_PATH)
-    (link,) = (link for link in mechanism.links if link.name == "pan_link")
+    robot = load(URDF_PATH)
+    (link,) = (link for link in robot.links if link.name == "pan_link")
     assert set(shown.painted().values()) == {tuple(round(255.0 * part) for part in link.colour)}
     node = shown.server.scene._handle_from_node_name[
         "/".join((shown.arm.path["pan_link"], "paint0"))

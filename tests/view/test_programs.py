@@ -10,7 +10,8 @@ import pytest
 import viser
 
 from katana450.arm.control.session import Session
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.script import parse
@@ -19,7 +20,7 @@ from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.kinematics.forward import forward
 from katana450.server.api.answers import Progress as Told
 from katana450.server.api.fields import Order
-from katana450.server.view.preview import GHOSTS, _poses
+from katana450.server.view.preview import GHOSTS
 from katana450.server.view.programs import ProgramsPanel, _page
 from tests.browser.server import free_port
 
@@ -58,17 +59,17 @@ def test_what_is_said_is_text_and_no_markup() -> None:
 
 
 def test_it_previews_steers_and_teaches(
-    server: viser.ViserServer, model: RobotModel, session: Session, tmp_path: Path
+    server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
     performer = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
+    panel = ProgramsPanel(server, robot, performer, Scripts(tmp_path), lambda: state)
     # Not the first, which is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
     way = panel._preview._way
     assert not way.visible
-    rig = PlanContext(session, model.T_base_shoulder)
+    rig = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"
     performer.program = compiled(parse(text), rig, state)
     panel.follow()
@@ -95,12 +96,12 @@ def test_it_previews_steers_and_teaches(
 
 
 def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
-    server: viser.ViserServer, model: RobotModel, session: Session, tmp_path: Path
+    server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
     performer = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(server, model, performer, Scripts(tmp_path), lambda: state)
-    rig = PlanContext(session, model.T_base_shoulder)
+    panel = ProgramsPanel(server, robot, performer, Scripts(tmp_path), lambda: state)
+    rig = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
     program = compiled(parse(text), rig, state)
     preview = panel._preview
@@ -125,11 +126,11 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     timeline = Timeline.of(program)
     for name, node in preview._sweep._nodes:
         for number, (q, fingers) in enumerate(timeline.postures(GHOSTS)):
-            linkage = _poses(model, q, fingers)[name]
+            linkage = robot.frames(robot.joint_values(q, fingers))[name]
             assert node.batched_positions[number] == pytest.approx(linkage[:3, 3], abs=1e-6)
     q, fingers = timeline.at(timeline.span)
-    tool = model.T_base_shoulder @ forward(model.arm.chain_to("tcp"), q)
-    assert _poses(model, q, fingers)["tcp"] == pytest.approx(tool, abs=1e-9)
+    tool = arm.T_base_shoulder @ forward(arm.chain_to("tcp"), q)
+    assert robot.frames(robot.joint_values(q, fingers))["tcp"] == pytest.approx(tool, abs=1e-9)
 
     assert timeline.span <= panel._look.max < timeline.span + 0.11
     panel._look.value = 1.0  # type: ignore[misc]  # likewise

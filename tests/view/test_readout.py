@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.session import Session
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.velocity import condition_number, limit_distances, manipulability
 from katana450.server.view.controls import ends
 from katana450.server.view.readout import page
 
 
 def test_every_axis_tells_how_far_its_limit_is_and_the_nearest_stands_out(
-    model: RobotModel, session: Session
+    arm: MountedArm, session: Session
 ) -> None:
-    random, chain = np.random.default_rng(2), model.arm.chain
+    random, chain = np.random.default_rng(2), arm.chain
     for q in random.uniform(chain.lower, chain.upper, (20, 5)):
-        told = page(model, replace(session.begin(session.ready, 0.0, 0.0), q=q))
+        told = page(arm, replace(session.begin(session.ready, 0.0, 0.0), q=q))
         (rooms,) = re.findall(r"data-now='limits'>(.*?)</table>", told)
         cells = re.findall(r"<td( class=nearest)?>(\d+)°</td>", rooms)
         distances = np.degrees(limit_distances(chain, q))
@@ -29,16 +29,16 @@ def test_every_axis_tells_how_far_its_limit_is_and_the_nearest_stands_out(
 
 
 def test_the_measures_of_velocity_are_those_of_the_kinematics(
-    model: RobotModel, session: Session
+    arm: MountedArm, session: Session
 ) -> None:
-    chain, state = model.arm.chain, session.begin(session.ready, 0.0, 0.0)
-    told = page(model, state)
+    chain, state = arm.chain, session.begin(session.ready, 0.0, 0.0)
+    told = page(arm, state)
     assert f"<td data-now='condition'>{condition_number(chain, state.q):.0f}</td>" in told
     assert f"<td data-now='manipulability'>{manipulability(chain, state.q):.3f}</td>" in told
 
 
-def test_in_a_singularity_the_condition_has_no_end(model: RobotModel, session: Session) -> None:
-    assert "<td data-now='condition'>∞</td>" in page(model, session.begin(np.zeros(5), 0.0, 0.0))
+def test_in_a_singularity_the_condition_has_no_end(arm: MountedArm, session: Session) -> None:
+    assert "<td data-now='condition'>∞</td>" in page(arm, session.begin(np.zeros(5), 0.0, 0.0))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.server.view.scene import COAT, DETAIL, coarse, surface
 
 
@@ -32,9 +32,9 @@ def test_far_corners_stay_as_they_are() -> None:
     assert trimesh.Trimesh(vertices, faces).volume == cube.volume
 
 
-def test_the_ghost_keeps_the_arms_outline(model: RobotModel) -> None:
+def test_the_ghost_keeps_the_arms_outline(robot: Robot) -> None:
     before = after = 0
-    for body in model.bodies:
+    for body in robot.links:
         for visual in body.visuals:
             vertices, faces = surface(visual)
             fine = visual.mesh

@@ -11,8 +11,8 @@ import viser
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.collision import standing_around
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.server.view.tint import Tint
 from katana450.server.view.workcell import Workcell
 
@@ -50,15 +50,15 @@ def touching(state: State, one: str, other: str) -> State:
     return replace(state, findings=(Finding(Reason.CONTACT, 0.006, parts=(one, other)),))
 
 
-def test_both_parts_are_coated_until_they_are_apart(model: RobotModel, state: State) -> None:
+def test_both_parts_are_coated_until_they_are_apart(robot: Robot, state: State) -> None:
     scene = Scene()
-    paths = {body.name: f"/{body.name}" for body in model.bodies}
-    tint = Tint(cast(Any, Server(scene)), model, paths, load_props())
+    paths = {body.name: f"/{body.name}" for body in robot.links}
+    tint = Tint(cast(Any, Server(scene)), robot, paths, load_props())
     tint.follow(state)
     assert scene.coats == {}
     tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
     assert scene.coated() == {"finger_left_link", "upper_arm_link"}
-    body = next(body for body in model.bodies if body.name == "finger_left_link")
+    body = next(body for body in robot.links if body.name == "finger_left_link")
     assert sum("finger_left" in name for name in scene.coats) == len(body.collisions)
     tint.follow(touching(state, "finger_left_link", "bench"))
     assert scene.coated() == {"finger_left_link"}
@@ -71,20 +71,20 @@ def test_both_parts_are_coated_until_they_are_apart(model: RobotModel, state: St
 
 
 @pytest.mark.parametrize("thing", [part.name for part in standing_around(load_props())])
-def test_a_thing_is_coated_too_where_it_stands(model: RobotModel, state: State, thing: str) -> None:
+def test_a_thing_is_coated_too_where_it_stands(robot: Robot, state: State, thing: str) -> None:
     scene = Scene()
-    paths = {body.name: f"/{body.name}" for body in model.bodies}
-    tint = Tint(cast(Any, Server(scene)), model, paths, load_props())
+    paths = {body.name: f"/{body.name}" for body in robot.links}
+    tint = Tint(cast(Any, Server(scene)), robot, paths, load_props())
     tint.follow(touching(state, "gripper_link", thing))
     assert scene.coated() == {"gripper_link", thing}
     tint.follow(state)
     assert scene.coated() == set()
 
 
-def test_viser_takes_the_coats(model: RobotModel, state: State, server: viser.ViserServer) -> None:
+def test_viser_takes_the_coats(robot: Robot, state: State, server: viser.ViserServer) -> None:
     Workcell(server, load_props())
-    paths = {body.name: f"/{body.name}" for body in model.bodies}
-    tint = Tint(server, model, paths, load_props())
+    paths = {body.name: f"/{body.name}" for body in robot.links}
+    tint = Tint(server, robot, paths, load_props())
     tint.follow(touching(state, "wrist_link", "cup"))
     tint.follow(state)
     assert not server.scene._handle_from_node_name["/cup/contact0"].visible

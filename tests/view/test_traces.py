@@ -12,7 +12,7 @@ import viser
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.plans import plan_along
 from katana450.arm.control.session import Session
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import Linear, ToolArc
@@ -30,9 +30,8 @@ def server() -> Iterator[viser.ViserServer]:
 
 
 def test_the_path_and_the_way_that_was_gone_are_the_arc(
-    server: viser.ViserServer, model: RobotModel
+    server: viser.ViserServer, arm: MountedArm
 ) -> None:
-    arm = model.arm
     session = Session(arm, np.array(Settings().ready))
     state = session.begin(session.ready, 0.0, 0.0)
     at = ToolTarget.at(arm.chain, session.ready)
@@ -40,7 +39,7 @@ def test_the_path_and_the_way_that_was_gone_are_the_arc(
     arc = ToolArc(at.position, centre, np.array((1.0, 0.0, 0.0)), math.tau,
                   Linear(at.pitch, at.pitch), Linear(0.0, 0.0))  # fmt: skip
     path = ToolPath(arm.chain, arc, branch_of(arm.chain, session.ready), session.ready)
-    traces = Traces(server, model)
+    traces = Traces(server, arm)
     desired, traced = traces._desired, traces._traced
     traces.follow(state)
     assert [desired.visible, traced.visible] == [False, False]
@@ -52,7 +51,7 @@ def test_the_path_and_the_way_that_was_gone_are_the_arc(
         traces.follow(state)
         told.append(len(traced.points))
     assert [desired.visible, traced.visible] == [True, True]
-    middle = (model.T_base_shoulder @ np.append(centre, 1.0))[:3]
+    middle = (arm.T_base_shoulder @ np.append(centre, 1.0))[:3]
     for handle in (desired, traced):
         away = np.linalg.norm(np.asarray(handle.points) - middle, axis=2)
         assert np.abs(away - 0.05).max() < 1e-5

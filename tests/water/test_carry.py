@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control.commands import Command, SetJoint, Stop
 from katana450.arm.control.session import Session
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
@@ -20,9 +20,9 @@ LEVEL = np.deg2rad((-50.0, -70.0, 100.0, -30.0, 0.0))
 """[rad] The tool level, half a metre from axis 1."""
 
 
-def swung(model: RobotModel, stop_after: float) -> tuple[list[FloatArray], FloatArray]:
+def swung(arm: MountedArm, stop_after: float) -> tuple[list[FloatArray], FloatArray]:
     """Poses of an upright cup at the tool, and its accelerations (n, 3), from rest to rest."""
-    session = Session(model.arm, LEVEL)
+    session = Session(arm, LEVEL)
     state = session.begin(LEVEL, 0.0, 0.0)
     poses = []
     for k in range(300):
@@ -31,7 +31,7 @@ def swung(model: RobotModel, stop_after: float) -> tuple[list[FloatArray], Float
             commands = [Stop()]
         state = session.step(state, commands, k * DT)
         state = session.observe(state, state.setpoint, state.gripper)
-        tool = model.T_base_shoulder @ forward(model.arm.chain, state.setpoint)
+        tool = arm.T_base_shoulder @ forward(arm.chain, state.setpoint)
         turn = so3.exp((0.0, 0.0, float(state.setpoint[0])))
         poses.append(se3.from_rotation_translation(turn, tool[:3, 3] - (0.0, 0.0, 0.05)))
     at = np.array([T[:3, 3] for T in poses])
@@ -53,9 +53,9 @@ def carried_by(
 
 @pytest.mark.parametrize("stop_after", [9.0, 0.6], ids=["whole way", "stopped"])
 def test_at_full_speed_the_arm_keeps_the_water_off_the_rim(
-    model: RobotModel, flow: Flow, stop_after: float
+    arm: MountedArm, flow: Flow, stop_after: float
 ) -> None:
-    poses, accelerations = swung(model, stop_after)
+    poses, accelerations = swung(arm, stop_after)
     travelled = np.linalg.norm(poses[-1][:3, 3] - poses[0][:3, 3])
     assert travelled > (0.5 if stop_after > 3.0 else 0.1)
     water, least = carried_by(flow, 2e-4, poses, accelerations)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
 from katana450.extensions.reachability import map as map_module
 from katana450.extensions.reachability.colors import share_colors
@@ -15,8 +15,8 @@ from katana450.maths.kinematics.forward import forward
 
 
 @pytest.fixture(scope="module")
-def survey(model: RobotModel) -> Survey:
-    reachability = Reachability(model.arm.chain, model.T_base_shoulder, 0.0, 3, 4)
+def survey(arm: MountedArm) -> Survey:
+    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.0, 3, 4)
     return Survey(reachability, voxel=0.16, samples=60, seed=9)
 
 
@@ -40,13 +40,13 @@ def test_chunks_do_not_change_the_map(survey: Survey, monkeypatch: pytest.Monkey
     assert np.array_equal(whole.share, pieces.share)
 
 
-def test_the_cloud_is_the_tool_at_random_joint_angles(survey: Survey, model: RobotModel) -> None:
+def test_the_cloud_is_the_tool_at_random_joint_angles(survey: Survey, arm: MountedArm) -> None:
     nothing = [np.zeros(len(survey.grid), dtype=np.int64)]
     found = survey.map(nothing)
     assert found.points.shape == (0, 3)
-    chain = model.arm.chain
+    chain = arm.chain
     q = np.random.default_rng(9).uniform(chain.lower, chain.upper, (60, 5))
-    points = np.array([(model.T_base_shoulder @ forward(chain, each))[:3, 3] for each in q])
+    points = np.array([(arm.T_base_shoulder @ forward(chain, each))[:3, 3] for each in q])
     assert 10 < len(found.cloud) < 60
     for point in found.cloud:
         assert np.abs(points - point).max(axis=1).min() < 1e-15

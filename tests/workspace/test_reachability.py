@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.reachability.reachability import MOST_STEPS, Reachability
 from katana450.maths.geometry import screws, se3, so3
@@ -24,10 +25,10 @@ ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
 
 def reachability(
-    model: RobotModel, *, tool: str = "tcp", table: float = 0.0, pitches: int = 8, rolls: int = 6
+    arm: MountedArm, *, tool: str = "tcp", table: float = 0.0, pitches: int = 8, rolls: int = 6
 ) -> Reachability:
-    chain = model.arm.chain_to(tool or model.arm.default_tool)
-    return Reachability(chain, model.T_base_shoulder, table, pitches, rolls)
+    chain = arm.chain_to(tool or arm.default_tool)
+    return Reachability(chain, arm.T_base_shoulder, table, pitches, rolls)
 
 
 def postures_inside(chain: Chain, count: int, seed: int) -> FloatArray:
@@ -40,15 +41,15 @@ def rotation_x(angle: float) -> FloatArray:
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0), (0.0, 0.02), (0.03, -0.01)])
 def test_what_forward_kinematics_reaches_is_counted(
-    model: RobotModel, offset: tuple[float, float]
+    arm: MountedArm, offset: tuple[float, float]
 ) -> None:
     """Postures inside the limits with the tool level and unrolled: that one orientation counts.
 
     offset: of the tool point from the roll axis, sideways and up [m].
     """
-    M = np.array(model.arm.chain.M)
+    M = np.array(arm.chain.M)
     M[1:3, 3] += offset
-    level = Reachability(model.arm.chain.with_tool(M), model.T_base_shoulder, -1.0, 1, 1)
+    level = Reachability(arm.chain.with_tool(M), arm.T_base_shoulder, -1.0, 1, 1)
     chain = level.chain
     q = postures_inside(chain, 600, 4)
     q[:, 3] = -q[:, 1] - q[:, 2]
@@ -61,12 +62,12 @@ def test_what_forward_kinematics_reaches_is_counted(
     assert (level.count(level.in_base(T[outward, :3, 3])) == 1).all()
 
 
-def of_the_katana(model: RobotModel, tool: str) -> Reachability:
-    return reachability(model, tool=tool, table=-1.0)
+def of_the_katana(arm: MountedArm, tool: str) -> Reachability:
+    return reachability(arm, tool=tool, table=-1.0)
 
 
 def of_another_arm(name: str) -> Reachability:
-    return reachability(load(ARMS / name), tool="", table=-1.0)
+    return reachability(load(ARMS / name).require_arm(), tool="", table=-1.0)
 
 
 def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
@@ -86,10 +87,10 @@ def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
 
 
 @pytest.mark.parametrize(
-    "arm",
+    "made",
     [
-        lambda model: of_the_katana(model, "tcp"),
-        lambda model: of_the_katana(model, "flange"),
+        lambda arm: of_the_katana(arm, "tcp"),
+        lambda arm: of_the_katana(arm, "flange"),
         lambda _: of_another_arm("pincherx_150.urdf"),
         lambda _: of_another_arm("youbot_arm.urdf"),
         lambda _: of_a_member(1),
@@ -108,10 +109,10 @@ def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
     ],
 )
 def test_the_count_is_that_of_poses_the_projection_leaves_alone(
-    model: RobotModel, arm: Callable[[RobotModel], Reachability]
+    made: Callable[[MountedArm], Reachability], arm: MountedArm
 ) -> None:
     """Both ways: nothing is counted that the arm cannot do, and nothing it can is left out."""
-    every = arm(model)
+    every = made(arm)
     chain, canonical = every.chain, arm_of(every.chain)
     q = postures_inside(chain, 5, 7)
     inside = np.array([forward(chain, each)[:3, 3] for each in q])
@@ -129,28 +130,28 @@ def test_the_count_is_that_of_poses_the_projection_leaves_alone(
     assert every.count(every.in_base(inside)).max() > 0
 
 
-def test_a_point_on_axis_1_can_be_asked_for(model: RobotModel) -> None:
-    every = reachability(model)
+def test_a_point_on_axis_1_can_be_asked_for(arm: MountedArm) -> None:
+    every = reachability(arm)
     above = np.array([[0.0, 0.0, 0.8], [1e-12, 0.0, 0.8]])
     counts = every.count(above)
     assert counts[0] > 0
     assert counts[0] == counts[1]
 
 
-def test_what_lies_below_the_table_or_too_far_is_not_counted(model: RobotModel) -> None:
+def test_what_lies_below_the_table_or_too_far_is_not_counted(arm: MountedArm) -> None:
     point = np.array([[0.3, 0.1, 0.3]])
-    assert reachability(model, table=0.29).count(point)[0] > 0
-    assert reachability(model, table=0.31).count(point)[0] == 0
-    assert reachability(model).count(np.array([[2.0, 0.0, 0.3], [0.0, 0.0, -1.0]])).tolist() == [
+    assert reachability(arm, table=0.29).count(point)[0] > 0
+    assert reachability(arm, table=0.31).count(point)[0] == 0
+    assert reachability(arm).count(np.array([[2.0, 0.0, 0.3], [0.0, 0.0, -1.0]])).tolist() == [
         0,
         0,
     ]
-    assert reachability(model).count(np.empty((0, 3))).shape == (0,)
+    assert reachability(arm).count(np.empty((0, 3))).shape == (0,)
 
 
-def test_elbow_and_wrist_keep_off_the_table(model: RobotModel) -> None:
+def test_elbow_and_wrist_keep_off_the_table(arm: MountedArm) -> None:
     """Against each link moved from home: clear is what has both points on the table or above."""
-    chain = model.arm.chain
+    chain = arm.chain
     q = postures_inside(chain, 300, 11)
     points = [screws.point_on(S) for S in chain.S.T]
     frames = np.array([joint_frames(chain, each) for each in q])
@@ -160,36 +161,36 @@ def test_elbow_and_wrist_keep_off_the_table(model: RobotModel) -> None:
             (frames[:, 2] @ [*points[3], 1.0])[:, 2],
         ]
     )
-    shoulder = model.T_base_shoulder[2, 3]
+    shoulder = arm.T_base_shoulder[2, 3]
     for table in (0.1, 0.3, 0.4):
-        found = reachability(model, table=table).clear(q)
+        found = reachability(arm, table=table).clear(q)
         assert np.array_equal(found, (heights + shoulder >= table).all(axis=0))
         assert 0 < found.sum() < len(q) or table == 0.1
 
 
-def test_a_higher_table_never_helps(model: RobotModel) -> None:
+def test_a_higher_table_never_helps(arm: MountedArm) -> None:
     points = np.random.default_rng(3).uniform([-0.4, -0.4, 0.45], [0.4, 0.4, 0.7], (30, 3))
-    low = reachability(model, table=0.0).count(points)
-    high = reachability(model, table=0.4).count(points)
+    low = reachability(arm, table=0.0).count(points)
+    high = reachability(arm, table=0.4).count(points)
     assert (high <= low).all()
     assert (high < low).any()
 
 
-def test_rolls_are_those_that_axis_5_can_turn(model: RobotModel) -> None:
+def test_rolls_are_those_that_axis_5_can_turn(arm: MountedArm) -> None:
     """From -164.5 to 171.5 degrees, with only the front shoulder inside the limits."""
-    whole_degrees = reachability(model, pitches=1, rolls=360)
+    whole_degrees = reachability(arm, pitches=1, rolls=360)
     p = forward(whole_degrees.chain, np.array([0.0, -0.8, 1.2, -0.4, 0.0]))[None, :3, 3]
     assert whole_degrees.count(whole_degrees.in_base(p)).tolist() == [336]
 
 
-def test_every_limit_counts(model: RobotModel) -> None:
+def test_every_limit_counts(arm: MountedArm) -> None:
     """Each joint's limits alone take orientations away, and wider ones give them back."""
-    chain = model.arm.chain
+    chain = arm.chain
     points = np.random.default_rng(5).uniform([-0.4, -0.4, 0.1], [0.4, 0.4, 0.6], (25, 3))
 
     def total(lower: FloatArray, upper: FloatArray) -> int:
         limited = dataclasses.replace(chain, lower=lower, upper=upper)
-        every = Reachability(limited, model.T_base_shoulder, 0.0, 6, 6)
+        every = Reachability(limited, arm.T_base_shoulder, 0.0, 6, 6)
         return int(every.count(points).sum())
 
     whole = total(chain.lower, chain.upper)
@@ -201,15 +202,15 @@ def test_every_limit_counts(model: RobotModel) -> None:
 
 
 @pytest.mark.parametrize("steps", [0, -1, MOST_STEPS + 1])
-def test_steps_that_are_none_are_refused(model: RobotModel, steps: int) -> None:
+def test_steps_that_are_none_are_refused(arm: MountedArm, steps: int) -> None:
     with pytest.raises(InputError, match="number of pitches"):
-        reachability(model, pitches=steps)
+        reachability(arm, pitches=steps)
     with pytest.raises(InputError, match="number of rolls"):
-        reachability(model, rolls=steps)
+        reachability(arm, rolls=steps)
 
 
-def test_an_arm_that_does_not_stand_upright_is_refused(model: RobotModel) -> None:
-    leaning = np.array(model.T_base_shoulder)
+def test_an_arm_that_does_not_stand_upright_is_refused(arm: MountedArm) -> None:
+    leaning = np.array(arm.T_base_shoulder)
     leaning[:3, :3] = rotation_x(0.1)
     with pytest.raises(RobotDescriptionError, match="axis 1 must be upright"):
-        Reachability(model.arm.chain, leaning, 0.0, 4, 4)
+        Reachability(arm.chain, leaning, 0.0, 4, 4)

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from multiprocessing.connection import Connection
 
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.control.joint_session import JointSession
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
-from katana450.assembly.robot_session import Described, Jointed, recognised
+from katana450.assembly.robot_session import recognised
 from katana450.errors import ConfigurationError
 from katana450.extensions.export.reachability_file import load_map
 from katana450.extensions.importers.meshes import Meshes
 from katana450.extensions.programs.script_files import Scripts
 from katana450.server.service.arm_handle import Motion
-from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
+from katana450.server.service.vrml_nodes import Nodes
 from katana450.server.view.follower import Follower
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.view import View, ViewOptions
 from katana450.server.web.web_server import Gateway
-from katana450.settings import Settings
 
 
 def attached(
@@ -31,36 +30,21 @@ def attached(
     """
     settings, workspace = outfit.settings, outfit.workspace
     found = recognised(settings, outfit.urdf, outfit.tool)
-    link = FrontEnd(pipe, found.session.check)
-    if isinstance(found, Jointed):
+    robot, session, _ = found
+    link = FrontEnd(pipe, session.check)
+    nodes = Nodes(robot, session.surroundings)
+    if isinstance(session, JointSession):
         if workspace is not None:
-            raise ConfigurationError(
-                f"{workspace} maps where a tool can be. {found.machine.joints.why}"
-            )
-        return link, _machine(gateway, settings, found, link)
+            raise ConfigurationError(f"{workspace} maps where a tool can be. {robot.why}")
+        rate = settings.frame_rate
+        machine_view = MachineView(gateway.viser, robot, link.board, link, rate)
+        gateway.attach(Motion(robot, session, link, None, nodes, machine_view.let_go))
+        return link, machine_view
     stored = None if workspace is None else load_map(workspace)
     besides = ViewOptions(stored, (gateway.steering, Scripts(settings.programs)), meshes)
-    return link, _arm(gateway, outfit, found, link, besides)
-
-
-def _arm(
-    gateway: Gateway, outfit: FrontendConfig, found: Described, link: FrontEnd, besides: ViewOptions
-) -> View:
-    model, session, _ = found
     navigator = PlanningWorker(session, link.board, link)
-    frame_rate = outfit.settings.frame_rate
-    view = View(gateway.viser, model, link.board, navigator, session, frame_rate, besides)
+    view = View(gateway.viser, robot, link.board, navigator, session, settings.frame_rate, besides)
     navigator.tell = gateway.announce
     navigator.redirected = gateway.steering.redirected
-    mechanism, _ = load_mechanism(outfit.urdf)
-    nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
-    gateway.attach(Motion(model, session, link, navigator, nodes, view.let_go))
-    return view
-
-
-def _machine(gateway: Gateway, settings: Settings, found: Jointed, link: FrontEnd) -> MachineView:
-    machine, session, _ = found
-    view = MachineView(gateway.viser, machine, link.board, link, settings.frame_rate)
-    nodes = Nodes(machine.mechanism, machine_of(machine), session.surroundings)
-    gateway.attach(Motion(machine, session, link, None, nodes, view.let_go))
-    return view
+    gateway.attach(Motion(robot, session, link, navigator, nodes, view.let_go))
+    return link, view

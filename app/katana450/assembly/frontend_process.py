@@ -35,7 +35,7 @@ OPEN, READY = "open", "ready"
 class FrontendConfig:
     """What a front is given each time it is started.
 
-    ``urdf``, ``tool``: see ``robot.model.load``. ``listening``: the port for browsers. ``lines``:
+    ``urdf``, ``tool``: see ``robot.loader.load``. ``listening``: the port for browsers. ``lines``:
     the one for JSON lines. ``workspace``: file of a reachability map. ``meshes``: those of the
     things there are at first.
     """

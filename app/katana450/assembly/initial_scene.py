@@ -12,6 +12,7 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import CUP
+from katana450.arm.control.session import Session
 from katana450.arm.control.things import Form, Thing
 from katana450.assembly.robot_session import Described
 from katana450.errors import InputError
@@ -27,7 +28,7 @@ PLACED = re.compile(r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?")
 
 
 def furnished(
-    robot: Described, scene: Path | None, objects: Sequence[str]
+    robot: Described[Session], scene: Path | None, objects: Sequence[str]
 ) -> tuple[StoredScene, tuple[str, ...]]:
     """The scene of the file ``scene`` and the ``objects`` besides, FILE[@x,y,z] each, in mm.
 

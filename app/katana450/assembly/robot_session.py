@@ -6,9 +6,10 @@ import gc
 import logging
 import os
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.joint_session import JointSession
@@ -17,9 +18,9 @@ from katana450.arm.control.things import Hand, Thing
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, table, things_of, world_of
-from katana450.arm.robot.machine import Machine, load_machine
-from katana450.arm.robot.model import RobotModel, load
+from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.water import around_of
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd
@@ -36,72 +37,85 @@ PROMPT = -10
 """Niceness of the process that moves the arm, where the system allows it."""
 
 
-class Described(NamedTuple):
-    """A robot as its files tell it, the rules for it, and sentences on what they leave open."""
+S = TypeVar("S", Session, JointSession)
 
-    model: RobotModel
-    session: Session
+
+class Described(NamedTuple, Generic[S]):
+    """A robot as its files describe it, the rules for it, and sentences on what they leave open."""
+
+    robot: Robot
+    session: S
     notes: tuple[str, ...]
 
 
-def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
-    """``urdf``, ``tool``: the arm, and the link its targets are set for; see ``load``."""
-    model = load(urdf, tool)
+def described(settings: Settings, urdf: Path, tool: str | None) -> Described[Session]:
+    """Return the robot with an arm in the file ``urdf``.
+
+    ``tool``: the link its targets are set for; see ``load``. Raises RobotDescriptionError for a
+    robot without an arm.
+    """
+    return arm_session(settings, load(urdf, tool))
+
+
+def recognised(
+    settings: Settings, urdf: Path, tool: str | None
+) -> Described[Session] | Described[JointSession]:
+    """Return the robot in the file ``urdf``: with all its arm can do, or driven joint by joint.
+
+    Raises RobotDescriptionError for a robot that is neither, and for one without an arm where a
+    ``tool`` or an arm without gripper was asked for.
+    """
+    robot = load(urdf, tool)
+    try:
+        return arm_session(settings, robot)
+    except RobotDescriptionError as error:
+        if tool is not None or settings.bare:
+            raise
+        robot = replace(robot, arm=None, why=str(error))
+    session = JointSession(robot.joint_group, robot.distance)
+    return Described(
+        robot, session, (*robot.notes, *robot.joint_notes, f"Joints only. {robot.why}")
+    )
+
+
+def arm_session(settings: Settings, robot: Robot) -> Described[Session]:
+    """Return ``robot`` with the rules for its arm. Raises RobotDescriptionError without an arm."""
     if settings.bare:
-        model = bare(model)
-    world, left_out = world_of(model)
-    notes = [*model.notes, *left_out]
+        robot = bare(robot)
+    arm = robot.require_arm()
+    world, left_out = world_of(robot)
+    notes = [*arm.notes, *robot.notes, *left_out]
     props = load_props()
     hand: Hand | None = None
     things: tuple[Thing, ...] = ()
     if world is None:
         notes.append(UNCHECKED)
     else:
-        hand, things = hand_of(model, world), things_of(props)
+        hand, things = hand_of(robot, world), things_of(props)
         world = world.with_obstacles((table(),))
     session = Session(
-        model.arm,
-        model.ready(settings.ready),
+        arm,
+        arm.ready(settings.ready),
         world,
         hand=hand,
         things=things,
         around=around_of(props) if things else None,
     )
-    return Described(model, session, tuple(notes))
-
-
-class Jointed(NamedTuple):
-    """Likewise of a mechanism that is driven joint by joint."""
-
-    machine: Machine
-    session: JointSession
-    notes: tuple[str, ...]
-
-
-def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described | Jointed:
-    """An arm of the family with all it can do; of any other mechanism, its joints.
-
-    Raises RobotDescriptionError for what is neither, or where a tool was asked for.
-    """
-    try:
-        return described(settings, urdf, tool)
-    except RobotDescriptionError as error:
-        if tool is not None or settings.bare or not urdf.is_file():
-            raise
-        machine = load_machine(urdf, str(error))
-        notes = (*machine.notes, f"Joints only. {error}")
-        return Jointed(machine, JointSession(machine.joints, machine.way), notes)
+    return Described(robot, session, tuple(notes))
 
 
 class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
     def __init__(
-        self, settings: Settings, robot: Described | Jointed, scene: Scene | None = None
+        self,
+        settings: Settings,
+        found: Described[Session] | Described[JointSession],
+        scene: Scene | None = None,
     ) -> None:
         """``scene``: what stands around in place of the robot's own, and where the arm stands."""
-        arm = robot.model.arm if isinstance(robot, Described) else robot.machine.joints
-        session, self.notes = robot.session, robot.notes
+        robot, session, self.notes = found
+        arm = robot.joint_group if robot.arm is None else robot.arm
         start = session.ready if scene is None or scene.joints is None else scene.joints
         driver = SimulatedDriver(arm, start, gripper=0.0)
         self._mailbox = Mailbox(session.check)

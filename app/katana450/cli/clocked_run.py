@@ -13,9 +13,7 @@ import numpy as np
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.robot.mechanism import Mechanism
-from katana450.arm.robot.model import RobotModel
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import described
 from katana450.cli.progress import progress
 from katana450.errors import InputError, KatanaError
@@ -40,14 +38,14 @@ class Planned(NamedTuple):
 
     script: Script
     program: Program
-    model: RobotModel
+    robot: Robot
     session: Session
 
 
 class Performance(NamedTuple):
     """An arm, and its states so many times a second; one where it only stands."""
 
-    model: RobotModel
+    robot: Robot
     session: Session
     states: Sequence[State]
     rate: float
@@ -66,16 +64,16 @@ class Performance(NamedTuple):
 def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
     """``seed``: of the ways round what is in between. ``speed``: share of the script's own."""
     settings = replace(Settings(), bare=script.bare)
-    model, session, _ = described(settings, urdf, None)
-    rig = PlanContext(session, model.T_base_shoulder, seed)
+    robot, session, _ = described(settings, urdf, None)
+    rig = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
     program = compiled(script, rig, _at_rest(session), speed)
-    return Planned(script, program, model, session)
+    return Planned(script, program, robot, session)
 
 
 def played(plan: Planned) -> Simulation:
     """Run to its end, with a bar. Raises KatanaError where it does not get there."""
     session = plan.session
-    driver = SimulatedDriver(plan.model.arm, session.ready, gripper=0.0)
+    driver = SimulatedDriver(plan.robot.require_arm(), session.ready, gripper=0.0)
     rehearsal = Simulation(plan.program, session, driver, Settings().rate)
     done, total = 0, 1000
     ticks = progress(range(total), total, plan.script.name)
@@ -110,37 +108,35 @@ def of_script(name: str, urdf: Path) -> Performance:
         found = error.problems[0]
         raise InputError(f"{name}:{found.line}:{found.column}: {found.said}") from error
     states = played(plan).states
-    return Performance(plan.model, plan.session, states, Settings().rate, plan.script.bare)
+    return Performance(plan.robot, plan.session, states, Settings().rate, plan.script.bare)
 
 
 def of_pose(pose: Sequence[float], urdf: Path) -> Performance:
     """Standing at ``pose``: values of the driven joints [rad]; at home where there are none."""
-    model, session, _ = _described(urdf)
+    robot, session, _ = _described(urdf)
     if not pose:
-        return Performance(model, session, [_at_rest(session)], 1.0)
-    mechanism = load_mechanism(urdf)[0]
-    return Performance(model, session, [_standing(model, session, mechanism.values(pose))], 1.0)
+        return Performance(robot, session, [_at_rest(session)], 1.0)
+    return Performance(robot, session, [_standing(robot, session, robot.values(pose))], 1.0)
 
 
 def of_trajectory(path: Path, urdf: Path) -> Performance:
     """As a table of joint values has it. Raises InputError for a file that is none."""
-    model, session, _ = _described(urdf)
-    mechanism: Mechanism = load_mechanism(urdf)[0]
-    motion, rate = load_motion(path, mechanism), Settings().rate
+    robot, session, _ = _described(urdf)
+    motion, rate = load_motion(path, robot), Settings().rate
     t = np.arange(int(motion.t[-1] * rate) + 1) / rate
     rows = {name: np.interp(t, motion.t, values) for name, values in motion.values.items()}
     states = [
-        _standing(model, session, {name: float(row[k]) for name, row in rows.items()}, time)
+        _standing(robot, session, {name: float(row[k]) for name, row in rows.items()}, time)
         for k, time in enumerate(t.tolist())
     ]
-    return Performance(model, session, states, rate)
+    return Performance(robot, session, states, rate)
 
 
-def _described(urdf: Path) -> tuple[RobotModel, Session, tuple[str, ...]]:
-    model, session, notes = described(Settings(), urdf, None)
+def _described(urdf: Path) -> tuple[Robot, Session, tuple[str, ...]]:
+    robot, session, notes = described(Settings(), urdf, None)
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)
-    return model, session, notes
+    return robot, session, notes
 
 
 def _at_rest(session: Session) -> State:
@@ -148,9 +144,8 @@ def _at_rest(session: Session) -> State:
     return session.begin(session.ready, session.arm.gripper.clamp(0.0), 0.0)
 
 
-def _standing(
-    model: RobotModel, session: Session, values: dict[str, float], t: float = 0.0
-) -> State:
-    q = np.array([values[name] for name in model.arm.chain.names])
-    driven = [name for name, follows in model.fingers.items() if follows == (1.0, 0.0)]
+def _standing(robot: Robot, session: Session, values: dict[str, float], t: float = 0.0) -> State:
+    arm = robot.require_arm()
+    q = np.array([values[name] for name in arm.chain.names])
+    driven = [name for name, follows in arm.fingers.items() if follows == (1.0, 0.0)]
     return session.begin(q, values[driven[0]] if driven else 0.0, t)

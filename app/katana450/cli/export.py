@@ -1,4 +1,4 @@
-"""``katana450 export``: the arm, or any other mechanism, as files for other programs."""
+"""``katana450 export``: the arm, or any other robot, as files for other programs."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from katana450.arm.robot.mechanism import Mechanism
-from katana450.arm.robot.urdf_mechanism import load_mechanism
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.c_source import c_files
@@ -42,12 +42,14 @@ def export(options: argparse.Namespace) -> int:
         raise InputError(f"A file of {kind} holds no run; html does.")
     if options.pose and kind not in POSED:
         raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED)} do.")
-    mechanism, notes = load_mechanism(options.urdf)
-    for note in notes:
+    robot = load(options.urdf)
+    robot.check_complete()
+    robot.read_shapes()
+    for note in robot.notes:
         print(f"katana450: {note}", file=sys.stderr)
-    values = mechanism.values(options.pose)
-    motion = None if options.trajectory is None else load_motion(options.trajectory, mechanism)
-    made = _package(options) if kind == "urdf" else _made(kind, mechanism, values, motion)
+    values = robot.values(options.pose)
+    motion = None if options.trajectory is None else load_motion(options.trajectory, robot)
+    made = _package(options) if kind == "urdf" else _made(kind, robot, values, motion)
     folder: Path = options.out
     try:
         for path in {(folder / name).parent for name in made}:
@@ -62,16 +64,16 @@ def export(options: argparse.Namespace) -> int:
 
 def _made(
     kind: str,
-    mechanism: Mechanism,
+    robot: Robot,
     values: Mapping[str, float],
     motion: Motion | None,
 ) -> Mapping[str, bytes]:
     match kind:
         case "vrml":
-            return vrml_files(mechanism, values, motion)
+            return vrml_files(robot, values, motion)
         case "c":
-            return c_files(mechanism, values)
-    return glb_files(mechanism, values, motion)
+            return c_files(robot, values)
+    return glb_files(robot, values, motion)
 
 
 def _package(options: argparse.Namespace) -> Mapping[str, bytes]:

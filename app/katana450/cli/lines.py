@@ -13,7 +13,7 @@ import numpy as np
 
 from katana450.arm.control.choices import met
 from katana450.arm.robot.collision import standing_around, world_of
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
@@ -42,13 +42,13 @@ class Kinematics:
         ``badges``: solutions carry what they cost to take from the request's ``q``.
         """
         self._badges = badges
-        model = load(urdf, tool)
-        self._arm = model.arm
+        robot = load(urdf, tool)
+        self._arm = robot.require_arm()
         self._world = None
         if badges:
-            world, _ = world_of(model)
+            world, _ = world_of(robot)
             self._world = world and world.with_obstacles(standing_around(load_props()))
-        self._T_frame_shoulder = model.T_base_shoulder if in_base_frame else np.eye(4)
+        self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """``{"q": [n rad], "tool"}`` to ``{"T": 4x4}`` [m]."""

@@ -22,11 +22,11 @@ def write_page(options: argparse.Namespace) -> int:
         raise InputError(f"{path} must end in .html.")
     check_writable(path)
     shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
-    title = f"{shown.model.name}: {_shown(options.run, options.trajectory)}"
+    title = f"{shown.robot.name}: {_shown(options.run, options.trajectory)}"
     count = int(shown.duration * FPS) + 1
     states = [shown.at(number / FPS) for number in range(count)]
     page = recorded(
-        shown.model, shown.session, progress(states, count, path.name), 1.0 / FPS, title
+        shown.robot, shown.session, progress(states, count, path.name), 1.0 / FPS, title
     ).encode()
     write_files({path: writer_of(page)})
     print(f"{path}: {len(page)} bytes")

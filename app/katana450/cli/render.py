@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import described
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.cli.clocked_run import Performance, chosen
@@ -59,8 +59,8 @@ def render(options: argparse.Namespace) -> int:
     shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
-        stage = Stage(shown.model, shown.session, load_props())
-        content = png(shot.taken(stage, shown.model, state, STILL))
+        stage = Stage(shown.robot, shown.session, load_props())
+        content = png(shot.taken(stage, shown.robot, state, STILL))
         write_files({path: writer_of(content)})
     else:
         _film(path, shown, shot, options.fps, options.urdf)
@@ -75,8 +75,8 @@ class _Shot(NamedTuple):
     size: tuple[int, int]
     theme: str
 
-    def taken(self, stage: Stage, model: RobotModel, state: State, rays: int) -> Pixels:
-        look = look_from(self.preset, model, state)
+    def taken(self, stage: Stage, robot: Robot, state: State, rays: int) -> Pixels:
+        look = look_from(self.preset, robot.require_arm(), state)
         camera = Camera(look.position, look.target, float(FOV), self.size)
         theme: Theme = THEMES[self.theme]
         return picture(stage.items(state), stage.water(state), camera, theme, rays).pixels
@@ -106,7 +106,7 @@ def _bare(state: State) -> State:
 
 class _Studio(NamedTuple):
     shot: _Shot
-    model: RobotModel
+    robot: Robot
     stage: Stage
 
 
@@ -118,10 +118,10 @@ def _begin(shot: _Shot, urdf: Path, bare: bool) -> None:
     # Ctrl-C is for the process that writes the file.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     session: Session
-    model, session, _ = described(replace(Settings(), bare=bare), urdf, None)
-    _studios.append(_Studio(shot, model, Stage(model, session, load_props())))
+    robot, session, _ = described(replace(Settings(), bare=bare), urdf, None)
+    _studios.append(_Studio(shot, robot, Stage(robot, session, load_props())))
 
 
 def _take(state: State) -> Pixels:
     (studio,) = _studios
-    return studio.shot.taken(studio.stage, studio.model, state, MOVING)
+    return studio.shot.taken(studio.stage, studio.robot, state, MOVING)

@@ -19,6 +19,7 @@ from katana450.server.web.listen import HERE, listen
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
+    from katana450.arm.control.session import Session
     from katana450.assembly.robot_session import Described
     from katana450.extensions.importers.scene_file import StoredScene
 
@@ -47,7 +48,7 @@ def serve(
 ) -> int:
     """Run the app until SIGINT or SIGTERM; returns the exit status, 1 if the control loop ended.
 
-    ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
+    ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.loader.load``.
     ``workspace``: file of a reachability map that can be shown. ``scene``, ``objects``: see
     ``furnished``.
     """
@@ -120,7 +121,7 @@ def _furnished(
     urdf_and_tool: tuple[Path, str | None],
     scene: Path | None,
     objects: Sequence[str],
-) -> tuple[Described | None, StoredScene | None]:
+) -> tuple[Described[Session] | None, StoredScene | None]:
     """The robot and what stands around it, where somebody says what."""
     if scene is None and not objects:
         return None, None

@@ -23,7 +23,7 @@ BARE = "The arm is without its gripper: its fingers would reach into the table."
 def rehearse(script: Script, options: Namespace) -> int:
     """Plan it, and unless that is all run it on a clock of its own and report."""
     plan = planned(script, options.urdf, options.seed, options.speed)
-    program, model = plan.program, plan.model
+    program, robot = plan.program, plan.robot
     notes = (BARE,) if script.bare else ()
     for note in notes:
         print(note)
@@ -33,18 +33,18 @@ def rehearse(script: Script, options: Namespace) -> int:
     rehearsal = played(plan)
     facts = {
         "version": version(),
-        "arm": model.name,
+        "arm": robot.name,
         "gripper": "none" if script.bare else "fitted",
         "speed": program.speed,
         "ticks_per_s": Settings().rate,
         "seed": options.seed,
     }
-    report = Report.of(script, program, model.arm, rehearsal.trace, facts, notes)
+    report = Report.of(script, program, robot.require_arm(), rehearsal.trace, facts, notes)
     print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:
         pictures = stage_pictures(
-            program, model, plan.session, load_props(), rehearsal.states, report.trace
+            program, robot, plan.session, load_props(), rehearsal.states, report.trace
         )
         report.write(options.report, datetime.now().astimezone(), pictures)
         print(f"Report: {options.report / 'report.html'}")

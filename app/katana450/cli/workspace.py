@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.model import load
+from katana450.arm.robot.loader import load
 from katana450.atomic import Writer, check_writable, write_files
 from katana450.cli.cluster import connected
 from katana450.cli.progress import progress
@@ -24,13 +24,14 @@ from katana450.extensions.reachability.reachability import Reachability
 def workspace(options: argparse.Namespace) -> int:
     """Map the workspace, write the files asked for, print what was found."""
     _check_files(options.out, options.ply)
-    model = load(options.urdf, options.tool)
-    for note in model.notes:
+    robot = load(options.urdf, options.tool)
+    arm = robot.require_arm()
+    for note in (*arm.notes, *robot.notes):
         print(f"katana450: {note}", file=sys.stderr)
-    tool = model.arm.default_tool
+    tool = arm.default_tool
     reachability = Reachability(
-        chain=model.arm.chain_to(tool),
-        T_base_shoulder=model.T_base_shoulder,
+        chain=arm.chain_to(tool),
+        T_base_shoulder=arm.T_base_shoulder,
         table=1e-3 * options.table,
         pitches=options.pitches,
         rolls=options.rolls,
@@ -39,7 +40,7 @@ def workspace(options: argparse.Namespace) -> int:
     found = survey.map(_counts(survey, options.scheduler))
     files: dict[Path, Writer] = {}
     if options.out:
-        files[options.out] = lambda file: write_npz(file, survey, found, model.name, tool)
+        files[options.out] = lambda file: write_npz(file, survey, found, robot.name, tool)
     if options.ply:
         files[options.ply] = lambda file: write_ply(file, found)
     write_files(files)

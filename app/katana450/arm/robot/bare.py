@@ -5,27 +5,28 @@ from __future__ import annotations
 from dataclasses import replace
 
 from katana450.arm.control.arm import NO_GRIPPER
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
 
 FLANGE = "flange"
 """The tool frame that is left."""
 
 
-def bare(model: RobotModel) -> RobotModel:
-    """`model` without the links that carry its fingers, and with the flange as its only tool.
+def bare(robot: Robot) -> Robot:
+    """Return ``robot`` without the links that carry its fingers, the flange its only tool.
 
-    Raises RobotDescriptionError where the description names no flange.
+    Raises RobotDescriptionError where it has no arm, or no link of that name.
     """
-    if FLANGE not in model.arm.tools:
+    arm = robot.require_arm()
+    if FLANGE not in arm.tools:
         raise RobotDescriptionError(
-            f"{model.name} has no link {FLANGE!r}, so nobody can say where its gripper begins."
+            f"{robot.name} has no link {FLANGE!r}, so nobody can say where its gripper begins."
         )
-    chain = model.arm.chain_to(FLANGE)
-    parents = {body.name: body.parent for body in model.bodies}
-    fingers = {body.name for body in model.bodies if body.joint in model.fingers}
+    chain = arm.chain_to(FLANGE)
+    parents = {link.name: link.parent for link in robot.links}
+    fingers = {link.name for link in robot.links if link.joint and link.joint.name in arm.fingers}
     # What carries the fingers, down to the last axis of the arm.
-    carried = {body.name for body in model.bodies if body.joint in chain.names}
+    carried = {link.name for link in robot.links if link.joint and link.joint.name in chain.names}
     gone = set(fingers)
     for name in fingers:
         above = parents[name]
@@ -33,11 +34,17 @@ def bare(model: RobotModel) -> RobotModel:
             gone.add(above)
             above = parents[above]
     left = []
-    for body in model.bodies:
-        if body.name in gone or body.parent in gone:
-            gone.add(body.name)
+    for link in robot.links:
+        if link.name in gone or link.parent in gone:
+            gone.add(link.name)
         else:
-            left.append(body)
-    tools = {FLANGE: model.arm.tools[FLANGE]}
-    arm = replace(model.arm, chain=chain, tools=tools, default_tool=FLANGE, gripper=NO_GRIPPER)
-    return replace(model, arm=arm, bodies=tuple(left), fingers={})
+            left.append(link)
+    plain = replace(
+        arm,
+        chain=chain,
+        tools={FLANGE: arm.tools[FLANGE]},
+        default_tool=FLANGE,
+        gripper=NO_GRIPPER,
+        fingers={},
+    )
+    return replace(robot, links=tuple(left), arm=plain)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.arm.control.things import Form, Hand, Thing
-from katana450.arm.robot.model import Body, RobotModel
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.maths.collision.linkage import GROUND, Linkage, Mover
 from katana450.maths.collision.pairs import pairs_that_meet
@@ -16,36 +18,39 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
-def world_of(model: RobotModel) -> tuple[World | None, tuple[str, ...]]:
-    """The arm's own collision bodies, and sentences for a person on what is left out of them.
+def world_of(robot: Robot) -> tuple[World | None, tuple[str, ...]]:
+    """Return the arm's own collision bodies, and sentences for a person on what they leave out.
 
     Every shape counts as its convex hull. x is the arm's joint angles (n,) and the driven finger
-    joint [rad, or m where it slides]. The world is None when no link has a shape.
+    joint [rad, or m where it slides]. The world is None when no link has a shape. Raises
+    RobotDescriptionError where there is no arm.
     """
+    arm = robot.require_arm()
     movers: list[Mover] = []
     # Of each body the piece it moves with, and where it is in the frame of that.
     places: dict[str | None, tuple[int, FloatArray]] = {None: (GROUND, np.eye(4))}
     parts: list[Part] = []
     notes: list[str] = []
-    for body in model.bodies:
-        piece, T = places[body.parent]
-        T = T @ body.T_parent_body
-        drive = _drive(model, body)
-        if drive is not None:
-            movers.append(Mover(piece, T, body.axis, *drive, slides=body.slides))
+    for link in robot.links:
+        piece, T = places[link.parent]
+        T = T @ link.at_rest(arm.resting)
+        joint = link.joint
+        drive = None if joint is None else _drive(arm, joint)
+        if joint is not None and drive is not None:
+            movers.append(Mover(piece, T, joint.axis, *drive, slides=joint.slides))
             piece, T = len(movers), np.eye(4)
-        places[body.name] = piece, T
-        shapes, refused = _shapes(body)
+        places[link.name] = piece, T
+        shapes, refused = _shapes(link)
         notes += refused
         if shapes:
-            parts.append(Part(body.name, piece, (frozen(T),) * len(shapes), shapes))
+            parts.append(Part(link.name, piece, (frozen(T),) * len(shapes), shapes))
     if not parts:
         return None, tuple(notes)
-    bare = [body.name for body in model.bodies if body.visuals and not body.collisions]
+    bare = [link.name for link in robot.links if link.visuals and not link.collisions]
     if bare:
         notes.append(f"Without collision shapes, and so not checked: {', '.join(bare)}.")
     linkage = Linkage(movers)
-    chain, gripper = model.arm.chain, model.arm.gripper
+    chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
     return World(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(notes)
 
@@ -75,39 +80,39 @@ def standing_around(props: Props) -> tuple[Part, ...]:
     return (table(), *(obstacle(each.name, each.T_shape, each.shape) for each in things))
 
 
-def hand_of(model: RobotModel, world: World) -> Hand:
-    """The fingers and what they hang on; without any, what the last joint turns."""
-    driven = {body.name for body in model.bodies if body.joint in model.fingers}
+def hand_of(robot: Robot, world: World) -> Hand:
+    """Return the fingers and what they hang on; without any, what the last joint turns.
+
+    Raises RobotDescriptionError where there is no arm.
+    """
+    arm = robot.require_arm()
+    driven = {link.name for link in robot.links if link.joint and link.joint.name in arm.fingers}
     fingers = [part for part in world.parts if part.name in driven]
     if fingers:
         palm = int(world.linkage.parent[fingers[0].mover])
     else:
-        palm = int(np.flatnonzero(world.linkage.variable == model.arm.chain.n - 1)[-1])
-    chain = model.arm.chain
-    T_base_palm = world.linkage.poses(np.zeros(chain.n + 1))[palm]
-    T_palm_tool = se3.inverse(T_base_palm) @ model.T_base_shoulder @ chain.M
+        palm = int(np.flatnonzero(world.linkage.variable == arm.chain.n - 1)[-1])
+    T_base_palm = world.linkage.poses(np.zeros(arm.chain.n + 1))[palm]
+    T_palm_tool = se3.inverse(T_base_palm) @ arm.T_base_shoulder @ arm.chain.M
     names = tuple(part.name for part in fingers)
-    return Hand(palm, names, frozen(T_palm_tool), slides=model.arm.gripper.slides)
+    return Hand(palm, names, frozen(T_palm_tool), slides=arm.gripper.slides)
 
 
-def _drive(model: RobotModel, body: Body) -> tuple[int, float, float] | None:
-    """Which entry of x turns the body's joint, with factor and offset; None where none does."""
-    chain = model.arm.chain
-    if body.joint is None:
-        return None
-    if body.joint in chain.names:
-        return chain.names.index(body.joint), 1.0, 0.0
-    if body.joint in model.fingers:
-        return chain.n, *model.fingers[body.joint]
+def _drive(arm: MountedArm, joint: Joint) -> tuple[int, float, float] | None:
+    """The entry of x that moves ``joint``, with factor and offset; None for a joint at rest."""
+    if joint.name in arm.chain.names:
+        return arm.chain.names.index(joint.name), 1.0, 0.0
+    if joint.name in arm.fingers:
+        return arm.chain.n, *arm.fingers[joint.name]
     return None
 
 
-def _shapes(body: Body) -> tuple[tuple[Shape, ...], list[str]]:
+def _shapes(link: Link) -> tuple[tuple[Shape, ...], list[str]]:
     shapes: list[Shape] = []
     refused: list[str] = []
-    for collision in body.collisions:
+    for collision in link.collisions:
         try:
             shapes.append(hull(collision.mesh.vertices))
         except InputError as error:
-            refused.append(f"A collision shape of link {body.name!r} is left out: {error}")
+            refused.append(f"A collision shape of link {link.name!r} is left out: {error}")
     return tuple(shapes), refused

@@ -60,13 +60,20 @@ SHAPES = ("box", "cylinder", "sphere", "mesh")
 JOINTS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
-@contextmanager
-def reading(path: Path) -> Iterator[None]:
-    """Check the file at `path`, and turn every failure of what reads it into a sentence.
+def checked(path: Path) -> Element:
+    """Return the outermost element of the URDF file at ``path``, whose every part is sound.
 
-    Raises RobotDescriptionError that names the file, the line where one is known, and what to do.
+    Raises RobotDescriptionError that names the file, the line and what to do.
     """
-    _Checks(path).run()
+    return _Checks(path).run()
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """Turn every unexpected failure while the file at ``path`` is read into a sentence.
+
+    Raises RobotDescriptionError.
+    """
     try:
         yield
     except RobotDescriptionError:
@@ -85,8 +92,8 @@ class _Checks:
         self._path = path
         self._line: dict[Element, int] = {}
 
-    def run(self) -> None:
-        """Raise RobotDescriptionError for the first fault found."""
+    def run(self) -> Element:
+        """Return the outermost element; RobotDescriptionError for the first fault found."""
         root = self._parsed()
         wrong = f"{self._path} is not a robot description:"
         if root.tag != "robot":
@@ -105,6 +112,7 @@ class _Checks:
                 "this is xacro, a template that has not been expanded. Expand it first, "
                 f"for instance with: xacro {self._path.name} > robot.urdf",
             ) from error
+        return root
 
     def _check_robot(self, root: Element) -> None:
         if not root.get("name"):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from katana450.arm.control.arm import NO_GRIPPER, Gripper
+from katana450.arm.robot.urdf import UrdfJoint
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -43,7 +43,7 @@ class Fingers:
 
 
 def fingers_of(
-    hand: Sequence[Any], others: Sequence[Any], frames: Mapping[str, FloatArray]
+    hand: Sequence[UrdfJoint], others: Sequence[UrdfJoint], frames: Mapping[str, FloatArray]
 ) -> Fingers:
     """The gripper made of the movable joints ``hand``; those and ``others`` that are none rest.
 
@@ -77,7 +77,7 @@ def fingers_of(
     return Fingers(gripper, follow, tuple(j.name for j in able), resting, tuple(notes))
 
 
-def _range(joint: Any) -> tuple[float, ...]:
+def _range(joint: UrdfJoint) -> tuple[float, ...]:
     """Lower and upper limit [rad or m] of a joint that has room between them; else nothing."""
     if joint.type not in ("revolute", SLIDING) or joint.limit is None:
         return ()
@@ -86,19 +86,19 @@ def _range(joint: Any) -> tuple[float, ...]:
     return (lower, upper) if -math.inf < lower < upper < math.inf else ()
 
 
-def _speed(joint: Any) -> float:
+def _speed(joint: UrdfJoint) -> float:
     """[rad/s or m/s]"""
-    speed = joint.limit.velocity
+    speed = None if joint.limit is None else joint.limit.velocity
     if speed is None or not 0.0 < speed < math.inf:
         return SLOW_SLIDE if joint.type == SLIDING else SLOW_TURN
     return float(speed)
 
 
-def _unit(joint: Any) -> str:
+def _unit(joint: UrdfJoint) -> str:
     return "m" if joint.type == SLIDING else "rad"
 
 
-def _at_rest(joint: Any) -> float:
+def _at_rest(joint: UrdfJoint) -> float:
     """Zero, or the limit next to it."""
     if joint.mimic is not None or not _range(joint):
         return 0.0
@@ -106,7 +106,9 @@ def _at_rest(joint: Any) -> float:
     return min(max(0.0, lower), upper)
 
 
-def _beside(lead: Any, joint: Any, frames: Mapping[str, FloatArray]) -> tuple[float, float]:
+def _beside(
+    lead: UrdfJoint, joint: UrdfJoint, frames: Mapping[str, FloatArray]
+) -> tuple[float, float]:
     """Factor and offset of a driven finger that closes when ``lead`` does."""
     low, high = _range(lead)
     lower, upper = _range(joint)
@@ -124,7 +126,7 @@ def _beside(lead: Any, joint: Any, frames: Mapping[str, FloatArray]) -> tuple[fl
 
 
 def _led(
-    joint: Any, joints: Mapping[str, Any], follow: Mapping[str, tuple[float, float]]
+    joint: UrdfJoint, joints: Mapping[str, UrdfJoint], follow: Mapping[str, tuple[float, float]]
 ) -> tuple[float, float] | None:
     """Factor and offset of a joint that mimics another; None where no finger is behind it.
 

@@ -6,12 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from katana450.arm.robot.urdf import Urdf, UrdfJoint
 from katana450.errors import RobotDescriptionError
-
-if TYPE_CHECKING:
-    import yourdfpy
 
 TOOL_FRAMES = ("tcp", "grasp", "flange")
 """Links that targets can be set for where the file has them; the first is the default."""
@@ -39,7 +36,7 @@ TIP = re.compile(r"tcp|tool|tip|grasp|end_?effector|(^|[_/])ee([_/]|$)", re.IGNO
 
 @dataclass(frozen=True)
 class Structure:
-    """The joints that matter for an arm, as yourdfpy has them.
+    """The joints that matter for an arm.
 
     Attributes:
         axes: the five turning joints that carry the tool, from the root.
@@ -49,14 +46,14 @@ class Structure:
         others: every other movable joint.
     """
 
-    axes: tuple[Any, ...]
+    axes: tuple[UrdfJoint, ...]
     tools: tuple[str, ...]
     chosen: bool
-    hand: tuple[Any, ...]
-    others: tuple[Any, ...]
+    hand: tuple[UrdfJoint, ...]
+    others: tuple[UrdfJoint, ...]
 
 
-def structure_of(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> Structure:
+def structure_of(urdf: Urdf, path: Path, tool: str | None) -> Structure:
     """The structure of the arm in a URDF.
 
     Args:
@@ -68,14 +65,14 @@ def structure_of(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> Structure
         RobotDescriptionError: there is no such link, or the arm has not five turning axes.
     """
     tree = _Tree(urdf)
-    if tool is not None and tool not in urdf.link_map:
+    if tool is not None and tool not in urdf.links:
         raise RobotDescriptionError(
-            f"{path.name} has no link {tool!r}; its links are {', '.join(urdf.link_map)}."
+            f"{path.name} has no link {tool!r}; its links are {', '.join(urdf.links)}."
         )
     axes = _main_axes(tree, path) if tool is None else _axes_to(tree, tool)
     carried = {
         link: len(tree.joints_to(link))
-        for link in urdf.link_map
+        for link in urdf.links
         if tree.movable_to(link) == axes and all(_carries(j) for j in tree.joints_to(link))
     }
     named = [link for link in TOOL_FRAMES if link in carried]
@@ -85,7 +82,7 @@ def structure_of(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> Structure
         leaf = {link: link not in tree.below for link in carried}
         tools = named or [max(carried, key=lambda link: (carried[link], leaf[link]))]
     hand = [j for link in tree.order(axes[-1].child) for j in tree.below.get(link, ()) if _moves(j)]
-    others = [j for j in urdf.joint_map.values() if _moves(j) and j not in axes and j not in hand]
+    others = [j for j in urdf.joints.values() if _moves(j) and j not in axes and j not in hand]
     chosen = tool is None and not named
     return Structure(tuple(axes), tuple(tools), chosen, tuple(hand), tuple(others))
 
@@ -93,28 +90,28 @@ def structure_of(urdf: yourdfpy.URDF, path: Path, tool: str | None) -> Structure
 class _Tree:
     """The joints of a URDF by the links they connect."""
 
-    def __init__(self, urdf: yourdfpy.URDF) -> None:
-        self._above = {joint.child: joint for joint in urdf.joint_map.values()}
-        self.joints = urdf.joint_map
-        self.below: dict[str, list[Any]] = {}
-        for joint in urdf.joint_map.values():
+    def __init__(self, urdf: Urdf) -> None:
+        self._above = {joint.child: joint for joint in urdf.joints.values()}
+        self.joints = urdf.joints
+        self.below: dict[str, list[UrdfJoint]] = {}
+        for joint in urdf.joints.values():
             self.below.setdefault(joint.parent, []).append(joint)
-        self.root = next(link for link in urdf.link_map if link not in self._above)
+        self.root = next(link for link in urdf.links if link not in self._above)
         self._depth: dict[str, int] = {}
         for link in reversed(self.order(self.root)):
             self._depth[link] = max(
                 (self._depth[j.child] + _drives(j) for j in self.below.get(link, ())), default=0
             )
 
-    def joints_to(self, link: str) -> list[Any]:
+    def joints_to(self, link: str) -> list[UrdfJoint]:
         """The joints from the root to ``link``, in that order."""
-        joints: list[Any] = []
+        joints: list[UrdfJoint] = []
         while link in self._above:
             joints.append(self._above[link])
             link = joints[-1].parent
         return joints[::-1]
 
-    def movable_to(self, link: str) -> list[Any]:
+    def movable_to(self, link: str) -> list[UrdfJoint]:
         """Those of them that are not fixed."""
         return [joint for joint in self.joints_to(link) if _moves(joint)]
 
@@ -125,7 +122,7 @@ class _Tree:
             found.extend(joint.child for joint in self.below.get(name, ()))
         return found
 
-    def next_joints(self, link: str) -> list[Any]:
+    def next_joints(self, link: str) -> list[UrdfJoint]:
         """The first movable joints behind ``link``, on every branch."""
         found, waiting = [], list(self.below.get(link, ()))
         for joint in waiting:
@@ -135,39 +132,40 @@ class _Tree:
                 waiting.extend(self.below.get(joint.child, ()))
         return found
 
-    def depth(self, joint: Any) -> int:
+    def depth(self, joint: UrdfJoint) -> int:
         """How many driven joints are in a row from ``joint`` on, at most."""
         return self._depth[joint.child] + _drives(joint)
 
-    def leader(self, joint: Any) -> Any:
+    def leader(self, joint: UrdfJoint) -> UrdfJoint | None:
         """The driven joint that ``joint`` follows, directly or not; None if there is none."""
         passed: list[str] = []
-        while joint is not None and joint.mimic is not None:
-            if joint.name in passed:
+        led: UrdfJoint | None = joint
+        while led is not None and led.mimic is not None:
+            if led.name in passed:
                 return None
-            passed.append(joint.name)
-            joint = self.joints.get(joint.mimic.joint)
-        return joint
+            passed.append(led.name)
+            led = self.joints.get(led.mimic.joint)
+        return led
 
 
-def _moves(joint: Any) -> bool:
+def _moves(joint: UrdfJoint) -> bool:
     return bool(joint.type != "fixed")
 
 
-def _drives(joint: Any) -> bool:
+def _drives(joint: UrdfJoint) -> bool:
     return _moves(joint) and joint.mimic is None
 
 
-def _carries(joint: Any) -> bool:
+def _carries(joint: UrdfJoint) -> bool:
     return joint.type in (*TURNING, "fixed")
 
 
-def _main_axes(tree: _Tree, path: Path) -> list[Any]:
+def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
     """The five axes of the arm in a tree, where fingers and wheels branch off.
 
     Raises RobotDescriptionError that says how many axes there are.
     """
-    axes: list[Any] = []
+    axes: list[UrdfJoint] = []
     link = tree.root
     while branches := _branches(tree, link, axes):
         deepest, *rest = sorted(branches, key=tree.depth, reverse=True)
@@ -214,19 +212,19 @@ def _main_axes(tree: _Tree, path: Path) -> list[Any]:
     return axes
 
 
-def _listed(joints: Iterable[Any]) -> str:
+def _listed(joints: Iterable[UrdfJoint]) -> str:
     """The names of ``joints``, with the type of each that does not turn."""
     return ", ".join(j.name if j.type in TURNING else f"{j.name} ({j.type})" for j in joints)
 
 
-def _branches(tree: _Tree, link: str, axes: Sequence[Any]) -> list[Any]:
+def _branches(tree: _Tree, link: str, axes: Sequence[UrdfJoint]) -> list[UrdfJoint]:
     """The next joints behind ``link``, without the bars that ``axes`` move and that carry none."""
     found = tree.next_joints(link)
     own = [j for j in found if j.mimic is None or tree.leader(j) not in axes or tree.depth(j)]
     return own or found[:1]
 
 
-def _is_finger(tree: _Tree, joint: Any, number: int) -> bool:
+def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
     """Whether the last joint of a row of ``number`` opens a gripper instead of turning one."""
     if joint.mimic is not None or joint.type == "prismatic":
         return True
@@ -236,12 +234,12 @@ def _is_finger(tree: _Tree, joint: Any, number: int) -> bool:
     if not FINGER.search(f"{joint.name} {joint.child}") or WRIST.search(joint.name):
         return False
     limit = joint.limit
-    if joint.type == "continuous" or limit is None or None in (limit.lower, limit.upper):
+    if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
         return True
     return bool(number > FIVE or limit.upper - limit.lower <= JAW_RANGE)
 
 
-def _axes_to(tree: _Tree, tool: str) -> list[Any]:
+def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
     """The five axes that carry the link ``tool``; RobotDescriptionError where they are not."""
     axes = tree.movable_to(tool)
     _refuse_followers(axes, repr(tool))
@@ -259,7 +257,7 @@ def _axes_to(tree: _Tree, tool: str) -> list[Any]:
     return axes
 
 
-def _refuse_followers(axes: Sequence[Any], what: str) -> None:
+def _refuse_followers(axes: Sequence[UrdfJoint], what: str) -> None:
     for joint in axes:
         if joint.mimic is not None:
             raise RobotDescriptionError(

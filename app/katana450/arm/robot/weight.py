@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.statics import Load
 
 
-def loads_of(model: RobotModel) -> tuple[Load, ...]:
-    """A load for each piece of the arm, its fingers at zero; none where the file tells no mass."""
-    T_shoulder_body: dict[str | None, FloatArray] = {None: se3.inverse(model.T_base_shoulder)}
+def loads_of(robot: Robot) -> tuple[Load, ...]:
+    """Return a load for each piece of the arm, its fingers at zero.
+
+    Empty where the file states no mass, and without an arm.
+    """
+    arm = robot.arm
+    if arm is None:
+        return ()
+    T_shoulder_link: dict[str | None, FloatArray] = {None: se3.inverse(arm.T_base_shoulder)}
     axes: dict[str | None, int] = {None: 0}
     moments: dict[int, FloatArray] = {}
-    for body in model.bodies:
-        T = T_shoulder_body[body.name] = T_shoulder_body[body.parent] @ body.T_parent_body
-        count = axes[body.name] = axes[body.parent] + (body.joint in model.arm.chain.names)
+    for link in robot.links:
+        T = T_shoulder_link[link.name] = T_shoulder_link[link.parent] @ link.at_rest(arm.resting)
+        turned = link.joint is not None and link.joint.name in arm.chain.names
+        count = axes[link.name] = axes[link.parent] + turned
         # The fourth number is the mass itself.
-        moment = body.mass * (T @ np.append(body.centre, 1.0))
+        moment = link.mass * (T @ np.append(link.center, 1.0))
         moments[count] = moments.get(count, np.zeros(4)) + moment
     return tuple(
         Load(count, float(moment[3]), frozen(moment[:3] / moment[3]))

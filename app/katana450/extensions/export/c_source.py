@@ -1,4 +1,4 @@
-"""A mechanism as C: the paper's three arrays a link, a function that draws it, and a viewer.
+"""A robot as C: the paper's three arrays a link, a function that draws it, and a viewer.
 
 A link's arrays are `vertices[][3]`, `normals[][3]` and `face_indices[][9]`: for each triangle the
 numbers of its vertices, of its normals and of its texture points, which no link has.
@@ -12,7 +12,9 @@ from importlib import resources
 
 import numpy as np
 
-from katana450.arm.robot.mechanism import FIELD_OF_VIEW, Joint, Link, Mechanism, camera
+from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.rows import distinct_rows
 from katana450.maths.geometry.arrays import FloatArray
@@ -34,9 +36,9 @@ RESERVED = frozenset(
 """Words of C, the project's own files, and names Windows has no files of."""
 
 
-def c_files(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, bytes]:
+def c_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
     """Name and content of every file; the viewer begins at the joint `values` [rad, m]."""
-    links = [link for link in mechanism.links if link.shapes]
+    links = [link for link in robot.links if link.shapes]
     names = dict(
         zip(
             (link.name for link in links),
@@ -47,8 +49,8 @@ def c_files(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, byte
     files: dict[str, str] = {}
     for link in links:
         files |= _part(link, names[link.name])
-    files["robot.h"] = _header(mechanism)
-    files["robot.c"] = _source(mechanism, names, values)
+    files["robot.h"] = _header(robot)
+    files["robot.c"] = _source(robot, names, values)
     folder = resources.files("katana450.extensions.export") / "c"
     files |= {name: (folder / name).read_text(encoding="utf-8") for name in TEMPLATES}
     return {name: text.encode() for name, text in files.items()}
@@ -172,9 +174,9 @@ void NAME_draw(void)
 """
 
 
-def _header(mechanism: Mechanism) -> str:
+def _header(robot: Robot) -> str:
     return f"""\
-/* {_comment(mechanism.name)}: its joints, and a function that draws all of it. */
+/* {_comment(robot.name)}: its joints, and a function that draws all of it. */
 #ifndef ROBOT_H
 #define ROBOT_H
 
@@ -188,8 +190,8 @@ def _header(mechanism: Mechanism) -> str:
 extern "C" {{
 #endif
 
-#define ROBOT_NAME {_text(mechanism.name)}
-#define ROBOT_JOINTS {len(mechanism.driven)}
+#define ROBOT_NAME {_text(robot.name)}
+#define ROBOT_JOINTS {len(robot.driven)}
 
 /* slides: values are in m, else in rad. */
 typedef struct {{
@@ -218,16 +220,16 @@ void robot_draw(const double q[]);
 """
 
 
-def _source(mechanism: Mechanism, names: Mapping[str, str], values: Mapping[str, float]) -> str:
-    view = camera(mechanism)
-    joints = [mechanism.joints[name] for name in mechanism.driven]
+def _source(robot: Robot, names: Mapping[str, str], values: Mapping[str, float]) -> str:
+    view = camera(robot)
+    joints = [robot.joints[name] for name in robot.driven]
     start = ", ".join(_double(values[joint.name]) for joint in joints)
     table = "".join(
         f"    {{{_text(joint.name)}, {int(joint.slides)}, "
         f"{_double(joint.lower)}, {_double(joint.upper)}}},\n"
         for joint in joints
     )
-    lines = "\n".join(_drawn(mechanism, mechanism.links[0], names))
+    lines = "\n".join(_drawn(robot, robot.links[0], names))
     headers = "\n".join(f'#include "{name}.h"' for name in sorted(names.values()))
     return f"""\
 #include "robot.h"
@@ -259,7 +261,7 @@ void robot_draw(const double q[])
 """
 
 
-def _drawn(mechanism: Mechanism, link: Link, names: Mapping[str, str]) -> Iterator[str]:
+def _drawn(robot: Robot, link: Link, names: Mapping[str, str]) -> Iterator[str]:
     """Statements that draw a link and what hangs on it, and leave the frame changed."""
     yield f"    /* {_comment(link.name)} */"
     T = link.T_parent_link
@@ -270,26 +272,26 @@ def _drawn(mechanism: Mechanism, link: Link, names: Mapping[str, str]) -> Iterat
     elif T[:3, 3].any():
         yield f"    glTranslated({_triple(T[:3, 3])});"
     if link.joint is not None:
-        yield f"    {_moved(mechanism, link.joint)}"
+        yield f"    {_moved(robot, link.joint)}"
     if link.name in names:
         yield f"    {names[link.name]}_draw();"
-    children = [child for child in mechanism.children(link) if _shows(mechanism, child)]
+    children = [child for child in robot.children(link) if _shows(robot, child)]
     for child in children:
         # The last may spoil the frame, so a long chain needs no deep stack of matrices.
         if child is children[-1]:
-            yield from _drawn(mechanism, child, names)
+            yield from _drawn(robot, child, names)
         else:
             yield "    glPushMatrix();"
-            yield from _drawn(mechanism, child, names)
+            yield from _drawn(robot, child, names)
             yield "    glPopMatrix();"
 
 
-def _shows(mechanism: Mechanism, link: Link) -> bool:
-    return bool(link.shapes) or any(_shows(mechanism, c) for c in mechanism.children(link))
+def _shows(robot: Robot, link: Link) -> bool:
+    return bool(link.shapes) or any(_shows(robot, c) for c in robot.children(link))
 
 
-def _moved(mechanism: Mechanism, joint: Joint) -> str:
-    value = f"q[{mechanism.driven.index(joint.leader)}]"
+def _moved(robot: Robot, joint: Joint) -> str:
+    value = f"q[{robot.driven.index(joint.leader)}]"
     if (joint.factor, joint.offset) != (1.0, 0.0):
         value = f"({_double(joint.factor)} * {value} + {_double(joint.offset)})"
     if joint.slides:

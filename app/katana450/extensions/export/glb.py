@@ -1,4 +1,4 @@
-"""A mechanism as binary glTF 2.0: a node a link, its joint told in `extras`, and its motion."""
+"""A robot as binary glTF 2.0: a node a link, its joint told in `extras`, and its motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.mechanism import Joint, Link, Material, Mechanism, Shape
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, Shape
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.trajectory_file import Motion
@@ -26,19 +28,17 @@ Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 
 
 def glb_files(
-    mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
+    robot: Robot, values: Mapping[str, float], motion: Motion | None = None
 ) -> dict[str, bytes]:
     """Name and content of the one file, at the joint `values` [rad, m] or where a motion begins."""
-    (name,) = distinct([mechanism.name])
-    return {f"{name}.glb": _Document(mechanism, values, motion).content()}
+    (name,) = distinct([robot.name])
+    return {f"{name}.glb": _Document(robot, values, motion).content()}
 
 
 class _Document:
     """The JSON chunk and the binary one as they grow."""
 
-    def __init__(
-        self, mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None
-    ) -> None:
+    def __init__(self, robot: Robot, values: Mapping[str, float], motion: Motion | None) -> None:
         values = values if motion is None else motion.start
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []
@@ -46,17 +46,17 @@ class _Document:
         self._meshes: list[dict[str, Any]] = []
         self._materials: dict[Material, int] = {}
         # Node 0 turns z up into y up; that of link k is node k + 1.
-        number = {link.name: place for place, link in enumerate(mechanism.links, start=1)}
+        number = {link.name: place for place, link in enumerate(robot.links, start=1)}
         nodes: list[dict[str, Any]] = [{"name": "z_up", "rotation": Y_UP, "children": [1]}]
-        nodes += [self._node(mechanism, link, values, number) for link in mechanism.links]
+        nodes += [self._node(robot, link, values, number) for link in robot.links]
         self._json: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": "katana450"},
             "scene": 0,
-            "scenes": [{"name": mechanism.name, "nodes": [0]}],
+            "scenes": [{"name": robot.name, "nodes": [0]}],
             "nodes": nodes,
         }
-        if motion is not None and mechanism.joints:
-            self._json["animations"] = [self._animation(mechanism, motion, number)]
+        if motion is not None and robot.joints:
+            self._json["animations"] = [self._animation(robot, motion, number)]
 
     def content(self) -> bytes:
         """The file."""
@@ -77,7 +77,7 @@ class _Document:
 
     def _node(
         self,
-        mechanism: Mechanism,
+        robot: Robot,
         link: Link,
         values: Mapping[str, float],
         number: Mapping[str, int],
@@ -90,7 +90,7 @@ class _Document:
             "translation": T[:3, 3].tolist(),
             "rotation": _xyzw(T[:3, :3]),
         }
-        children = [number[child.name] for child in mechanism.children(link)]
+        children = [number[child.name] for child in robot.children(link)]
         if children:
             node["children"] = children
         if joint is not None:
@@ -115,12 +115,10 @@ class _Document:
             "material": self._materials.setdefault(shape.material, len(self._materials)),
         }
 
-    def _animation(
-        self, mechanism: Mechanism, motion: Motion, number: Mapping[str, int]
-    ) -> dict[str, Any]:
+    def _animation(self, robot: Robot, motion: Motion, number: Mapping[str, int]) -> dict[str, Any]:
         samplers: list[dict[str, Any]] = []
         channels: list[dict[str, Any]] = []
-        for link in mechanism.links:
+        for link in robot.links:
             joint = link.joint
             if joint is None:
                 continue

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from katana450.arm.robot.mechanism import Material, Shape
+from katana450.arm.robot.surfaces import Material, Shape
 from katana450.extensions.export.rows import distinct_rows
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 

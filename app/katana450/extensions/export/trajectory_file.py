@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.robot.mechanism import Mechanism
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
@@ -40,7 +40,7 @@ WIDEST_TURN = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """t: (n,) [s], from 0 on, rising. values: (n,) [rad, m] of every joint of a mechanism."""
+    """t: (n,) [s], from 0 on, rising. values: (n,) [rad, m] of every joint of a robot."""
 
     t: FloatArray
     values: Mapping[str, FloatArray]
@@ -60,8 +60,8 @@ class Motion:
         return np.interp(place, rows, self.t), np.interp(place, rows, values)
 
 
-def load_motion(path: Path, mechanism: Mechanism) -> Motion:
-    """The motion of `mechanism` in a .csv or .json file.
+def load_motion(path: Path, robot: Robot) -> Motion:
+    """Return the motion of ``robot`` in a .csv or .json file.
 
     Raises InputError for a file that cannot be read, is no such table, names what is no joint, or
     leaves a joint's limits.
@@ -77,7 +77,7 @@ def load_motion(path: Path, mechanism: Mechanism) -> Motion:
             columns = _json_columns(path, text)
         case _:
             raise InputError(f"{path} must end in .csv or .json.")
-    return _motion(path, columns, mechanism)
+    return _motion(path, columns, robot)
 
 
 def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
@@ -108,7 +108,7 @@ def _json_columns(path: Path, text: str) -> dict[str, list[object]]:
     return columns
 
 
-def _motion(path: Path, columns: Mapping[str, list[object]], mechanism: Mechanism) -> Motion:
+def _motion(path: Path, columns: Mapping[str, list[object]], robot: Robot) -> Motion:
     if "t" not in columns:
         raise InputError(f"{path} has no column t; it has {', '.join(columns)}.")
     count = len(columns["t"])
@@ -124,29 +124,29 @@ def _motion(path: Path, columns: Mapping[str, list[object]], mechanism: Mechanis
         raise InputError(f"t of {path} must rise from row to row; in row {row} it does not.")
     given: dict[str, FloatArray] = {}
     for column, values in table.items():
-        name = _joint(path, column, mechanism)
+        name = _joint(path, column, robot)
         if name in given:
             raise InputError(f"{path} names the joint {name} twice.")
         for value in (values.min(), values.max()):
-            mechanism.check(name, float(value))
+            robot.check(name, float(value))
         given[name] = values
     rows = [
-        mechanism.every({name: float(values[row]) for name, values in given.items()})
+        robot.every({name: float(values[row]) for name, values in given.items()})
         for row in range(count)
     ]
-    every = {name: frozen([row[name] for row in rows]) for name in mechanism.joints}
+    every = {name: frozen([row[name] for row in rows]) for name in robot.joints}
     return Motion(frozen(t - t[0]), every)
 
 
-def _joint(path: Path, column: str, mechanism: Mechanism) -> str:
-    driven = mechanism.driven
+def _joint(path: Path, column: str, robot: Robot) -> str:
+    driven = robot.driven
     if column in driven:
         return column
     theta = THETA.fullmatch(column)
     number = int(theta[1]) if theta else GRIPPER if column == "gripper" else 0
     if not 1 <= number <= len(driven):
         raise InputError(
-            f"{path} names {column!r}, which is no driven joint of {mechanism.name}; "
+            f"{path} names {column!r}, which is no driven joint of {robot.name}; "
             f"these are {', '.join(driven)}."
         )
     return driven[number - 1]

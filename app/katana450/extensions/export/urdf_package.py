@@ -18,8 +18,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from katana450.arm.robot.mechanism import Material, Shape
-from katana450.arm.robot.urdf_mechanism import shapes_of
+from katana450.arm.robot.surfaces import Material, Shape, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.names import distinct

@@ -1,4 +1,4 @@
-"""A mechanism as a VRML97 world, the way the paper's LabVIEW and Simulink scenes take it.
+"""A robot as a VRML97 world, the way the paper's LabVIEW and Simulink scenes take it.
 
 Geometry stands where it is at zero, in the root's frame, as a CAD program exports an assembly; each
 joint is a Transform whose `center` is a point of its axis and whose `rotation` is about that axis.
@@ -15,15 +15,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.robot.mechanism import (
-    FIELD_OF_VIEW,
-    Joint,
-    Link,
-    Material,
-    Mechanism,
-    Shape,
-    camera,
-)
+from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, Shape
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.trajectory_file import Motion
@@ -46,26 +41,24 @@ Z_UP = (1.0, 0.0, 0.0, -math.pi / 2.0)
 _TURN = so3.rotation_x(-math.pi / 2.0)
 
 
-def world_of(
-    mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
-) -> World:
-    """The whole mechanism at the joint `values` [rad, m]; with a motion it plays it by itself.
+def world_of(robot: Robot, values: Mapping[str, float], motion: Motion | None = None) -> World:
+    """Return the whole robot at the joint `values` [rad, m]; with a motion it plays it by itself.
 
     A motion also sets the static pose to its first sample, for programs that play none.
     """
     values = values if motion is None else motion.start
-    names = Names(mechanism)
-    root = _link(mechanism, mechanism.links[0], values, names, set())
+    names = Names(robot)
+    root = _link(robot, robot.links[0], values, names, set())
     nodes = [
-        *_surroundings(mechanism),
+        *_surroundings(robot),
         Node("Transform", (("rotation", Z_UP), ("children", (root,)))),
     ]
     routes: list[Route] = []
     if motion is not None:
         clock: list[tuple[str, Value]] = [("cycleInterval", float(motion.t[-1])), ("loop", True)]
         nodes.append(Node("TimeSensor", tuple(clock), names.clock))
-        for name, joint in mechanism.joints.items():
-            nodes.append(_interpolator(joint, mechanism, motion, names))
+        for name, joint in robot.joints.items():
+            nodes.append(_interpolator(joint, robot, motion, names))
             target, way = names.joints[name], f"{names.joints[name]}{names.way}"
             setter = "set_translation" if joint.slides else "set_rotation"
             routes.append(Route(names.clock, "fraction_changed", way, "set_fraction"))
@@ -74,28 +67,28 @@ def world_of(
 
 
 def vrml_files(
-    mechanism: Mechanism, values: Mapping[str, float], motion: Motion | None = None
+    robot: Robot, values: Mapping[str, float], motion: Motion | None = None
 ) -> dict[str, bytes]:
     """Name and content of the file of the whole, and of one for each link with a shape."""
-    (whole,) = distinct([mechanism.name])
-    files = {f"{whole}.wrl": world_text(world_of(mechanism, values, motion)).encode()}
-    links = [link for link in mechanism.links if link.shapes]
+    (whole,) = distinct([robot.name])
+    files = {f"{whole}.wrl": world_text(world_of(robot, values, motion)).encode()}
+    links = [link for link in robot.links if link.shapes]
     for link, name in zip(links, distinct(link.name for link in links), strict=True):
-        files[f"parts/{name}.wrl"] = world_text(part_world(mechanism, link)).encode()
+        files[f"parts/{name}.wrl"] = world_text(part_world(robot, link)).encode()
     return files
 
 
-def part_world(mechanism: Mechanism, link: Link) -> World:
-    """One link alone where it is at zero, z up, so that all of them loaded make the mechanism."""
-    names = Names(mechanism)
-    shapes = _shapes(mechanism, link, names, set())
+def part_world(robot: Robot, link: Link) -> World:
+    """One link alone where it is at zero, z up, so that all of them loaded make the robot."""
+    names = Names(robot)
+    shapes = _shapes(robot, link, names, set())
     part = Node("Group", (("children", tuple(shapes)),), names.links[link.name])
-    title = Node("WorldInfo", (("title", f"{mechanism.name} {link.name}"),))
+    title = Node("WorldInfo", (("title", f"{robot.name} {link.name}"),))
     return World((title, Node("Transform", (("rotation", Z_UP), ("children", (part,))))))
 
 
-def _surroundings(mechanism: Mechanism) -> list[Node]:
-    view = camera(mechanism)
+def _surroundings(robot: Robot) -> list[Node]:
+    view = camera(robot)
     R = _TURN @ _looking(view.target - view.eye)
     w = so3.log(R)
     angle = float(np.linalg.norm(w))
@@ -103,7 +96,7 @@ def _surroundings(mechanism: Mechanism) -> list[Node]:
     return [
         Node(
             "WorldInfo",
-            (("title", mechanism.name), ("info", ("Metres and radians; z of the root is up.",))),
+            (("title", robot.name), ("info", ("Metres and radians; z of the root is up.",))),
         ),
         Node("NavigationInfo", (("type", ("EXAMINE", "ANY")),)),
         Node("Background", (("skyColor", SKY),)),
@@ -129,27 +122,25 @@ def _looking(way: FloatArray) -> FloatArray:
 
 
 def _link(
-    mechanism: Mechanism,
+    robot: Robot,
     link: Link,
     values: Mapping[str, float],
     names: Names,
     told: set[Material],
 ) -> Node:
     """The node of a link with all that hangs on it."""
-    own = _switch(mechanism, link, names, told)
-    hung = [_link(mechanism, other, values, names, told) for other in mechanism.children(link)]
-    center = ("center", _rounded(mechanism.home[link.name][:3, 3], 9))
+    own = _switch(robot, link, names, told)
+    hung = [_link(robot, other, values, names, told) for other in robot.children(link)]
+    center = ("center", _rounded(robot.home[link.name][:3, 3], 9))
     children = ("children", (*own, *hung))
     if link.joint is None:
         return Node("Transform", (center, children), names.links[link.name])
     group = Node("Group", (children,), names.links[link.name])
-    moved = _moved(mechanism, link.joint, values[link.joint.name])
+    moved = _moved(robot, link.joint, values[link.joint.name])
     return Node("Transform", (center, moved, ("children", (group,))), names.joints[link.joint.name])
 
 
-def _switch(
-    mechanism: Mechanism, link: Link, names: Names, told: set[Material]
-) -> tuple[Node, ...]:
+def _switch(robot: Robot, link: Link, names: Names, told: set[Material]) -> tuple[Node, ...]:
     """The shapes of a link as they are made, and once more to be painted."""
     if not link.shapes:
         return ()
@@ -158,7 +149,7 @@ def _switch(
     paint: Node | Use = Node("Material", colours, dressed.paint)
     made: list[Node] = []
     painted: list[Node] = []
-    for number, shape in enumerate(_shapes(mechanism, link, names, told)):
+    for number, shape in enumerate(_shapes(robot, link, names, told)):
         name = f"{names.links[link.name]}{names.surface}{number}"
         look, (field, surface) = shape.fields
         assert isinstance(surface, Node)
@@ -170,15 +161,15 @@ def _switch(
     return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.look),)
 
 
-def _moved(mechanism: Mechanism, joint: Joint, value: float) -> tuple[str, Value]:
-    axis = mechanism.axis(joint)
+def _moved(robot: Robot, joint: Joint, value: float) -> tuple[str, Value]:
+    axis = robot.axis(joint)
     if joint.slides:
         return "translation", _rounded(value * axis, 9)
     return "rotation", (*_rounded(axis, 9), value)
 
 
-def _shapes(mechanism: Mechanism, link: Link, names: Names, told: set[Material]) -> list[Node]:
-    T = mechanism.home[link.name]
+def _shapes(robot: Robot, link: Link, names: Names, told: set[Material]) -> list[Node]:
+    T = robot.home[link.name]
     return [_shape(shape, T, names, told) for shape in link.shapes]
 
 
@@ -215,9 +206,9 @@ def _material(material: Material) -> Node:
     )
 
 
-def _interpolator(joint: Joint, mechanism: Mechanism, motion: Motion, names: Names) -> Node:
+def _interpolator(joint: Joint, robot: Robot, motion: Motion, names: Names) -> Node:
     name = f"{names.joints[joint.name]}{names.way}"
-    axis = mechanism.axis(joint)
+    axis = robot.axis(joint)
     t, values = motion.keys(joint.name)
     keys = ("key", tuple((t / motion.t[-1]).tolist()))
     if joint.slides:

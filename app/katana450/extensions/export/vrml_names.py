@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from katana450.arm.robot.mechanism import Material, Mechanism
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.vrml_node import KEYWORDS
 
@@ -34,14 +35,14 @@ class Names:
         way: what is put behind a joint's name for its interpolator.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        links = [link.name for link in mechanism.links]
-        shown = [link.name for link in mechanism.links if link.shapes]
-        materials = {shape.material for link in mechanism.links for shape in link.shapes}
+    def __init__(self, robot: Robot) -> None:
+        links = [link.name for link in robot.links]
+        shown = [link.name for link in robot.links if link.shapes]
+        materials = {shape.material for link in robot.links for shape in link.shapes}
         ordered = sorted(materials, key=repr)
         wanted = [
             *links,
-            *mechanism.joints,
+            *robot.joints,
             *(f"{name}_{part}" for name in shown for part in (LOOK, PAINT)),
             *(material.name for material in ordered),
             CLOCK,
@@ -49,7 +50,7 @@ class Names:
         self._made = distinct(wanted, KEYWORDS)
         made = iter(self._made)
         self.links: Mapping[str, str] = {name: next(made) for name in links}
-        self.joints: Mapping[str, str] = {name: next(made) for name in mechanism.joints}
+        self.joints: Mapping[str, str] = {name: next(made) for name in robot.joints}
         self.dressed: Mapping[str, Dressed] = {
             name: Dressed(next(made), next(made)) for name in shown
         }

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.mechanism import Material, Shape
+from katana450.arm.robot.surfaces import Material, Shape
 from katana450.maths.geometry.arrays import FloatArray
 
 Floats = npt.NDArray[np.float32]

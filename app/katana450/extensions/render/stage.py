@@ -12,10 +12,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.control.things import Thing
 from katana450.arm.robot.conduit import Stretch
-from katana450.arm.robot.mechanism import Material, Shape
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import Props
-from katana450.arm.robot.urdf_mechanism import shapes_of
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, Shape, shapes_of
 from katana450.arm.robot.visual import Visual
 from katana450.extensions.render.picture import Translucent
 from katana450.extensions.render.scene import Item, smooth
@@ -32,17 +31,14 @@ CONDUIT, TABLE = "conduit", "table"
 class Stage:
     """Shapes that are read once, and put where a state has them."""
 
-    def __init__(self, model: RobotModel, session: Session, props: Props) -> None:
+    def __init__(self, robot: Robot, session: Session, props: Props) -> None:
         """``session``: knows where things and water are."""
-        self._model = model
+        self._robot, arm = robot, robot.require_arm()
         self._session = session
-        self._links = {
-            body.name: tuple(shape for visual in body.visuals for shape in shapes_of(visual))
-            for body in model.bodies
-        }
+        self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
         self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
-        self._hung = [_Hung(stretch) for stretch in model.stretches]
+        self._hung = [_Hung(stretch) for stretch in arm.stretches]
 
     def items(self, state: State) -> list[Item]:
         """All that hides what is behind it."""
@@ -89,18 +85,11 @@ class Stage:
         return veils_of(state.poured.water, pouring.around(state.things))
 
     def _angles(self, state: State) -> Mapping[str, float]:
-        return self._model.joint_angles(state.q, state.gripper)
+        return self._robot.joint_values(state.q, state.gripper)
 
     def _frames(self, state: State) -> Mapping[str, FloatArray]:
         """(4, 4) of each link in the base frame."""
-        angles = self._angles(state)
-        found: dict[str, FloatArray] = {}
-        for body in self._model.bodies:
-            T = body.T_parent_body
-            if body.joint is not None:
-                T = T @ body.motion(angles[body.joint])
-            found[body.name] = T if body.parent is None else found[body.parent] @ T
-        return found
+        return self._robot.frames(self._angles(state))
 
 
 class _Hung:
@@ -142,6 +131,6 @@ def _in_file(path: Path) -> Sequence[Shape]:
 def _plain(thing: Thing) -> Shape:
     red, green, blue = thing.look.colour or COLOUR
     colour = red / 255.0, green / 255.0, blue / 255.0
-    made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), form(thing), COLOUR)
+    made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(thing), COLOUR)
     (shape,) = shapes_of(made)
     return Shape(Material("plain", colour), shape.vertices, shape.normals, shape.faces)

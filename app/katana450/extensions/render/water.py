@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.arm.robot.mechanism import Material, Shape
+from katana450.arm.robot.surfaces import Material, Shape
 from katana450.extensions.render.picture import Translucent
 from katana450.extensions.render.scene import Item, smooth
 from katana450.maths.geometry import se3, so3

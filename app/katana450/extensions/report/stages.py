@@ -9,8 +9,8 @@ import numpy as np
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import Props
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
@@ -78,20 +78,20 @@ DONE = 0.7
 
 def stage_pictures(
     program: Program,
-    model: RobotModel,
+    robot: Robot,
     session: Session,
     props: Props,
     states: Sequence[State],
     trace: Trace,
 ) -> Mapping[str, bytes]:
     """PNG files by their names."""
-    stage = Stage(model, session, props)
+    stage = Stage(robot, session, props)
     found: dict[str, bytes] = {}
     for name, tick in moments(program, trace).items():
         state, items = states[tick], stage.items(states[tick])
         look = ON_TABLE
         if name == "tracing":
-            items += _lines(program, model, trace, tick)
+            items += _lines(program, robot, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
         found[f"{name}.png"] = png(picture(items, stage.water(state), camera, LIGHT, RAYS).pixels)
@@ -115,11 +115,11 @@ def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
     return path if isinstance(path, ToolPath) else None
 
 
-def _lines(program: Program, model: RobotModel, trace: Trace, tick: int) -> list[Item]:
+def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item]:
     """The path that the arm is on, and what it has traced of it, coloured as on the page."""
     path = _path(program, trace, tick)
     assert path is not None
-    T = model.T_base_shoulder
+    T = robot.require_arm().T_base_shoulder
 
     def seen(points: FloatArray) -> FloatArray:
         return np.asarray(points @ T[:3, :3].T + T[:3, 3])

@@ -15,8 +15,8 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.control.things import Environment
-from katana450.arm.robot.machine import Machine
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -38,7 +38,7 @@ class Motion:
 
     def __init__(
         self,
-        model: RobotModel | Machine,
+        robot: Robot,
         session: Session | JointSession,
         link: FrontEnd,
         navigator: PlanningWorker | None,
@@ -47,7 +47,7 @@ class Motion:
     ) -> None:
         """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
         has a name in its VRML world. ``let_go`` takes the handles of the view out of every hand."""
-        self.model = model
+        self.robot = robot
         self.nodes = nodes
         self._session = session
         self._link = link
@@ -55,7 +55,7 @@ class Motion:
         self._navigator = navigator
         self._sink: CommandSink = link if navigator is None else navigator
         self._let_go = let_go
-        self._loads = () if isinstance(model, Machine) else loads_of(model)
+        self._loads = loads_of(robot)
         self._measured: (
             tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
         ) = None
@@ -85,14 +85,14 @@ class Motion:
         """What programs are planned for. Raises InputError where there are only joints."""
         if isinstance(self._session, JointSession):
             self._session.refuse()
-        return PlanContext(self._session, self.robot.T_base_shoulder)
+        return PlanContext(self._session, self.arm.T_base_shoulder)
 
     @property
-    def robot(self) -> RobotModel:
-        """The arm. Raises InputError, and says why, where there are only joints."""
-        if isinstance(self.model, Machine):
-            raise InputError(f"Only its joints can be driven. {self.model.joints.why}")
-        return self.model
+    def arm(self) -> MountedArm:
+        """The arm. Raises InputError with the reason where there are only joints."""
+        if self.robot.arm is None:
+            raise InputError(f"Only its joints can be driven. {self.robot.why}")
+        return self.robot.arm
 
     @property
     def lateness(self) -> LoopTiming:
@@ -117,7 +117,7 @@ class Motion:
         world, x = self._session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
-            chain = self.robot.arm.chain_to(state.tool)
+            chain = self.arm.chain_to(state.tool)
             holding = holding_torques(chain, state.q, self._loads) if self._loads else None
             self._measured = (key, (margins(chain, world, x), holding))
         return self._measured[1]

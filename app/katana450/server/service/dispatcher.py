@@ -157,7 +157,7 @@ class Dispatcher:
         """(4, 4) from ``frame`` into {S}."""
         if frame is requests.Frame.SHOULDER:
             return np.eye(4)
-        return se3.inverse(self._hub.present().robot.T_base_shoulder)
+        return se3.inverse(self._hub.present().arm.T_base_shoulder)
 
     def look(self, at: str) -> answers.Answer:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
@@ -176,7 +176,7 @@ class Dispatcher:
         """What follows from the newest snapshot alone."""
         match at:
             case "arm":
-                return serialize.arm(arm.model, arm.ready.tolist())
+                return serialize.arm(arm.robot, arm.ready.tolist())
             case "links":
                 return arm.nodes.links(arm.state)
             case "branches":

@@ -12,8 +12,8 @@ from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.state import State
 from katana450.arm.control.things import Environment
-from katana450.arm.robot.machine import Machine
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.extensions.programs.bench import PlanContext
@@ -27,10 +27,10 @@ class Arm(Protocol):
     """What the gateway asks of the arm; ``Motion`` is one."""
 
     @property
-    def model(self) -> RobotModel | Machine: ...
+    def robot(self) -> Robot: ...
 
     @property
-    def robot(self) -> RobotModel: ...
+    def arm(self) -> MountedArm: ...
 
     @property
     def nodes(self) -> Nodes: ...

@@ -56,7 +56,7 @@ class ObjectRequests:
             )
         T = se3.printed(asked.T, f"The pose of {asked.name!r}")
         if asked.frame is requests.Frame.SHOULDER:
-            T = arm.robot.T_base_shoulder @ T
+            T = arm.arm.T_base_shoulder @ T
         if thing.fixed:
             T = arm.surroundings.into_hand(T, arm.state.x)
         placed = replace(thing, T=T)
@@ -124,7 +124,7 @@ class ObjectRequests:
     def _out_of_the_hand(self, name: str) -> Thing | None:
         """The thing of that name, if there is one. Raises InputError when it is held."""
         arm = self._hub.present()
-        if any(part.name == name for part in arm.robot.bodies) or name == "table":
+        if any(link.name == name for link in arm.robot.links) or name == "table":
             raise InputError(f"{name!r} is no thing that can be put elsewhere.")
         known = named(arm.state.things, name)
         if known is not None and known.held:

@@ -13,8 +13,8 @@ from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
-from katana450.arm.robot.machine import Machine
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.kinematics.forward import forward
@@ -64,7 +64,7 @@ def state(hub: Hub) -> answers.State:
 def _state(arm: Arm, snapshot: Snapshot) -> answers.State:
     """What follows from ``snapshot`` alone; the rest is filled in for each answer."""
     now = snapshot.state
-    tool = None if isinstance(arm.model, Machine) else _Tool.of(arm.model, now)
+    tool = None if arm.robot.arm is None else _Tool.of(arm.robot.arm, now)
     return answers.State(
         t=now.t,
         told=now.t,
@@ -122,8 +122,8 @@ class _Tool(NamedTuple):
     speed: float
 
     @classmethod
-    def of(cls, model: RobotModel, now: control.State) -> _Tool:
-        chain = model.arm.chain_to(now.tool)
+    def of(cls, arm: MountedArm, now: control.State) -> _Tool:
+        chain = arm.chain_to(now.tool)
         five = ToolTarget.at(chain, now.q)
         speed = tool_speed(chain, now.setpoint, now.motion.qd)
         return cls(forward(chain, now.q).tolist(), five.pitch, five.roll, speed)
@@ -143,21 +143,22 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
     )
 
 
-def arm(model: RobotModel | Machine, ready: list[float]) -> answers.Arm:
+def arm(robot: Robot, ready: list[float]) -> answers.Arm:
     """``ready``: the posture that Home drives to."""
-    if isinstance(model, Machine):
-        joints = model.joints
+    found = robot.arm
+    if found is None:
+        joints = robot.joint_group
         jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
-        return jointed.told(model.mechanism.name, ready)
-    names, gripper = model.arm.chain.names, model.arm.gripper
-    jointed = _Jointed(names, (False,) * len(names), model.arm.limits)
+        return jointed.told(robot.name, ready)
+    names, gripper = found.chain.names, found.gripper
+    jointed = _Jointed(names, (False,) * len(names), found.limits)
     return msgspec.structs.replace(
-        jointed.told(model.name, ready),
-        tools={name: M.tolist() for name, M in model.arm.tools.items()},
-        default_tool=model.arm.default_tool,
+        jointed.told(robot.name, ready),
+        tools={name: M.tolist() for name, M in found.tools.items()},
+        default_tool=found.default_tool,
         gripper=(gripper.lower, gripper.upper, gripper.speed) if gripper.moves else None,
         gripper_slides=gripper.slides,
-        T_base_shoulder=model.T_base_shoulder.tolist(),
+        T_base_shoulder=found.T_base_shoulder.tolist(),
     )
 
 

@@ -19,9 +19,9 @@ from katana450.arm.control.looks import Colour, Trait
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Thing
-from katana450.arm.robot.machine import Machine
-from katana450.arm.robot.mechanism import PLAIN, Joint, Mechanism
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.link import Joint
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import Dressed, Names
 from katana450.extensions.export.vrml_node import WIDTHS, Type
@@ -33,47 +33,6 @@ ASIDE = 1e-6
 """[rad] By which the axis of a rotation may be beside that of the joint."""
 
 FieldValue = float | list[float]
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """What moves, and by which commands.
-
-    Attributes:
-        axes: the joints that are axes of the arm, with their numbers from 0.
-        gripper: the driven finger joint, if there is one.
-        values: of every movable joint [rad, m].
-        links: those there are.
-        fingers: the finger joints, which move together.
-    """
-
-    axes: Mapping[str, int]
-    gripper: str | None
-    values: Callable[[State], Mapping[str, float]]
-    links: frozenset[str]
-    fingers: frozenset[str] = frozenset()
-
-
-def body_of(model: RobotModel, mechanism: Mechanism) -> Body:
-    """An arm of the family; ``mechanism`` is that of the same file."""
-    fingers = [name for name in model.fingers if mechanism.joints[name].leader == name]
-    return Body(
-        axes={name: axis for axis, name in enumerate(model.arm.chain.names)},
-        gripper=fingers[0] if fingers else None,
-        values=lambda state: model.joint_angles(state.q, state.gripper),
-        links=frozenset(body.name for body in model.bodies),
-        fingers=frozenset(model.fingers),
-    )
-
-
-def machine_of(machine: Machine) -> Body:
-    """A mechanism that is driven joint by joint."""
-    return Body(
-        axes={name: axis for axis, name in enumerate(machine.joints.names)},
-        gripper=None,
-        values=lambda state: machine.values(state.q),
-        links=frozenset(link.name for link in machine.mechanism.links),
-    )
 
 
 class _Orders:
@@ -108,11 +67,16 @@ class _Node:
 class Nodes:
     """All there is to be named. Changes nothing by itself."""
 
-    def __init__(self, mechanism: Mechanism, body: Body, surroundings: Environment) -> None:
-        self._mechanism = mechanism
-        self._body = body
+    def __init__(self, robot: Robot, surroundings: Environment) -> None:
+        self._robot = robot
+        arm = robot.arm
+        axes = robot.driven if arm is None else arm.chain.names
+        self._axes: Mapping[str, int] = {name: axis for axis, name in enumerate(axes)}
+        self._fingers = () if arm is None else tuple(arm.fingers)
+        # A finger that follows another is set by it alone.
+        self._gripper = next((f for f in self._fingers if robot.joints[f].leader == f), None)
         self._surroundings = surroundings
-        self._names = Names(mechanism)
+        self._names = Names(robot)
         self._fixed = self._of_the_robot()
         # Of the things there are at present, by the names they had.
         self._known: tuple[tuple[str, ...], Mapping[str, _Node]] = ((), self._fixed)
@@ -141,11 +105,11 @@ class Nodes:
 
     def links(self, state: State) -> answers.Links:
         """Where every link is."""
-        frames = self._mechanism.frames(self._body.values(state))
-        there = self._body.links
-        return answers.Links(
-            links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items() if n in there]
-        )
+        frames = self._robot.frames(self._values(state))
+        return answers.Links(links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items()])
+
+    def _values(self, state: State) -> Mapping[str, float]:
+        return self._robot.joint_values(state.q, state.gripper)
 
     def read(self, state: State, asked: Iterable[requests.Named]) -> tuple[answers.Value, ...]:
         """What the fields are now. Raises InputError for a name there is none of."""
@@ -200,9 +164,7 @@ class Nodes:
 
     def _of_the_robot(self) -> dict[str, _Node]:
         nodes: dict[str, _Node] = {}
-        for link in self._mechanism.links:
-            if link.name not in self._body.links:
-                continue
+        for link in self._robot.links:
             if link.joint is not None:
                 nodes[self._names.joints[link.joint.name]] = self._joint(link.joint)
             if link.shapes:
@@ -211,11 +173,11 @@ class Nodes:
         return nodes
 
     def _joint(self, joint: Joint) -> _Node:
-        axis = self._mechanism.axis(joint)
-        body, name = self._body, joint.name
+        axis = self._robot.axis(joint)
+        name = joint.name
 
         def read(state: State) -> FieldValue:
-            value = body.values(state).get(name, 0.0)
+            value = self._values(state)[name]
             return [*(value * axis).tolist()] if joint.slides else [*axis.tolist(), value]
 
         def put(orders: _Orders, value: FieldValue | None) -> None:
@@ -224,19 +186,19 @@ class Nodes:
             if joint.leader != name:
                 raise InputError(f"{name} follows {joint.leader}: set that.")
             amount = _along(name, axis, value) if joint.slides else _about(name, axis, value)
-            if name in body.axes:
-                orders.axes[body.axes[name]] = amount
-            elif name == body.gripper:
+            if name in self._axes:
+                orders.axes[self._axes[name]] = amount
+            elif name == self._gripper:
                 orders.others.append(cmd.SetGripper(amount))
-            elif name in body.fingers:
-                raise InputError(f"{name} is driven together with {body.gripper}: set that.")
+            elif name in self._fingers:
+                raise InputError(f"{name} is driven together with {self._gripper}: set that.")
             else:
-                raise InputError(f"{name} stays at zero: it is no joint of the arm.")
+                raise InputError(f"{name} stays where it is: it is no joint of the arm.")
 
         moved = "translation" if joint.slides else "rotation"
         kind = Type.VECTOR if joint.slides else Type.ROTATION
-        link = next(link for link in self._mechanism.links if link.joint is joint)
-        center: list[float] = self._mechanism.home[link.name][:3, 3].tolist()
+        link = next(link for link in self._robot.links if link.joint is joint)
+        center: list[float] = self._robot.home[link.name][:3, 3].tolist()
         fields = {moved: _Field(kind, read, put), "center": _Field(Type.VECTOR, lambda _: center)}
         return _Node("Transform", f"joint {name}", fields)
 

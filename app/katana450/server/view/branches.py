@@ -16,7 +16,7 @@ import viser
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.commands import TakeBranch
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.server.view.controls import Listen
 from katana450.server.view.scene import Colour, GhostNodes
@@ -44,14 +44,14 @@ class BranchList:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         find: Find,
         listen: Listen,
         state: State,
     ) -> None:
         self._server = server
         self._find = find
-        self._model = model
+        self._robot = robot
         self._listen = listen
         self._seen = state
         self._seen_at = -math.inf
@@ -103,12 +103,12 @@ class BranchList:
             visible = wanted in (OTHERS, str(branch)) and branch != state.branch
             ghost.root.visible = visible
             if visible:
-                ghost.move(self._model.joint_angles(choice.badge.q, state.gripper))
+                ghost.move(self._robot.joint_values(choice.badge.q, state.gripper))
 
     def _ghost(self, number: int) -> GhostNodes:
         branch = BRANCHES[number]
         name = f"/branch/{branch}"
-        ghost = GhostNodes(self._server, self._model, name, COLOURS[number], OPACITY)
+        ghost = GhostNodes(self._server, self._robot, name, COLOURS[number], OPACITY)
         for shape in ghost.shapes:
             self._listen(shape, lambda: TakeBranch(branch))
         return ghost

@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 
@@ -52,8 +52,8 @@ BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
 class Cameras:
     """Turns cameras; a browser that rides on the tool does so until it is given another view."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
-        self._model = model
+    def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
+        self._arm = arm
         self._riding: dict[int, viser.ClientHandle] = {}
         self._lock = threading.Lock()
         server.on_client_disconnect(self._forget)
@@ -64,26 +64,26 @@ class Cameras:
             self._riding.pop(client.client_id, None)
             if preset is Preset.TOOL:
                 self._riding[client.client_id] = client
-        _turn(client, look_from(preset, self._model, state))
+        _turn(client, look_from(preset, self._arm, state))
 
     def follow(self, state: State) -> None:
         """Take the cameras that ride on the tool along."""
         with self._lock:
             riding = list(self._riding.values())
         for client in riding:
-            _turn(client, look_from(Preset.TOOL, self._model, state))
+            _turn(client, look_from(Preset.TOOL, self._arm, state))
 
     def _forget(self, client: viser.ClientHandle) -> None:
         with self._lock:
             self._riding.pop(client.client_id, None)
 
 
-def look_from(preset: Preset, model: RobotModel, state: State) -> Look:
+def look_from(preset: Preset, arm: MountedArm, state: State) -> Look:
     """The view that ``preset`` is of an arm in ``state``."""
     if preset is not Preset.TOOL:
         return LOOKS[preset]
-    chain = model.arm.chain_to(state.tool)
-    T = model.T_base_shoulder @ forward(chain, state.q)
+    chain = arm.chain_to(state.tool)
+    T = arm.T_base_shoulder @ forward(chain, state.q)
     p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
     # Above in the arm's plane, however the tool is rolled.
     up = z - (z @ x) * x

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import viser
 
 from katana450.arm.robot.conduit import Stretch
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.scene import ArmNodes, Colour
@@ -71,10 +71,10 @@ class _Hung:
 class Conduits:
     """Hang below the links they start from; sent anew only when the joint between has moved."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel, arm: ArmNodes) -> None:
+    def __init__(self, server: viser.ViserServer, arm: MountedArm, nodes: ArmNodes) -> None:
         self._hung = [
-            _Hung(server, stretch, f"{arm.path[stretch.start.link]}/conduit{number}")
-            for number, stretch in enumerate(model.stretches)
+            _Hung(server, stretch, f"{nodes.path[stretch.start.link]}/conduit{number}")
+            for number, stretch in enumerate(arm.stretches)
         ]
 
     def move(self, angles: Mapping[str, float]) -> None:

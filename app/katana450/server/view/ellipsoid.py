@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import velocity_ellipsoid
@@ -23,8 +23,8 @@ COLOUR = (124, 77, 219)
 class Ellipsoid:
     """Hidden until a person asks for it."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
-        self._model = model
+    def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
+        self._arm = arm
         self._node = server.scene.add_icosphere(
             "/velocity",
             radius=1.0,
@@ -44,9 +44,9 @@ class Ellipsoid:
         """Go where the tool of ``state`` is, if shown."""
         if not self._node.visible:
             return
-        chain = self._model.arm.chain_to(state.tool)
+        chain = self._arm.chain_to(state.tool)
         ellipsoid = velocity_ellipsoid(chain, state.q)
-        T_base_shoulder = self._model.T_base_shoulder
+        T_base_shoulder = self._arm.T_base_shoulder
         T_base_tool = T_base_shoulder @ forward(chain, state.q)
         self._node.position = T_base_tool[:3, 3]
         self._node.wxyz = so3.to_quaternion(T_base_shoulder[:3, :3] @ ellipsoid.axes)

@@ -16,7 +16,7 @@ import viser
 
 from katana450.arm.control.commands import Command, MoveTool, Settle, TurnTool
 from katana450.arm.control.state import State, ToolTarget
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
@@ -61,12 +61,12 @@ class Gizmo:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        arm: MountedArm,
         put: Callable[[Command], None],
         current: Callable[[], State],
     ) -> None:
         """``put`` takes a command; ``current`` is the newest state."""
-        self._model = model
+        self._arm = arm
         self._put = put
         self._current = current
         self._held: set[str] = set()
@@ -110,8 +110,8 @@ class Gizmo:
 
     def aim(self, state: State, T: FloatArray) -> None:
         """Take in where the goal of ``state`` is, ``T`` (4, 4) in the base frame."""
-        chain = self._model.arm.chain_to(state.tool)
-        pitched = self._model.T_base_shoulder[:3, :3] @ pitched_frame(chain, state.goal)
+        chain = self._arm.chain_to(state.tool)
+        pitched = self._arm.T_base_shoulder[:3, :3] @ pitched_frame(chain, state.goal)
         _, roll = pitch_and_roll(chain, state.goal)
         x, y, z = T[:3, 3].tolist()
         rolled = pitched @ so3.rotation_x(roll)
@@ -135,8 +135,8 @@ class Gizmo:
             return
         if event.phase == "end":
             self._held.discard("move")
-        p = np.asarray(event.target.position, dtype=float) - self._model.T_base_shoulder[:3, 3]
-        self._put(MoveTool(p @ self._model.T_base_shoulder[:3, :3]))
+        p = np.asarray(event.target.position, dtype=float) - self._arm.T_base_shoulder[:3, 3]
+        self._put(MoveTool(p @ self._arm.T_base_shoulder[:3, :3]))
         self._settle(event)
 
     def _settle(self, event: viser.TransformControlsEvent) -> None:
@@ -164,7 +164,7 @@ class Gizmo:
             if isinstance(wish, ToolTarget):
                 pitch, roll = wish.pitch, wish.roll
             else:
-                chain = self._model.arm.chain_to(state.tool)
+                chain = self._arm.chain_to(state.tool)
                 pitch, roll = pitch_and_roll(chain, state.goal)
             self._turns[ring] = _Turn(R, pitch, roll)
             self._held.add(ring)

@@ -1,4 +1,4 @@
-"""Any mechanism in the browser: a frame a link, nested as the links are, that turns or slides."""
+"""Any robot in the browser: a frame a link, nested as the links are, that turns or slides."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import viser
 
-from katana450.arm.robot.mechanism import Joint, Mechanism, Shape
+from katana450.arm.robot.link import Joint
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Shape
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.scene import add_shape
@@ -20,14 +22,14 @@ WORTH_SENDING = 1e-7
 class MachineNodes:
     """The links and their shapes."""
 
-    def __init__(self, server: viser.ViserServer, mechanism: Mechanism) -> None:
+    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
         self.path: dict[str, str] = {}
         self.shapes: dict[str, list[viser.MeshHandle]] = {}
         """Of each link, as they are made."""
         self._jointed: list[tuple[Joint, FloatArray, viser.FrameHandle]] = []
         self._sent: dict[str, float] = {}
-        self._surfaces = {link.name: link.shapes for link in mechanism.links}
-        for number, link in enumerate(mechanism.links):
+        self._surfaces = {link.name: link.shapes for link in robot.links}
+        for number, link in enumerate(robot.links):
             above = "" if link.parent is None else self.path[link.parent]
             # A link's own name may hold what a path is parted by.
             path = self.path[link.name] = f"{above}/link{number}"

@@ -1,4 +1,4 @@
-"""The window on a mechanism that is driven joint by joint."""
+"""The view of a robot that can only be driven joint by joint."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import time
 
 import viser
 
-from katana450.arm.robot.machine import Machine
-from katana450.arm.robot.mechanism import camera
+from katana450.arm.robot.camera import camera
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.server.view.follower import Follower
@@ -24,23 +24,23 @@ class MachineView(Follower):
     def __init__(
         self,
         server: viser.ViserServer,
-        machine: Machine,
+        robot: Robot,
         board: StatePublisher,
         sink: CommandSink,
         frame_rate: float,
     ) -> None:
         """``sink`` takes what people do. ``frame_rate``: most updates a second [Hz]."""
         super().__init__(server, board, frame_rate)
-        self._machine = machine
+        self._robot = robot
         self._sink = sink
         furnish(server)
-        server.gui.set_panel_label(title(machine.mechanism.name))
-        look = camera(machine.mechanism)
+        server.gui.set_panel_label(title(robot.name))
+        look = camera(robot)
         server.initial_camera.position = look.eye
         server.initial_camera.look_at = look.target
-        self._nodes = MachineNodes(server, machine.mechanism)
+        self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
-        self._panel = MachinePanel(server.gui, machine.joints, sink.put, board.snapshot.state)
+        self._panel = MachinePanel(server.gui, robot.joint_group, sink.put, board.snapshot.state)
         self.show(board.snapshot)
 
     def let_go(self) -> None:
@@ -49,7 +49,7 @@ class MachineView(Follower):
     def show(self, snapshot: Snapshot) -> None:
         state = snapshot.state
         with self._server.atomic():
-            self._nodes.move(self._machine.values(state.q))
+            self._nodes.move(self._robot.joint_values(state.q, state.gripper))
             self._paint.follow(state)
             self._panel.follow(
                 state,

@@ -10,7 +10,7 @@ import viser
 
 from katana450.arm.control.looks import Choice, Look, Looks
 from katana450.arm.control.state import State
-from katana450.arm.robot.mechanism import Shape, main_colour
+from katana450.arm.robot.surfaces import Shape, main_colour
 from katana450.server.view.scene import add_shape, of_255
 
 

@@ -12,7 +12,7 @@ import viser
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
@@ -49,25 +49,25 @@ class Panel:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         put: Callable[[cmd.Command], int],
         find: Find,
         shows: Shows,
         state: State,
     ) -> None:
         """``put`` takes a command; ``state`` is what the panel shows first."""
-        self._model = model
+        self._arm = robot.require_arm()
         self._on_person = listener(put)
         self._gui = server.gui
         self._told_at = -math.inf
         self._told = ""
-        self._readout = self._gui.add_html(readout.page(model, state))
+        self._readout = self._gui.add_html(readout.page(self._arm, state))
         add_views(self._gui, shows)
-        if not model.collides:
+        if not robot.collides:
             self._gui.add_markdown(UNCHECKED)
         with self._gui.add_folder("Joints"):
-            self._sliders = [self._joint(axis, state) for axis in range(model.arm.chain.n)]
-            self._gripper = self._finger(state) if model.arm.gripper.moves else None
+            self._sliders = [self._joint(axis, state) for axis in range(self._arm.chain.n)]
+            self._gripper = self._finger(state) if self._arm.gripper.moves else None
         self._gestures = self._gui.add_button_group(
             "Drive",
             tuple(GESTURES),
@@ -79,7 +79,7 @@ class Panel:
         with self._gui.add_folder("Pose by numbers"):
             self._pose_form(state)
         with self._gui.add_folder("Branches", expand_by_default=False):
-            self._branches = BranchList(server, model, find, self._on_person, state)
+            self._branches = BranchList(server, robot, find, self._on_person, state)
         with self._gui.add_folder("Show", expand_by_default=False):
             add_shows(self._gui, shows)
         with self._gui.add_folder("Why", expand_by_default=False):
@@ -100,7 +100,7 @@ class Panel:
         self._told_at = now
         if caught_up:
             self._set_controls(state)
-        page = readout.page(self._model, state)
+        page = readout.page(self._arm, state)
         if page != self._told:
             self._told = self._readout.content = page
         self._branches.follow(state, now)
@@ -119,7 +119,7 @@ class Panel:
             self._meaning.content = meaning
 
     def _joint(self, axis: int, state: State) -> viser.GuiSliderHandle[float]:
-        chain = self._model.arm.chain
+        chain = self._arm.chain
         lower, upper = ends(*(math.degrees(limit[axis]) for limit in (chain.lower, chain.upper)))
         slider = self._gui.add_slider(
             f"Axis {axis + 1}",
@@ -135,7 +135,7 @@ class Panel:
         return slider
 
     def _finger(self, state: State) -> viser.GuiSliderHandle[float]:
-        fingers = self._model.arm.gripper
+        fingers = self._arm.gripper
         named = millimetres if fingers.slides else degrees
         slider = self._gui.add_slider(
             "Gripper",
@@ -151,7 +151,7 @@ class Panel:
         return slider
 
     def _pose_form(self, state: State) -> None:
-        arm = self._model.arm
+        arm = self._arm
         T = forward(arm.chain_to(state.tool), state.goal)
         self._tool = self._gui.add_dropdown(
             "Tool",
@@ -191,11 +191,11 @@ class Panel:
         self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
 
     def _opening(self, angle: float) -> float:
-        fingers = self._model.arm.gripper
+        fingers = self._arm.gripper
         return 100.0 * (angle - fingers.lower) / (fingers.upper - fingers.lower)
 
     def _finger_angle(self, opening: float) -> float:
-        fingers = self._model.arm.gripper
+        fingers = self._arm.gripper
         return fingers.lower + opening / 100.0 * (fingers.upper - fingers.lower)
 
 

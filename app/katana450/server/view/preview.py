@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
 
 import numpy as np
 import viser
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.programs.order import Go, Use
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.timeline import Timeline
@@ -39,9 +39,9 @@ class Preview:
     They are sent when they are first wanted: their shapes are as much as a sixth of the page.
     """
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
+    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
         self._server = server
-        self._model = model
+        self._robot = robot
         self._way = server.scene.add_line_segments(
             "/path/preview",
             np.zeros((1, 2, 3), dtype=np.float32),
@@ -59,7 +59,7 @@ class Preview:
         """Draw ``program``, which begins with ``tool``; tells how long it is [s], 0 for nothing."""
         with self._lock:
             self._hide_ghosts()
-            ways = [] if program is None else _ways(self._model, program, tool)
+            ways = [] if program is None else _ways(self._robot.require_arm(), program, tool)
             if ways:
                 self._way.points = np.concatenate(ways).astype(np.float32)
             self._way.visible = bool(ways)
@@ -68,7 +68,7 @@ class Preview:
                 return 0.0
             if ghosts:
                 if self._sweep is None:
-                    self._sweep = GhostSweep(self._server, self._model)
+                    self._sweep = GhostSweep(self._server, self._robot)
                 self._sweep.show(self._timeline)
             return self._timeline.span
 
@@ -82,9 +82,9 @@ class Preview:
                 return
             if self._ghost is None:
                 self._ghost = GhostNodes(
-                    self._server, self._model, "/path/ghost", LOOK, LOOK_OPACITY
+                    self._server, self._robot, "/path/ghost", LOOK, LOOK_OPACITY
                 )
-            self._ghost.move(self._model.joint_angles(*timeline.at(t)))
+            self._ghost.move(self._robot.joint_values(*timeline.at(t)))
             self._ghost.show(True, LOOK)
 
     def begin(self) -> None:
@@ -103,15 +103,15 @@ class Preview:
 class GhostSweep:
     """The arm in several postures at once, each shape sent once and the first the faintest."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
-        self._model = model
+    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
+        self._robot = robot
         self._root = server.scene.add_frame("/path/sweep", show_axes=False, visible=False)
         still = np.tile((1.0, 0.0, 0.0, 0.0), (GHOSTS, 1)), np.zeros((GHOSTS, 3))
         self._nodes: list[tuple[str, viser.BatchedMeshHandle]] = [
             (
-                body.name,
+                link.name,
                 server.scene.add_batched_meshes_simple(
-                    f"/path/sweep/{body.name}{number}",
+                    f"/path/sweep/{link.name}{number}",
                     *surface(visual),
                     *still,
                     batched_colors=COLOUR,
@@ -123,14 +123,17 @@ class GhostSweep:
                     receive_shadow=False,
                 ),
             )
-            for body in model.bodies
-            for number, visual in enumerate(body.visuals)
-            if body.moves
+            for link in robot.links
+            for number, visual in enumerate(link.visuals)
+            if link.name in robot.moving
         ]
 
     def show(self, timeline: Timeline) -> None:
         """Postures evenly in time, from start to end."""
-        placed = [_poses(self._model, *each) for each in timeline.postures(GHOSTS)]
+        placed = [
+            self._robot.frames(self._robot.joint_values(*each))
+            for each in timeline.postures(GHOSTS)
+        ]
         for name, node in self._nodes:
             poses = np.array([each[name] for each in placed])
             wxyzs = np.array([so3.to_quaternion(T[:3, :3]) for T in poses], dtype=np.float32)
@@ -143,29 +146,15 @@ class GhostSweep:
             self._root.visible = False
 
 
-def _poses(model: RobotModel, q: FloatArray, fingers: float) -> dict[str, FloatArray]:
-    """Every link (4, 4) in the base frame by its name."""
-    angles = model.joint_angles(q, fingers)
-    found: dict[str, FloatArray] = {}
-    for body in model.bodies:
-        T: Any = (
-            body.T_parent_body if body.parent is None else found[body.parent] @ body.T_parent_body
-        )
-        if body.joint is not None:
-            T = T @ body.motion(angles[body.joint])
-        found[body.name] = T
-    return found
-
-
-def _ways(model: RobotModel, program: Program, tool: str) -> list[FloatArray]:
+def _ways(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
     """Of each plan the way of the tool, (PLACES, 2, 3) in the base frame [m]."""
     ways: list[FloatArray] = []
     for task in program.tasks:
         if isinstance(task.order, Use):
             tool = task.order.name
         elif isinstance(task.order, Go):
-            chain = model.arm.chain_to(tool)
+            chain = arm.chain_to(tool)
             postures = task.order.plan.postures(PLACES + 1)
-            points = [(model.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
+            points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
             ways.append(np.stack((points[:-1], points[1:]), axis=1))
     return ways

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import parse
@@ -70,7 +70,7 @@ class ProgramsPanel:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         steering: Steering,
         scripts: Scripts,
         state: Callable[[], State],
@@ -87,12 +87,12 @@ class ProgramsPanel:
         self._asking = threading.Lock()
         # Whether a person asked to see it before it runs.
         self._wanted = False
-        self._preview = Preview(server, model)
+        self._preview = Preview(server, robot)
         gui = server.gui
         with gui.add_folder("Programs", expand_by_default=False):
             names = tuple(scripts.paths)
             # First one that this arm can run: the library has a circle for the bare flange too.
-            fitting = (name for name in names if _suits(scripts, name, model))
+            fitting = (name for name in names if _suits(scripts, name, robot))
             self._choice = gui.add_dropdown(
                 "Script",
                 names,
@@ -224,10 +224,10 @@ def shown_seconds(duration: float) -> float:
     return math.ceil(round(duration / STEP, 6)) * STEP
 
 
-def _suits(scripts: Scripts, name: str, model: RobotModel) -> bool:
+def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
     """Whether the script can be read, and is not for an arm without the gripper there is."""
     try:
-        return not (parse(scripts.text(name)).bare and model.arm.gripper.moves)
+        return not (parse(scripts.text(name)).bare and robot.require_arm().gripper.moves)
     except KatanaError:
         return False
 

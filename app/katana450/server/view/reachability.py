@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 import viser
 
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError
 from katana450.extensions.export.reachability_file import StoredMap
 from katana450.extensions.reachability.colors import share_colors
@@ -33,16 +33,16 @@ class Cut(Enum):
 class ReachabilityCloud:
     """Hidden until a person asks for it."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel, stored: StoredMap) -> None:
+    def __init__(self, server: viser.ViserServer, robot: Robot, stored: StoredMap) -> None:
         """Raises ConfigurationError when ``stored`` is the map of another arm."""
-        if stored.robot != model.name:
+        if stored.robot != robot.name:
             raise ConfigurationError(
                 f"The map given with --workspace is of the arm {stored.robot!r}; this one is "
-                f"{model.name!r}. Make one with: katana450 workspace --urdf ... --out map.npz"
+                f"{robot.name!r}. Make one with: katana450 workspace --urdf ... --out map.npz"
             )
         self._server = server
         self._stored = stored
-        self._middle = float(model.T_base_shoulder[1, 3])
+        self._middle = float(robot.require_arm().T_base_shoulder[1, 3])
         self._node: viser.PointCloudHandle | None = None
         self._colors = share_colors(stored.share)
 

@@ -6,7 +6,7 @@ import math
 from html import escape
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -27,9 +27,9 @@ from katana450.server.view.texts import (
 ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
-def page(model: RobotModel, state: State) -> str:
+def page(arm: MountedArm, state: State) -> str:
     """The whole read-out for ``state``."""
-    chain = model.arm.chain_to(state.tool)
+    chain = arm.chain_to(state.tool)
     now, goal = (_numbers(forward(chain, q)) for q in (state.q, state.goal))
     rows = "".join(
         f"<tr><th>{name}</th><td data-now='{name}'>{a}</td><td data-goal='{name}'>{b}</td>"

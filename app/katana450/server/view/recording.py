@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.importers.meshes import Meshes
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.traces import Traces
@@ -43,14 +43,14 @@ page is unpacked in the browser, so it is changed there, on its way into the pag
 
 
 def recorded(
-    model: RobotModel, session: Session, states: Iterable[State], interval: float, title: str
+    robot: Robot, session: Session, states: Iterable[State], interval: float, title: str
 ) -> str:
     """HTML that shows ``states``, ``interval`` [s] apart, with a slider of the time."""
     # Nobody is let in: the server is there for what it would send.
     server = open_server(secrets.token_hex())
     try:
-        scenery = Scenery(server, model, session, load_props(), _ignore, Meshes())
-        traces = Traces(server, model)
+        scenery = Scenery(server, robot, session, load_props(), _ignore, Meshes())
+        traces = Traces(server, robot.require_arm())
         recording = server.get_scene_serializer()
         for number, state in enumerate(states):
             if number:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from katana450.arm.robot.mechanism import Shape
-from katana450.arm.robot.model import RobotModel
-from katana450.arm.robot.urdf_mechanism import shapes_of
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Shape
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -77,28 +76,25 @@ class _Sliding:
 class FrameTree:
     """One viser frame a link, nested as the links are; shapes are hung below by a subclass."""
 
-    def __init__(self, server: viser.ViserServer, root: str, model: RobotModel) -> None:
+    def __init__(self, server: viser.ViserServer, root: str, robot: Robot) -> None:
         """``root``: name of the node that carries the tree, for instance ``/arm``."""
         self._server = server
         self.root = server.scene.add_frame(root, show_axes=False)
         self.path: dict[str, str] = {}
         self._joints: list[_Jointed | _Sliding] = []
-        for body in model.bodies:
-            parent = root if body.parent is None else self.path[body.parent]
-            self.path[body.name] = f"{parent}/{body.name}"
-            straight = so3.to_quaternion(body.T_parent_body[:3, :3])
+        for link in robot.links:
+            parent = root if link.parent is None else self.path[link.parent]
+            self.path[link.name] = f"{parent}/{link.name}"
+            R, position, joint = link.T_parent_link[:3, :3], link.T_parent_link[:3, 3], link.joint
+            straight = so3.to_quaternion(R)
             frame = server.scene.add_frame(
-                self.path[body.name],
-                show_axes=False,
-                wxyz=straight,
-                position=body.T_parent_body[:3, 3],
+                self.path[link.name], show_axes=False, wxyz=straight, position=position
             )
-            if body.joint is not None and body.slides:
-                way = body.T_parent_body[:3, :3] @ body.axis
-                self._joints.append(_Sliding(body.joint, frame, body.T_parent_body[:3, 3], way))
-            elif body.joint is not None:
-                across = so3.quaternion_product(straight, (0.0, *body.axis))
-                self._joints.append(_Jointed(body.joint, frame, straight.tolist(), across.tolist()))
+            if joint is not None and joint.slides:
+                self._joints.append(_Sliding(joint.name, frame, position, R @ joint.axis))
+            elif joint is not None:
+                across = so3.quaternion_product(straight, (0.0, *joint.axis))
+                self._joints.append(_Jointed(joint.name, frame, straight.tolist(), across.tolist()))
 
     def move(self, angles: Mapping[str, float]) -> None:
         """Bring the links to the joint ``angles`` [rad or m]; sends only what changed."""
@@ -112,21 +108,21 @@ class FrameTree:
 class ArmNodes(FrameTree):
     """The arm itself: GLB files as they are, so that normals and materials are kept."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
-        super().__init__(server, "/arm", model)
+    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
+        super().__init__(server, "/arm", robot)
         self.shapes = {
-            body.name: [
-                _as_made(server, f"{self.path[body.name]}/shape{number}", visual)
-                for number, visual in enumerate(body.visuals)
+            link.name: [
+                _as_made(server, f"{self.path[link.name]}/shape{number}", visual)
+                for number, visual in enumerate(link.visuals)
             ]
-            for body in model.bodies
+            for link in robot.links
         }
         """Of each link, as they are made."""
-        self._visuals = {body.name: body.visuals for body in model.bodies}
+        self._links = {link.name: link for link in robot.links}
 
-    def surfaces(self, link: str) -> list[Shape]:
-        """What its shapes are, one a material."""
-        return [shape for visual in self._visuals[link] for shape in shapes_of(visual)]
+    def surfaces(self, link: str) -> Sequence[Shape]:
+        """Return the surfaces of a link, one per material."""
+        return self._links[link].shapes
 
 
 def _as_made(
@@ -161,27 +157,27 @@ class GhostNodes(FrameTree):
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         root: str,
         colour: Colour,
         opacity: float,
     ) -> None:
         """``root``: name of its node; it is made hidden."""
-        super().__init__(server, root, model)
+        super().__init__(server, root, robot)
         self.root.visible = False
         self._colour = colour
         self.shapes = [
             server.scene.add_mesh_simple(
-                f"{self.path[body.name]}/shape{number}",
+                f"{self.path[link.name]}/shape{number}",
                 *surface(visual),
                 color=colour,
                 opacity=opacity,
                 cast_shadow=False,
                 receive_shadow=False,
             )
-            for body in model.bodies
-            for number, visual in enumerate(body.visuals)
-            if body.moves
+            for link in robot.links
+            for number, visual in enumerate(link.visuals)
+            if link.name in robot.moving
         ]
 
     def show(self, visible: bool, colour: Colour) -> None:

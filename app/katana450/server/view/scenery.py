@@ -9,8 +9,8 @@ import viser
 from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import Props
+from katana450.arm.robot.robot import Robot
 from katana450.extensions.importers.meshes import Meshes
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.conduit import Conduits
@@ -27,7 +27,7 @@ class Scenery:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         session: Session,
         props: Props,
         put: Callable[[Command], None],
@@ -36,20 +36,20 @@ class Scenery:
         """``session``: knows where things are. ``put``: takes what is done with their handles.
         ``meshes``: those that things are of."""
         self._server = server
-        self._model = model
+        self._robot = robot
         self._session = session
         furnish(server)
         Workcell(server, props)
         self.things = ThingNodes(server, props, session.surroundings, put, meshes)
-        self.arm = ArmNodes(server, model)
-        self._conduits = Conduits(server, model, self.arm)
+        self.arm = ArmNodes(server, robot)
+        self._conduits = Conduits(server, robot.require_arm(), self.arm)
         # Made when there is water.
         self._water: WaterNodes | None = None
         self._around: WaterEnvironment | None = None
 
     def show(self, state: State) -> None:
         """Everything as ``state`` has it."""
-        angles = self._model.joint_angles(state.q, state.gripper)
+        angles = self._robot.joint_values(state.q, state.gripper)
         self.arm.move(angles)
         self._conduits.move(angles)
         self.things.follow(state)

@@ -8,8 +8,8 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import Props
+from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry.arrays import frozen
 from katana450.server.view.scene import surface
@@ -25,13 +25,13 @@ class Tint:
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         path: Mapping[str, str],
         props: Props,
     ) -> None:
         """``path``: the scene node of each link; a thing's is its name."""
         self._server = server
-        self._shapes = {body.name: (path[body.name], body.collisions) for body in model.bodies} | {
+        self._shapes = {link.name: (path[link.name], link.collisions) for link in robot.links} | {
             name: (f"/{name}", (Visual(frozen(np.eye(4)), frozen(np.ones(3)), mesh),))
             for name, mesh in (
                 ("table", props.table.mesh),

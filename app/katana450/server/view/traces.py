@@ -7,7 +7,7 @@ import numpy.typing as npt
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
@@ -39,8 +39,8 @@ Colours = npt.NDArray[np.uint8]
 class Traces:
     """Of the plan that is followed, until another one is. Nothing is sent of an arm at rest."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel) -> None:
-        self._T_base_shoulder = model.T_base_shoulder
+    def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
+        self._T_base_shoulder = arm.T_base_shoulder
         two = np.zeros((1, 2, 3), dtype=np.float32)
         self._desired = server.scene.add_line_segments(
             "/path/desired", two, DESIRED, thickness=0.003, visible=False

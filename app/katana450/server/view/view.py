@@ -11,8 +11,8 @@ import viser
 from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
-from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.errors import InputError
@@ -72,7 +72,7 @@ class View(Follower):
     def __init__(
         self,
         server: viser.ViserServer,
-        model: RobotModel,
+        robot: Robot,
         board: StatePublisher,
         mailbox: CommandSink,
         session: Session,
@@ -86,32 +86,32 @@ class View(Follower):
         """
         super().__init__(server, board, frame_rate)
         besides = ViewOptions() if besides is None else besides
-        server.gui.set_panel_label(title(model.name))
-        self._model = model
+        server.gui.set_panel_label(title(robot.name))
+        self._robot, self._arm = robot, robot.require_arm()
         self._mailbox = mailbox
         props = load_props()
-        self._scenery = Scenery(server, model, session, props, self._put_dragged, besides.meshes)
+        self._scenery = Scenery(server, robot, session, props, self._put_dragged, besides.meshes)
         state = board.snapshot.state
         self._paint = PaintNodes(server, self._scenery.arm)
-        self._tint = Tint(server, model, self._scenery.arm.path, props)
-        self._ghost = GhostNodes(server, model, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
+        self._tint = Tint(server, robot, self._scenery.arm.path, props)
+        self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
-        self._traces = Traces(server, model)
-        self._gizmo = Gizmo(server, model, self._put_dragged, lambda: board.snapshot.state)
-        self._ellipsoid = Ellipsoid(server, model)
+        self._traces = Traces(server, self._arm)
+        self._gizmo = Gizmo(server, self._arm, self._put_dragged, lambda: board.snapshot.state)
+        self._ellipsoid = Ellipsoid(server, self._arm)
         cloud = (
             None
             if besides.workspace is None
-            else ReachabilityCloud(server, model, besides.workspace)
+            else ReachabilityCloud(server, robot, besides.workspace)
         )
-        self._cameras = Cameras(server, model)
+        self._cameras = Cameras(server, self._arm)
         shows = Shows(
             self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, cloud
         )
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
-        self._panel = Panel(server, model, mailbox.put, session.choices, shows, state)
+        self._panel = Panel(server, robot, mailbox.put, session.choices, shows, state)
         self._objects = ObjectsPanel(
             server, mailbox.put, lambda: board.snapshot.state, session.surroundings
         )
@@ -119,7 +119,7 @@ class View(Follower):
         if besides.programs is not None:
             steering, scripts = besides.programs
             self._programs = ProgramsPanel(
-                server, model, steering, scripts, lambda: board.snapshot.state
+                server, robot, steering, scripts, lambda: board.snapshot.state
             )
         self.show(board.snapshot)
 
@@ -164,12 +164,12 @@ class View(Follower):
         visible = away or state.status is not Status.OK
         self._ghost.show(visible, GHOST_COLOURS[state.status])
         if visible:
-            self._ghost.move(self._model.joint_angles(state.goal, state.gripper_goal))
+            self._ghost.move(self._robot.joint_values(state.goal, state.gripper_goal))
         # A goal is never written to: another one is another array.
         if state.goal is not self._goal or state.tool != self._tool:
             self._goal, self._tool = state.goal, state.tool
-            chain = self._model.arm.chain_to(state.tool)
-            self._T_base_goal = self._model.T_base_shoulder @ forward(chain, state.goal)
+            chain = self._arm.chain_to(state.tool)
+            self._T_base_goal = self._arm.T_base_shoulder @ forward(chain, state.goal)
             self._gizmo.aim(state, self._T_base_goal)
         self._gizmo.follow()
         self._gap.show(self._wished(state), self._T_base_goal[:3, 3])
@@ -183,5 +183,5 @@ class View(Follower):
                 p = T[:3, 3]
             case _:
                 return None
-        T_base_shoulder = self._model.T_base_shoulder
+        T_base_shoulder = self._arm.T_base_shoulder
         return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]

@@ -1,0 +1,151 @@
+"""The arm in a URDF: its five axes as an exact chain, with tools, fingers and conduit."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.robot.conduit import Hinge, read_stretches
+from katana450.arm.robot.gripper import Fingers, fingers_of
+from katana450.arm.robot.link import Link
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.structure import structure_of
+from katana450.arm.robot.urdf import Urdf, UrdfJoint
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.maths.geometry import screws, se3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.ideal import idealised
+
+SHOULDER_FRAME = "shoulder_frame"
+"""The link that is the paper's frame {S}."""
+
+CONDUITS = "conduits.json"
+"""File beside the URDF that says where its conduit is held."""
+
+
+def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> MountedArm:
+    """Return the arm that ``urdf`` describes.
+
+    Args:
+        links: the tree made of it.
+        path: of the file, for error messages; its conduits are described beside it.
+        tool: link that targets are set for by default; None for the first of TOOL_FRAMES there
+            is, else the outermost link the arm carries.
+
+    Raises:
+        RobotDescriptionError: it is none that the kinematics accept, or its conduits are not
+            described rightly; says what is wrong.
+    """
+    frames = urdf.frames()
+    structure = structure_of(urdf, path, tool)
+    joints = structure.axes
+    T_base_shoulder = _shoulder_frame(frames, joints)
+    T_shoulder_base = se3.inverse(T_base_shoulder)
+    described = Chain(
+        M=T_shoulder_base @ frames[structure.tools[0]],
+        S=np.column_stack([_screw(j, T_shoulder_base @ frames[j.child]) for j in joints]),
+        lower=np.array([_limit(joint, "lower") for joint in joints]),
+        upper=np.array([_limit(joint, "upper") for joint in joints]),
+        speed=np.array([_limit(joint, "velocity") for joint in joints]),
+        names=tuple(joint.name for joint in joints),
+    )
+    up = T_shoulder_base[:3, 2]
+    chain, notes = idealised(described, up)
+    tools = {
+        link: idealised(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
+        for link in structure.tools
+    }
+    fingers = fingers_of(structure.hand, structure.others, frames)
+    notes = [*notes, *fingers.notes]
+    if structure.chosen and fingers.driven:
+        notes.append(_taken_for_gripper(fingers, structure.tools[0]))
+    return MountedArm(
+        chain=chain,
+        tools=tools,
+        default_tool=structure.tools[0],
+        gripper=fingers.gripper,
+        T_base_shoulder=frozen(T_base_shoulder),
+        fingers=fingers.follow,
+        resting=fingers.resting,
+        stretches=read_stretches(
+            path.parent / CONDUITS,
+            lambda start, end: _hinge(links, chain, fingers.resting, start, end),
+        ),
+        notes=tuple(notes),
+    )
+
+
+def _taken_for_gripper(fingers: Fingers, tool: str) -> str:
+    names = ", ".join(map(repr, fingers.driven))
+    if len(fingers.driven) == 1:
+        return f"Joint {names} is taken for that of a gripper; {tool!r} is the tool."
+    return (
+        f"Joints {names} are taken for those of a gripper and driven together; "
+        f"{tool!r} is the tool."
+    )
+
+
+def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[UrdfJoint]) -> FloatArray:
+    """{S}: the link of that name, else parallel to the root where axis 1 passes axis 2."""
+    if SHOULDER_FRAME in frames:
+        return frames[SHOULDER_FRAME]
+    one, two = (_screw(joint, frames[joint.child]) for joint in joints[:2])
+    p1, p2 = screws.point_on(one), screws.point_on(two)
+    # The foot on axis 1 of the common normal of the two lines.
+    normal = np.cross(one[:3], two[:3])
+    size = float(normal @ normal)
+    along = float(np.cross(p2 - p1, two[:3]) @ normal) / size if size > 0.0 else 0.0
+    return se3.from_rotation_translation(np.eye(3), p1 + along * one[:3])
+
+
+def _screw(joint: UrdfJoint, T_shoulder_child: FloatArray) -> FloatArray:
+    """The joint's screw axis (6,) in {S}; a URDF joint turns about an axis of its child's frame."""
+    direction = T_shoulder_child[:3, :3] @ joint.axis
+    try:
+        return screws.revolute(direction, T_shoulder_child[:3, 3])
+    except InputError as error:
+        raise RobotDescriptionError(
+            f"Joint {joint.name!r} is not described rightly. {error}"
+        ) from error
+
+
+def _limit(joint: UrdfJoint, which: str) -> float:
+    if joint.type == "continuous" and which in ("lower", "upper"):
+        return math.pi if which == "upper" else -math.pi
+    value = None if joint.limit is None else getattr(joint.limit, which)
+    if value is None:
+        raise RobotDescriptionError(f"Joint {joint.name!r} has no {which} limit.")
+    return float(value)
+
+
+def _hinge(
+    links: Sequence[Link], chain: Chain, resting: Mapping[str, float], start: str, end: str
+) -> Hinge:
+    """The one joint between two links; KeyError when there is not one."""
+    by_name = {link.name: link for link in links}
+    path: list[Link] = []
+    name: str | None = end
+    while name != start:
+        if name is None:
+            raise KeyError(f"{end} does not hang on {start}")
+        path.insert(0, by_name[name])
+        name = path[0].parent
+    joints = [link.joint.name if link.joint is not None else "" for link in path]
+    driven = [i for i, joint in enumerate(joints) if joint in chain.names]
+    if len(driven) != 1:
+        raise KeyError(f"there are {len(driven)} driven joints between {start} and {end}, not one")
+    (at,) = driven
+    before, after = (
+        functools.reduce(np.matmul, (link.at_rest(resting) for link in some), np.eye(4))
+        for some in (path[: at + 1], path[at + 1 :])
+    )
+    joint = path[at].joint
+    assert joint is not None
+    number = chain.names.index(joint.name)
+    lower, upper = float(chain.lower[number]), float(chain.upper[number])
+    return Hinge(joint.name, joint.axis, lower, upper, before, after)

@@ -1,0 +1,91 @@
+"""A link of a robot and the joint it hangs on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from katana450.arm.robot.surfaces import Shape, main_colour, shapes_of
+from katana450.arm.robot.visual import Visual
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """The movable connection of a link to its parent.
+
+    Attributes:
+        name: of the joint.
+        slides: whether it is prismatic; else it turns.
+        axis: (3,) unit direction in the frame of its link.
+        lower, upper: limits [rad] or [m], infinite where there are none.
+        leader: the joint whose value it follows; its own name when it is driven itself.
+        factor, offset: value = factor * leader + offset.
+        speed: maximum [rad/s] or [m/s], infinite where the file states none.
+    """
+
+    name: str
+    slides: bool
+    axis: FloatArray
+    lower: float
+    upper: float
+    leader: str
+    factor: float = 1.0
+    offset: float = 0.0
+    speed: float = math.inf
+
+    def motion(self, value: float) -> FloatArray:
+        """Return the pose (4, 4) that the joint adds at ``value`` [rad] or [m]."""
+        if self.slides:
+            return se3.from_rotation_translation(np.eye(3), value * self.axis)
+        return se3.from_rotation_translation(so3.exp(value * self.axis), np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid body of a robot.
+
+    Attributes:
+        parent: name of the link it hangs on; the root has none.
+        T_parent_link: (4, 4) pose in its parent at zero [m].
+        joint: None when it is fixed.
+        visuals: its shapes as the file has them.
+        collisions: the shapes that stand for it where contacts are looked for.
+        mass: [kg], 0 where the file states none. center: (3,) of mass in its own frame [m].
+    """
+
+    name: str
+    parent: str | None
+    T_parent_link: FloatArray
+    joint: Joint | None
+    visuals: tuple[Visual, ...]
+    collisions: tuple[Visual, ...]
+    mass: float
+    center: FloatArray
+
+    def at_rest(self, resting: Mapping[str, float]) -> FloatArray:
+        """Return its pose (4, 4) in its parent with its joint at its value of ``resting``.
+
+        At zero where ``resting`` [rad or m] has none.
+        """
+        if self.joint is None or not (value := resting.get(self.joint.name, 0.0)):
+            return self.T_parent_link
+        return self.T_parent_link @ self.joint.motion(value)
+
+    @cached_property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The surfaces of its visuals, read on first use.
+
+        Raises RobotDescriptionError for a mesh file that cannot be read.
+        """
+        return tuple(shape for visual in self.visuals for shape in shapes_of(visual))
+
+    @cached_property
+    def colour(self) -> tuple[float, float, float]:
+        """sRGB 0..1 of most of its surface; PLAIN without shapes."""
+        return main_colour(self.shapes)

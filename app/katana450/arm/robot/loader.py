@@ -1,0 +1,138 @@
+"""Reads a robot from its URDF file, once for everything that is made of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.robot.arm_reader import arm_in
+from katana450.arm.robot.description import checked, explained
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.urdf import Urdf, UrdfJoint, urdf_of
+from katana450.arm.robot.visual import rods
+from katana450.errors import RobotDescriptionError
+from katana450.maths.geometry.arrays import frozen
+from katana450.resources import URDF_PATH
+
+MOVABLE = {"revolute": False, "continuous": False, "prismatic": True}
+"""Types of joint that are understood, and whether each slides."""
+
+
+def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
+    """Read the robot in a URDF file.
+
+    Thin rods stand for a link without shapes that others hang on. Meshes are read on first use.
+
+    Args:
+        tool: link that targets are set for by default; None for the first of TOOL_FRAMES there
+            is, else the last link that hangs on five turning joints.
+
+    Raises:
+        RobotDescriptionError: the file cannot be read, or there is no arm with that ``tool``;
+            names what is wrong and its line.
+    """
+    root = checked(path)
+    with explained(path):
+        urdf = urdf_of(root, path.parent)
+        links, faults = _links_of(urdf, path)
+    arm, why = None, ""
+    try:
+        with explained(path):
+            arm = arm_in(urdf, links, path, tool)
+    except RobotDescriptionError as error:
+        if tool is not None:
+            raise
+        why = str(error)
+    missing = [mesh for link in urdf.links.values() for mesh in link.missing]
+    notes = tuple(f"There is no mesh at {mesh}." for mesh in dict.fromkeys(missing))
+    return Robot(urdf.name, links, arm, why, notes, faults)
+
+
+def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]]:
+    """The tree, parents first, and sentences on the joints in it that cannot be moved."""
+    above = {joint.child: joint for joint in urdf.joints.values()}
+    joints: dict[str, Joint] = {}
+    faults: list[str] = []
+    for described in urdf.joints.values():
+        try:
+            if described.type != "fixed":
+                joints[described.name] = _joint(path, described)
+        except RobotDescriptionError as error:
+            faults.append(str(error))
+    led: dict[str, Joint] = {}
+    for name, joint in joints.items():
+        try:
+            led[name] = _led(path, joint, joints)
+        except RobotDescriptionError as error:
+            faults.append(str(error))
+    links = []
+    for name in urdf.parents_first():
+        link, hung_by = urdf.links[name], above.get(name)
+        below = [joint.origin[:3, 3] for joint in urdf.joints.values() if joint.parent == name]
+        links.append(
+            Link(
+                name=name,
+                parent=None if hung_by is None else hung_by.parent,
+                T_parent_link=frozen(np.eye(4)) if hung_by is None else hung_by.origin,
+                joint=None if hung_by is None else led.get(hung_by.name),
+                visuals=link.visuals or rods(below),
+                collisions=link.collisions,
+                mass=link.mass,
+                center=link.center,
+            )
+        )
+    return tuple(links), tuple(faults)
+
+
+def _joint(path: Path, joint: UrdfJoint) -> Joint:
+    if joint.type not in MOVABLE:
+        raise RobotDescriptionError(
+            f"Joint {joint.name!r} of {path.name} is {joint.type}; "
+            f"joints that can be exported are fixed, {', '.join(MOVABLE)}."
+        )
+    size = float(np.linalg.norm(joint.axis))
+    if not 0.0 < size < math.inf:
+        raise RobotDescriptionError(f"Joint {joint.name!r} of {path.name} has no axis.")
+    lower, upper, speed = -math.inf, math.inf, math.inf
+    if joint.limit is not None:
+        if joint.type != "continuous":
+            lower = lower if joint.limit.lower is None else joint.limit.lower
+            upper = upper if joint.limit.upper is None else joint.limit.upper
+        speed = speed if joint.limit.velocity is None else joint.limit.velocity
+    leader, factor, offset = joint.name, 1.0, 0.0
+    if joint.mimic is not None:
+        leader, factor, offset = joint.mimic
+        if leader == joint.name:
+            raise RobotDescriptionError(f"Joint {joint.name!r} of {path.name} mimics itself.")
+    return Joint(
+        name=joint.name,
+        slides=MOVABLE[joint.type],
+        axis=frozen(joint.axis / size),
+        lower=lower,
+        upper=upper,
+        leader=leader,
+        factor=factor,
+        offset=offset,
+        speed=speed,
+    )
+
+
+def _led(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> Joint:
+    """``joint`` tied to the driven joint at the end of the row it follows."""
+    passed = [joint.name]
+    while joint.leader != passed[-1]:
+        above = joints.get(joint.leader)
+        if above is None or above.name in passed:
+            raise RobotDescriptionError(
+                f"Joint {joint.name!r} of {path.name} mimics {joint.leader!r}, "
+                "which no driven joint stands behind."
+            )
+        passed.append(above.name)
+        factor, offset = joint.factor * above.factor, joint.factor * above.offset + joint.offset
+        joint = replace(joint, leader=above.leader, factor=factor, offset=offset)
+    return joint

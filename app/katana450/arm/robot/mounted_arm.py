@@ -1,0 +1,63 @@
+"""The arm of a robot with its place in the robot: base, fingers and conduit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from katana450.arm.control.arm import Arm
+from katana450.arm.robot.conduit import Stretch
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.turns import in_limits_turn
+
+READY_ROOM = 0.05
+"""Fraction of a joint's range that the ready posture keeps from its limits."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MountedArm(Arm):
+    """A five-axis arm as part of a robot.
+
+    The control core takes it as the ``Arm`` that it is: ``Arm`` is a class of its own because the
+    core knows neither base frames nor links nor conduits.
+
+    Attributes:
+        T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table.
+        fingers: finger joints, the driven one first: value = factor * driven + offset [rad or m].
+        resting: value [rad or m] of every movable joint that the arm does not drive.
+        stretches: the free runs of the conduit, if it has one.
+        notes: sentences for a person on what was assumed about the file.
+    """
+
+    T_base_shoulder: FloatArray
+    fingers: Mapping[str, tuple[float, float]]
+    resting: Mapping[str, float]
+    stretches: tuple[Stretch, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def moves(self, joint: str) -> bool:
+        """Return whether the joint of that name is an axis or a finger."""
+        return joint in self.chain.names or joint in self.fingers
+
+    def ready(self, posture: Sequence[float]) -> FloatArray:
+        """The joint angles (5,) [rad] nearest inside the limits to a posture of the canonical arm.
+
+        ``posture``: (5,) [rad]; for the Katana these are its joint angles.
+        """
+        chain = self.chain
+        q = in_limits_turn(chain, arm_of(chain).joints(posture))
+        room = READY_ROOM * (chain.upper - chain.lower)
+        return np.clip(q, chain.lower + room, chain.upper - room)
+
+    def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
+        """Return the value of every movable joint of the robot [rad or m].
+
+        q: (n,) of the axes [rad]. gripper: of the driven finger joint [rad or m].
+        """
+        values = dict(zip(self.chain.names, (float(angle) for angle in q), strict=True))
+        for joint, (factor, offset) in self.fingers.items():
+            values[joint] = factor * gripper + offset
+        return {**values, **self.resting}

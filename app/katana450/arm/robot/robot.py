@@ -1,0 +1,246 @@
+"""The robot: a tree of links and joints, with an arm where the kinematics accept one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from katana450.arm.control.joints import Joints
+from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+
+SLACK = 1e-9
+"""[rad, m] By which a joint may seem to be beyond its limits."""
+
+SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
+"""[rad/s, m/s] Speed of a joint whose file states none."""
+
+QUARTER = math.pi / 2.0
+"""[rad, m] Range of a joint that is searched for the room a robot takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot as its URDF file describes it.
+
+    Attributes:
+        links: parents first; the first is the root.
+        arm: the part of it that brings a tool to poses; None where it can only be driven joint by
+            joint.
+        why: the reason for that in a sentence; empty where there is an arm.
+        notes: sentences for a person on what its files lack.
+        faults: sentences on joints that the tree holds at zero because it cannot move them.
+    """
+
+    name: str
+    links: tuple[Link, ...]
+    arm: MountedArm | None
+    why: str = ""
+    notes: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+    def require_arm(self) -> MountedArm:
+        """Return the arm. Raises RobotDescriptionError with the reason where there is none."""
+        if self.arm is None:
+            raise RobotDescriptionError(self.why)
+        return self.arm
+
+    def check_complete(self) -> None:
+        """Raise RobotDescriptionError if there is a joint that the tree cannot move."""
+        if self.faults:
+            raise RobotDescriptionError(self.faults[0])
+
+    def read_shapes(self) -> None:
+        """Read the meshes of every link now. Raises RobotDescriptionError for an unreadable one."""
+        for link in self.links:
+            len(link.shapes)
+
+    @cached_property
+    def joints(self) -> Mapping[str, Joint]:
+        """Every movable joint by its name."""
+        return {link.joint.name: link.joint for link in self.links if link.joint is not None}
+
+    @cached_property
+    def driven(self) -> tuple[str, ...]:
+        """The joints that follow no other, in the order of the links."""
+        return tuple(name for name, joint in self.joints.items() if joint.leader == name)
+
+    def children(self, link: Link) -> tuple[Link, ...]:
+        """The links that hang on it."""
+        return tuple(other for other in self.links if other.parent == link.name)
+
+    @cached_property
+    def home(self) -> Mapping[str, FloatArray]:
+        """(4, 4) of each link in the root at zero, where every joint adds nothing."""
+        return self.frames({})
+
+    def axis(self, joint: Joint) -> FloatArray:
+        """(3,) unit direction of ``joint`` in the root's frame at zero."""
+        link = next(link for link in self.links if link.joint is joint)
+        return self.home[link.name][:3, :3] @ joint.axis
+
+    def values(self, pose: Sequence[float]) -> dict[str, float]:
+        """The value of every joint [rad] or [m] for those of the first driven ones.
+
+        Driven joints that `pose` is too short for stay at zero, or at the limit next to it.
+        Raises InputError for more numbers than joints, no numbers, and values beyond the limits.
+        """
+        driven = self.driven
+        if len(pose) > len(driven):
+            raise InputError(
+                f"A pose of {self.name} has at most {len(driven)} numbers "
+                f"({', '.join(driven)}), not {len(pose)}."
+            )
+        numbers = finite_array(pose, (len(pose),), "The pose").tolist()
+        given = dict(zip(driven, numbers, strict=False))
+        for name, value in given.items():
+            self.check(name, value)
+        return self.every(given)
+
+    def check(self, name: str, value: float) -> None:
+        """InputError when `value` [rad] or [m] is beyond the limits of the driven joint `name`."""
+        joint = self.joints[name]
+        if not joint.lower - SLACK <= value <= joint.upper + SLACK:
+            unit = "m" if joint.slides else "rad"
+            raise InputError(
+                f"{name} cannot be at {value:g} {unit}; "
+                f"it goes from {joint.lower:g} to {joint.upper:g} {unit}."
+            )
+
+    def every(self, given: Mapping[str, float]) -> dict[str, float]:
+        """The value of every joint, from those of some driven ones."""
+        leaders = {name: self.joints[name] for name in self.driven}
+        at = {
+            name: given.get(name, min(max(0.0, joint.lower), joint.upper))
+            for name, joint in leaders.items()
+        }
+        return {
+            name: joint.factor * at[joint.leader] + joint.offset
+            for name, joint in self.joints.items()
+        }
+
+    def frames(self, values: Mapping[str, float]) -> dict[str, FloatArray]:
+        """(4, 4) of each link in the root; joints without a value add nothing."""
+        found: dict[str, FloatArray] = {}
+        for link in self.links:
+            T = link.T_parent_link
+            if link.parent is not None:
+                T = found[link.parent] @ T
+            if link.joint is not None and link.joint.name in values:
+                T = T @ link.joint.motion(values[link.joint.name])
+            found[link.name] = frozen(T)
+        return found
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest corner (3,) [m] of all shapes in the root.
+
+        At zero, and with one driven joint at a limit or between both.
+        """
+        poses = [self.every({})]
+        for name in self.driven:
+            joint = self.joints[name]
+            ends = [max(joint.lower, -QUARTER), min(joint.upper, QUARTER)]
+            poses += [self.every({name: value}) for value in (*ends, sum(ends) / 2.0)]
+        corners = [np.zeros((1, 3))]
+        for frames in map(self.frames, poses):
+            for link in self.links:
+                T = frames[link.name]
+                corners += [shape.corners @ T[:3, :3].T + T[:3, 3] for shape in link.shapes]
+        points = np.concatenate(corners)
+        return points.min(axis=0), points.max(axis=0)
+
+    @property
+    def collides(self) -> bool:
+        """Whether any link has a shape to look for contacts with."""
+        return any(link.collisions for link in self.links)
+
+    @cached_property
+    def moving(self) -> frozenset[str]:
+        """The links that a driven joint moves, directly or through their parents."""
+        found: set[str] = set()
+        for link in self.links:
+            joint = link.joint
+            moved = joint is not None and (self.arm is None or self.arm.moves(joint.name))
+            if moved or link.parent in found:
+                found.add(link.name)
+        return frozenset(found)
+
+    def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
+        """Return the value of every movable joint [rad] or [m].
+
+        q: (n,) values of the axes of the arm, or without an arm of the driven joints.
+        gripper: value of the driven finger joint of the arm.
+        """
+        if self.arm is None:
+            return self.every(dict(zip(self.driven, q.tolist(), strict=True)))
+        return self.arm.joint_values(q, gripper)
+
+    def distance(self, q: FloatArray, to: FloatArray) -> float:
+        """Return how far the origin of any link is between two vectors of driven joints [m]."""
+        here, there = (self.frames(self.joint_values(each, 0.0)) for each in (q, to))
+        return max(math.dist(here[name][:3, 3], there[name][:3, 3]) for name in here)
+
+    @cached_property
+    def joint_group(self) -> Joints:
+        """The driven joints within limits that their followers keep too.
+
+        An endless joint is given half a turn either way. Raises RobotDescriptionError where there
+        is no joint to drive, or one that the tree cannot move or has no room.
+        """
+        self.check_complete()
+        driven = [self.joints[name] for name in self.driven]
+        if not driven:
+            raise RobotDescriptionError(f"{self.name} has no joint that could be driven.")
+        ranges = np.array([self._range(joint) for joint in driven])
+        return Joints(
+            names=self.driven,
+            slides=tuple(joint.slides for joint in driven),
+            lower=frozen(ranges[:, 0]),
+            upper=frozen(ranges[:, 1]),
+            speed=frozen([_speed(joint) for joint in driven]),
+            why=self.why,
+        )
+
+    @property
+    def joint_notes(self) -> tuple[str, ...]:
+        """Sentences for a person on what was assumed about the driven joints."""
+        return tuple(
+            f"Joint {joint.name!r} has no speed of its own: {_speed(joint):g} "
+            f"{'m/s' if joint.slides else 'rad/s'}."
+            for joint in map(self.joints.__getitem__, self.driven)
+            if _speed(joint) != joint.speed
+        )
+
+    def _range(self, driven: Joint) -> tuple[float, float]:
+        """Where ``driven`` [rad, m] and all that follow it are inside their limits."""
+        low, high = -math.inf, math.inf
+        for joint in self.joints.values():
+            if joint.leader != driven.name or joint.factor == 0.0:
+                continue
+            ends = sorted((end - joint.offset) / joint.factor for end in (joint.lower, joint.upper))
+            low, high = max(low, ends[0]), min(high, ends[1])
+        if not driven.slides:
+            low, high = (
+                -math.pi if low == -math.inf else low,
+                math.pi if high == math.inf else high,
+            )
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise RobotDescriptionError(
+                f"Joint {driven.name!r} of {self.name} cannot be driven: with all that follows it "
+                f"it goes from {low:g} to {high:g}. Give it limits with room between them."
+            )
+        return low, high
+
+
+def _speed(joint: Joint) -> float:
+    """[rad/s] or [m/s], slow where none is stated."""
+    if 0.0 < joint.speed < math.inf:
+        return joint.speed
+    return SLOW_SLIDE if joint.slides else SLOW_TURN

@@ -1,0 +1,141 @@
+"""The surfaces of a robot's shapes: triangles of one material each."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.robot.visual import Visual, unreadable_mesh
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+EDGE = math.radians(30.0)
+"""Between two triangles, from which on they are shaded apart."""
+
+
+class Material(NamedTuple):
+    """Optical properties: sRGB color 0..1, glTF's factors metallic and rough 0..1."""
+
+    name: str
+    colour: tuple[float, float, float]
+    metallic: float = 0.0
+    rough: float = 0.6
+
+    @property
+    def gleam(self) -> float:
+        """Grey of the highlight 0..1, in formats that know no metal: smooth metal has the most."""
+        return (1.0 - self.rough) * (0.3 + 0.5 * self.metallic)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Triangles of one material.
+
+    vertices, normals: (n, 3), [m] and of unit length, in the frame of their link. faces: (m, 3)
+    indices of both, counter-clockwise seen from outside.
+    """
+
+    material: Material
+    vertices: FloatArray
+    normals: FloatArray
+    faces: npt.NDArray[np.int64]
+
+    @cached_property
+    def area(self) -> float:
+        """[m^2]"""
+        a, b, c = np.moveaxis(self.vertices[self.faces], 1, 0)
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """(8, 3) of the box round it."""
+        ends = (self.vertices.min(axis=0), self.vertices.max(axis=0))
+        return np.array(list(itertools.product(*np.transpose(ends).tolist())))
+
+
+PLAIN = (0.8, 0.8, 0.8)
+"""The colour that VRML gives what says none."""
+
+
+def main_colour(shapes: Sequence[Shape]) -> tuple[float, float, float]:
+    """sRGB 0..1 of most of their surface; PLAIN where there are none."""
+    areas: dict[Material, float] = {}
+    for shape in shapes:
+        areas[shape.material] = areas.get(shape.material, 0.0) + shape.area
+    return max(areas, key=areas.__getitem__).colour if areas else PLAIN
+
+
+def shapes_of(visual: Visual) -> Sequence[Shape]:
+    """Return the surfaces of ``visual``, one per material, in the frame of its link.
+
+    Raises RobotDescriptionError for a mesh file that cannot be read.
+    """
+    plain = Material(
+        "plain {:02x}{:02x}{:02x}".format(*visual.colour),
+        (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),
+    )
+    if not isinstance(visual.source, Path):
+        return [_shape(_edged(visual.mesh), np.eye(4), plain)]
+    import trimesh
+
+    bare = visual.source.suffix.lower() == ".stl"
+    T = visual.T_body_visual @ np.diag([*visual.scale, 1.0])
+    try:
+        scene = trimesh.load_scene(visual.source)
+    except Exception as error:
+        raise unreadable_mesh(visual.source) from error
+    shapes = []
+    for node in scene.graph.nodes_geometry:
+        T_file, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+            made = _edged(mesh) if bare else mesh
+            shapes.append(_shape(made, T @ T_file, _material(mesh, plain)))
+    return shapes
+
+
+def _edged(mesh: Any) -> Any:
+    """A mesh that brings no normals of its own, with those of a smooth surface up to an edge."""
+    import trimesh
+
+    return trimesh.graph.smooth_shade(mesh, angle=EDGE)
+
+
+def _shape(mesh: Any, T: FloatArray, material: Material) -> Shape:
+    A = T[:3, :3]
+    normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(A)
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.where(size > 0.0, normals / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
+    faces = np.asarray(mesh.faces, dtype=np.int64)
+    # A mirrored shape would show its inside.
+    faces = faces[:, ::-1] if np.linalg.det(A) < 0.0 else faces
+    vertices = np.asarray(mesh.vertices) @ A.T + T[:3, 3]
+    return Shape(material, frozen(vertices), frozen(normals), faces)
+
+
+def _material(mesh: Any, plain: Material) -> Material:
+    material = getattr(mesh.visual, "material", None)
+    if material is None:
+        return plain
+    factor = getattr(material, "baseColorFactor", None)
+    if factor is None:
+        red, green, blue = (float(part) / 255.0 for part in material.main_color[:3])
+        return Material(str(material.name or plain.name), (red, green, blue))
+    red, green, blue = (_srgb(float(part) / 255.0) for part in np.asarray(factor)[:3])
+    metallic, rough = (
+        default if value is None else float(value)
+        for value, default in ((material.metallicFactor, 1.0), (material.roughnessFactor, 1.0))
+    )
+    return Material(str(material.name or plain.name), (red, green, blue), metallic, rough)
+
+
+def _srgb(linear: float) -> float:
+    """IEC 61966-2-1, for glTF tells colours as light."""
+    return 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1.0 / 2.4) - 0.055
