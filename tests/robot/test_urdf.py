@@ -1,0 +1,174 @@
+"""A URDF is read as yourdfpy reads it, once, and without a mesh library."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from katana450.arm.robot.description import checked
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.urdf import Urdf, urdf_of
+from katana450.arm.robot.visual import GREY
+from katana450.errors import RobotDescriptionError
+from katana450.extensions.export.c_source import c_files
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.vrml import vrml_files
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+from tests.exchange.conftest import GANTRY
+from tests.exchange.trees import tree
+from tests.robot.public_arms import PX150, J, urdf, written
+
+ARMS = Path(__file__).parent / "arms"
+
+EVERYTHING = """<robot name="all of it">
+  <material name="sky"><color rgba="0.2 0.4 1.0 0.5"/></material>
+  <material name="none"/>
+  <link name="root">
+    <inertial><origin xyz="0.1 -0.2 0.3" rpy="1 2 3"/><mass value="2.5"/></inertial>
+    <visual><origin rpy="0.3 -1.1 2.9"/><geometry><box size="0.1,0.2, 0.3"/></geometry>
+      <material name="sky"/></visual>
+    <visual><geometry><sphere radius="0.1"/></geometry>
+      <material name="own"><color rgba="0 1.5 0.5"/></material></visual>
+    <visual><geometry><cylinder radius="0.1" length="0.4"/></geometry>
+      <material name="none"/></visual>
+    <collision><origin xyz="1 2 3"/><geometry><box size="1 2 3"/></geometry></collision>
+  </link>
+  <link name="led"/><link name="leader"/><link name="endless"/><link name="held"/>
+  <joint name="a" type="revolute"><parent link="root"/><child link="led"/>
+    <origin xyz="0.1 0 0" rpy="0.4 1.57079632679 -3"/><axis xyz="0 3 4"/>
+    <limit upper="1.5" effort="1"/><mimic joint="b"/></joint>
+  <joint name="b" type="prismatic"><parent link="led"/><child link="leader"/>
+    <limit lower="-0.1" upper="0.2" velocity="0.3" effort="1"/></joint>
+  <joint name="c" type="continuous"><parent link="leader"/><child link="endless"/>
+    <origin xyz="0 0 1"/><mimic joint="b" multiplier="-2" offset="0.25"/></joint>
+  <joint name="d" type="fixed"><parent link="endless"/><child link="held"/>
+    <origin rpy="-1 0.5 0.25"/></joint>
+</robot>"""
+
+
+@pytest.fixture
+def everything(tmp_path: Path) -> Path:
+    path = tmp_path / "all.urdf"
+    path.write_text(EVERYTHING)
+    return path
+
+
+def read(path: Path) -> Urdf:
+    return urdf_of(checked(path), path.parent)
+
+
+def paths(tmp_path: Path) -> Iterator[Path]:
+    yield from (URDF_PATH, GANTRY, *sorted(ARMS.glob("*.urdf")))
+    for seed in range(5):
+        path = tmp_path / f"tree{seed}.urdf"
+        path.write_text(tree(seed, 8))
+        yield path
+
+
+def test_every_joint_is_that_of_yourdfpy(everything: Path, tmp_path: Path) -> None:
+    for path in (everything, *paths(tmp_path)):
+        peer = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False)
+        found = read(path)
+        assert list(found.links) == list(peer.link_map)
+        assert list(found.joints) == list(peer.joint_map)
+        for name, joint in found.joints.items():
+            other = peer.joint_map[name]
+            assert (joint.type, joint.parent, joint.child) == (
+                other.type, other.parent, other.child
+            )  # fmt: skip
+            origin = np.eye(4) if other.origin is None else other.origin
+            # The same bits: exported files must not change with the reader.
+            np.testing.assert_array_equal(joint.origin, origin)
+            np.testing.assert_array_equal(joint.axis, other.axis)
+            assert (joint.limit is None) == (other.limit is None)
+            if joint.limit is not None:
+                limit = other.limit
+                assert joint.limit == (limit.lower, limit.upper, limit.velocity)
+            assert (joint.mimic is None) == (other.mimic is None)
+            if joint.mimic is not None:
+                mimic = other.mimic
+                assert joint.mimic == (mimic.joint, mimic.multiplier, mimic.offset)
+
+
+def test_links_have_their_shapes_colors_and_mass(everything: Path) -> None:
+    root = read(everything).links["root"]
+    assert [visual.colour for visual in root.visuals] == [(51, 102, 255), (0, 255, 128), GREY]
+    box, ball, can = (visual.mesh for visual in root.visuals)
+    assert box.volume == pytest.approx(0.1 * 0.2 * 0.3)
+    assert ball.extents == pytest.approx((0.2, 0.2, 0.2), abs=2e-3)
+    assert can.extents == pytest.approx((0.2, 0.2, 0.4), abs=2e-3)
+    (collision,) = root.collisions
+    assert collision.mesh.bounds.tolist() == [[0.5, 1.0, 1.5], [1.5, 3.0, 4.5]]
+    assert (root.mass, root.center.tolist()) == (2.5, [0.1, -0.2, 0.3])
+
+
+@pytest.mark.parametrize("path", [URDF_PATH, GANTRY])
+def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[object] = []
+    create = expat.ParserCreate
+
+    def counted(*args: str | None, **options: str | None) -> expat.XMLParserType:
+        opened.append(args)
+        return create(*args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(expat, "ParserCreate", counted)
+    robot = load(path)
+    values = robot.values(())
+    for files in (vrml_files(robot, values), c_files(robot, values), glb_files(robot, values)):
+        assert all(files.values())
+    assert len(opened) == 1
+
+
+def test_reading_loads_no_mesh_library() -> None:
+    script = (
+        "import sys; from katana450.arm.robot.loader import load; load();"
+        "print([name for name in ('trimesh', 'yourdfpy', 'coal', 'viser') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_robot_without_arm_says_why() -> None:
+    robot = load(GANTRY)
+    assert robot.arm is None
+    with pytest.raises(RobotDescriptionError, match=r"gantry\.urdf has 2 axes \(rail"):
+        robot.require_arm()
+    assert robot.why.startswith("gantry.urdf has 2 axes")
+    assert load().why == ""
+
+
+def test_joint_that_cannot_be_moved_rests_in_an_arm_and_in_no_export(tmp_path: Path) -> None:
+    loose = J("afloat", "floating", "base", "buoy", (0.0, 0.0, 0.1))
+    robot = load(written(tmp_path, "arm", [*PX150, loose]))
+    arm = robot.require_arm()
+    assert "Joint 'afloat' is floating and stays at zero." in arm.notes
+    ready = robot.frames(robot.joint_values(arm.ready(Settings().ready), 0.0))
+    assert ready["buoy"][2, 3] == pytest.approx(0.1)
+    with pytest.raises(RobotDescriptionError, match=r"'afloat' of arm\.urdf is floating"):
+        robot.check_complete()
+
+
+def test_links_of_any_order_are_sorted_from_the_root(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    whole = urdf("arm", PX150)
+    path.write_text(whole)
+    before = load(path)
+    base = '<link name="base"/>'
+    assert base in whole
+    path.write_text(whole.replace(base, "").replace("</robot>", f"{base}</robot>"))
+    after = load(path)
+    assert [link.name for link in after.links] == [link.name for link in before.links]
+    known: set[str | None] = {None}
+    for link in after.links:
+        assert link.parent in known
+        known.add(link.name)
