@@ -19,7 +19,7 @@ PAGE = Path(__file__).with_name("api.md")
 PREFACE = """\
 # The API, version {version}
 
-<!-- Written by `python -m docs.api` from the shapes in api. -->
+<!-- Written by `python -m docs.api` from the shapes in app/katana450/server/api. -->
 
 What the page can ask of the arm a program can ask too, by the same rules: one holds the arm at a
 time, everybody may stop it, and whoever holds it gives ten signs of life a second. Each message is a
@@ -52,8 +52,7 @@ what else the state says is old, and `GET /health` answers with status 503.
 ## From Python
 
 ```python
-from katana450.server.api import answers
-from katana450.server.api import requests
+from katana450.server.api import answers, requests
 from katana450.client import connect
 
 with connect("http://127.0.0.1:8080", name="My script") as arm:
