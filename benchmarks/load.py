@@ -232,9 +232,10 @@ async def crowd(url: str, stops: int) -> None:
     pictures = [0]
     watchers = [lambda: watch(url, pictures)] * WATCHERS
     await turn(url, "nobody else", [], stops)
-    before = time.monotonic()
+    # A turn begins with a pause in which nobody watches.
+    begun = time.monotonic() + RECOVERY
     await turn(url, f"{WATCHERS} watchers", [*watchers], stops)
-    rate = pictures[0] / WATCHERS / (time.monotonic() - before)
+    rate = pictures[0] / WATCHERS / (time.monotonic() - begun)
     print(f"{'':20} {rate:.1f} pictures a second to each watcher")
     await turn(url, f"{FLOODS} who flood", [lambda: flood(url)] * FLOODS, stops)
     await turn(url, f"{SLOW} who read nothing", [lambda: crawl(url)] * SLOW, stops)
