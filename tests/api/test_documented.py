@@ -6,6 +6,7 @@ import json
 
 from docs.api import PAGE, page
 from katana450.server.api import answers, requests, schema
+from katana450.server.api.fields import tag_of
 
 
 def test_the_page_is_what_the_shapes_say() -> None:
@@ -16,7 +17,7 @@ def test_every_message_is_on_it_with_a_sentence() -> None:
     said = PAGE.read_text(encoding="utf-8")
     for union, tag in ((requests.AnyRequest, "do"), (answers.AnyAnswer, "is")):
         for kind in schema.kinds(union):
-            assert f'### `"{tag}": "{kind.__name__.lower()}"`' in said
+            assert f'### `"{tag}": "{tag_of(kind.__name__)}"`' in said
             assert len(schema.summary(kind)) > 5, kind
 
 

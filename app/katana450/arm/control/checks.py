@@ -25,7 +25,7 @@ def check(
         case cmd.SetAxes(values=values):
             for axis, value in values:
                 check(arm, pouring, surroundings, cmd.SetJoint(axis, value))
-        case cmd.Together(commands=commands):
+        case cmd.Batch(commands=commands):
             for each in commands:
                 check(arm, pouring, surroundings, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):

@@ -32,20 +32,23 @@ __all__ = [
     "LEAST_SPEED",
     "THINGS",
     "Attach",
+    "Batch",
+    "ClearStop",
     "Command",
     "Dress",
+    "EndDrag",
     "Fill",
     "Follow",
     "Furnish",
     "GoAlong",
+    "GoToZero",
+    "Hold",
     "Home",
     "Jog",
     "MoveTool",
     "Pause",
     "Place",
-    "Release",
     "Remove",
-    "Reset",
     "Resume",
     "Servo",
     "SetAxes",
@@ -55,13 +58,10 @@ __all__ = [
     "SetPose",
     "SetReading",
     "SetTool",
-    "Settle",
     "Shift",
     "SpeedScale",
     "Stop",
-    "Stretch",
     "TakeBranch",
-    "Together",
     "TurnTool",
 ]
 
@@ -207,8 +207,8 @@ class TakeBranch:
 
 
 @dataclass(frozen=True)
-class Settle:
-    """The hand lets go: what the arm can do becomes what is wished."""
+class EndDrag:
+    """End a drag: the nearest pose that the arm can reach becomes the target."""
 
 
 @dataclass(frozen=True)
@@ -217,23 +217,23 @@ class Home:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class GoToZero:
     """Drive to the zero posture, the arm stretched along x (paper, Fig. 2)."""
 
 
 @dataclass(frozen=True)
-class Reset:
-    """Forget the target: the arm holds where it is, and the gripper too."""
+class Hold:
+    """Come to rest and forget the targets of arm and gripper."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Come to rest as fast as the arm can, and stay until a person says Release."""
+    """Come to rest as fast as the arm can, and accept no motion until ClearStop."""
 
 
 @dataclass(frozen=True)
-class Release:
-    """After a stop: commands count again. Nothing moves by this."""
+class ClearStop:
+    """Accept motion again after a stop. Nothing moves by this."""
 
 
 @dataclass(frozen=True)
@@ -298,14 +298,14 @@ class Jog:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
-    """Several at once, in one tick: all of them, or none when one cannot be."""
+class Batch:
+    """Several commands in one tick: all of them, or none if one is invalid."""
 
     commands: tuple[Command, ...]
 
     def __post_init__(self) -> None:
-        if any(isinstance(each, Together) for each in self.commands):
-            raise InputError("Commands that are given together are single ones.")
+        if any(isinstance(each, Batch) for each in self.commands):
+            raise InputError("A batch cannot contain another batch: list its commands singly.")
 
 
 Command = (
@@ -320,12 +320,12 @@ Command = (
     | SetTool
     | SetReading
     | TakeBranch
-    | Settle
+    | EndDrag
     | Home
-    | Stretch
-    | Reset
+    | GoToZero
+    | Hold
     | Stop
-    | Release
+    | ClearStop
     | Pause
     | Resume
     | Follow
@@ -337,7 +337,7 @@ Command = (
     | Fill
     | Shift
     | Dress
-    | Together
+    | Batch
     | SpeedScale
     | Jog
 )

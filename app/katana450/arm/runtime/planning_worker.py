@@ -54,7 +54,7 @@ class PlanningWorker:
 
     def put(self, command: cmd.Command) -> int:
         """See ``CommandSink``; the command that follows a way found later has no ticket."""
-        said = command.commands if isinstance(command, cmd.Together) else (command,)
+        said = command.commands if isinstance(command, cmd.Batch) else (command,)
         if not all(isinstance(each, PASSIVE) for each in said):
             self.cancel()
         if not all(isinstance(each, PASSIVE + WAITING) for each in said):
@@ -100,7 +100,7 @@ class PlanningWorker:
     def _at_rest(self, cancelled: threading.Event) -> State:
         """The state of an arm that stands, which it is made to."""
         if self._board.snapshot.state.moving:
-            self._unless(cancelled, cmd.Reset())
+            self._unless(cancelled, cmd.Hold())
         end = time.monotonic() + REST_SECONDS
         snapshot = self._board.snapshot
         while snapshot.state.moving or snapshot.ticket < self._arm.last_ticket:

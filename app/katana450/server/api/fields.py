@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import Enum
 from typing import Annotated
 
@@ -89,8 +90,13 @@ class Order(Enum):
     """Run one step, then wait."""
     PAUSE = "pause"
     RESUME = "resume"
-    HALT = "halt"
+    END = "end"
     """Come to rest and end it."""
+
+
+def tag_of(name: str) -> str:
+    """Return the tag of the message class ``name``: ``ClearStop`` is ``clear_stop``."""
+    return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
 
 
 class Request(
@@ -99,8 +105,8 @@ class Request(
     forbid_unknown_fields=True,
     kw_only=True,
     tag_field="do",
-    tag=str.lower,
+    tag=tag_of,
 ):
-    """Any of them; ``do`` is the name of the class in small letters."""
+    """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it."""
 
     id: Id = None

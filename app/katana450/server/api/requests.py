@@ -57,14 +57,17 @@ __all__ = [
     "AnyRequest",
     "Ask",
     "Attach",
-    "Beat",
     "Branch",
+    "ClearStop",
+    "EndDrag",
     "Fill",
     "Form",
     "Frame",
     "Get",
     "Give",
+    "GoToZero",
     "Gripper",
+    "Heartbeat",
     "Hello",
     "Hold",
     "Home",
@@ -72,7 +75,6 @@ __all__ = [
     "Joint",
     "Joints",
     "Load",
-    "Look",
     "Mount",
     "Named",
     "Order",
@@ -81,20 +83,18 @@ __all__ = [
     "Pose",
     "Position",
     "Program",
+    "Query",
     "Read",
-    "Release",
+    "ReleaseLease",
     "Remove",
     "Request",
-    "Reset",
     "Resume",
     "Servo",
     "Set",
     "Setting",
-    "Settle",
     "Speed",
     "Steer",
     "Stop",
-    "Stretch",
     "Take",
     "Tool",
     "Turn",
@@ -112,8 +112,8 @@ class Hello(Request, frozen=True, kw_only=True):
     token: Annotated[str, Meta(max_length=400)] = ""
 
 
-class Beat(Request, frozen=True, kw_only=True):
-    """A sign of life; the number comes back, which gives the round trip.
+class Heartbeat(Request, frozen=True, kw_only=True):
+    """A heartbeat; the number comes back, which gives the round trip.
 
     Whoever holds the arm gives ten a second. Without them a moving arm is stopped.
     """
@@ -125,14 +125,14 @@ class Stop(Request, frozen=True, kw_only=True):
     """STOP: the arm comes to rest as fast as it can. Everybody may, at any time.
 
     Who says it again, for want of an answer, gives the same ``press``: it counts once, so that a
-    late one does not undo the reset that came in between.
+    late one does not undo the ``clear_stop`` that came in between.
     """
 
     press: Press = None
 
 
-class Reset(Request, frozen=True):
-    """End a stop. Nothing moves by it; old targets are gone."""
+class ClearStop(Request, frozen=True):
+    """Accept motion again after a stop. Nothing moves by it; old targets are gone."""
 
 
 class Acquire(Request, frozen=True):
@@ -151,8 +151,8 @@ class Withdraw(Request, frozen=True):
     """Ask no more."""
 
 
-class Release(Request, frozen=True):
-    """Give it up."""
+class ReleaseLease(Request, frozen=True):
+    """Give up the arm, so that others can have it."""
 
 
 class Give(Request, frozen=True, kw_only=True):
@@ -253,15 +253,15 @@ class Branch(Request, frozen=True, kw_only=True):
     elbow: Literal["up", "down"]
 
 
-class Settle(Request, frozen=True):
-    """What the arm can do becomes what is wished."""
+class EndDrag(Request, frozen=True):
+    """End a drag: the nearest pose that the arm can reach becomes the target."""
 
 
 class Home(Request, frozen=True):
     """Drive to the ready posture."""
 
 
-class Stretch(Request, frozen=True):
+class GoToZero(Request, frozen=True):
     """Drive to the zero posture, the arm stretched along x."""
 
 
@@ -296,11 +296,11 @@ class Program(Request, frozen=True, kw_only=True):
 
 
 class Steer(Request, frozen=True, kw_only=True):
-    """Run, step, pause, resume or halt the program that is planned.
+    """Run, step, pause, resume or end the program that is planned.
 
     It drives by itself, under its own name; its owner has to stay connected. While it is being
     planned, ``run`` and ``step`` take effect afterwards, unless the arm is told to move, hold or
-    stop in between; ``pause`` makes it start paused, and ``halt`` cancels the planning. A program
+    stop in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program
     that is to run from another posture or scene than it was planned for is planned anew first. An
     arm that is paused when a program begins stays paused until ``resume``.
     """
@@ -318,7 +318,7 @@ class Watch(Request, frozen=True, kw_only=True):
     fields: tuple[Named, ...] = ()
 
 
-class Look(Request, frozen=True, kw_only=True):
+class Query(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
     the things around it, the VRML world, where its links are."""
 
@@ -327,14 +327,14 @@ class Look(Request, frozen=True, kw_only=True):
 
 AnyRequest = (
     Hello
-    | Beat
+    | Heartbeat
     | Stop
-    | Reset
+    | ClearStop
     | Acquire
     | Take
     | Ask
     | Withdraw
-    | Release
+    | ReleaseLease
     | Give
     | Jog
     | Speed
@@ -348,9 +348,9 @@ AnyRequest = (
     | Tool
     | Read
     | Branch
-    | Settle
+    | EndDrag
     | Home
-    | Stretch
+    | GoToZero
     | Hold
     | Pause
     | Resume
@@ -364,7 +364,7 @@ AnyRequest = (
     | Program
     | Steer
     | Watch
-    | Look
+    | Query
 )
 
 _decoder: msgspec.json.Decoder[AnyRequest] = msgspec.json.Decoder(AnyRequest)

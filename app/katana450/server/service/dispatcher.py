@@ -20,10 +20,10 @@ from katana450.server.service.interfaces import Arm
 from katana450.server.service.object_requests import ObjectRequests
 
 BARE: dict[type[requests.AnyRequest], cmd.Command] = {
-    requests.Settle: cmd.Settle(),
+    requests.EndDrag: cmd.EndDrag(),
     requests.Home: cmd.Home(),
-    requests.Stretch: cmd.Stretch(),
-    requests.Hold: cmd.Reset(),
+    requests.GoToZero: cmd.GoToZero(),
+    requests.Hold: cmd.Hold(),
     requests.Pause: cmd.Pause(),
     requests.Resume: cmd.Resume(),
 }
@@ -31,18 +31,18 @@ BARE: dict[type[requests.AnyRequest], cmd.Command] = {
 
 FREE = (
     requests.Stop,
-    requests.Reset,
-    requests.Beat,
+    requests.ClearStop,
+    requests.Heartbeat,
     requests.Acquire,
     requests.Take,
     requests.Ask,
     requests.Withdraw,
     requests.Give,
-    requests.Release,
+    requests.ReleaseLease,
 )
 """Requests that cost nothing, however much else was asked: STOP, signs of life, and who drives."""
 
-QUESTIONS = (requests.Look, requests.Get, requests.Watch)
+QUESTIONS = (requests.Query, requests.Get, requests.Watch)
 """Requests that change nothing."""
 
 
@@ -74,10 +74,10 @@ class Dispatcher:
         hub = self._hub
         hub.beat(window)
         match request:
-            case requests.Beat(n=n):
+            case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
-            case requests.Look(at=at):
-                return self.look(at)
+            case requests.Query(at=at):
+                return self.query(at)
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.Named(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
@@ -97,8 +97,8 @@ class Dispatcher:
         match request:
             case requests.Stop(press=press):
                 hub.stop(window.person.name, press)
-            case requests.Reset():
-                hub.reset(window)
+            case requests.ClearStop():
+                hub.clear_stop(window)
             case requests.Acquire():
                 hub.acquire(window)
             case requests.Take():
@@ -107,8 +107,8 @@ class Dispatcher:
                 hub.request(window)
             case requests.Withdraw():
                 hub.withdraw(window)
-            case requests.Release():
-                hub.give_up(window)
+            case requests.ReleaseLease():
+                hub.release_lease(window)
             case requests.Give(to=number):
                 hub.hand_over(window, number)
             case requests.Jog(rates=rates, frame=frame):
@@ -159,7 +159,7 @@ class Dispatcher:
             return np.eye(4)
         return se3.inverse(self._hub.present().robot.T_base_shoulder)
 
-    def look(self, at: str) -> answers.Answer:
+    def query(self, at: str) -> answers.Answer:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
         match at:

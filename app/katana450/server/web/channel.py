@@ -40,7 +40,7 @@ FAREWELL = 1.0
 """[s] That who is sent away has for being told so: who reads nothing cannot be told."""
 
 
-ANSWERED = (requests.Beat, requests.Look, requests.Get)
+ANSWERED = (requests.Heartbeat, requests.Query, requests.Get)
 """Requests that are answered without an id too."""
 
 
