@@ -167,7 +167,7 @@ def test_what_wants_a_tool_is_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (cmd.SetJoint(3, 0.0), "axis 4: this mechanism has 3"),
+        (cmd.SetJoint(3, 0.0), "axis 4, only 3"),
         (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
         (cmd.SetJoints(np.zeros(5)), "3 driven joints, the command 5"),
         (cmd.Servo(np.zeros(2)), "3 driven joints, the command 2"),

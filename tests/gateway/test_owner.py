@@ -215,7 +215,7 @@ def test_the_page_paces_its_own_program_by_both_its_sockets(server: AppServer, a
             async def until(**wanted: Any) -> None:
                 async with asyncio.timeout(40.0):
                     while True:
-                        state = await asyncio.to_thread(arm.look, answers.State)
+                        state = await asyncio.to_thread(arm.query, answers.State)
                         known = {"program": status(state), "speed": state.speed}
                         if all(known[key] == wanted[key] for key in wanted):
                             return

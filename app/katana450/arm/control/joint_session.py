@@ -15,7 +15,7 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.aims import gone, paused, resumed, stamped, streamed, turned, without
+from katana450.arm.control.aims import gone, paused, resumed, stamped, streamed, without
 from katana450.arm.control.arrangement import dressed
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.joints import Joints
@@ -28,13 +28,6 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.motion.limiter import Limiter, Motion
 from katana450.maths.motion.pursuit import stream_step
-
-MOTIONS = (cmd.SetJoint, cmd.SetAxes, cmd.SetJoints, cmd.Servo, cmd.Home, cmd.GoToZero, cmd.EndDrag)
-
-STOPS = (cmd.Stop, cmd.ClearStop, cmd.Pause, cmd.Resume, cmd.Hold)
-
-SAFE = (cmd.Stop, cmd.ClearStop, cmd.SpeedScale, cmd.Dress, cmd.Batch)
-"""What counts while a stop holds the joints."""
 
 NO_BRANCH = BRANCHES[0]
 """Said where there is none: without a tool nobody reads it."""
@@ -60,17 +53,14 @@ class JointSession:
         """Refuse, with an InputError for the sender, what cannot even be asked."""
         joints = self.joints
         match command:
-            case cmd.SetJoint(axis=axis) if axis >= joints.n:
-                raise InputError(f"There is no axis {axis + 1}: this mechanism has {joints.n}.")
-            case cmd.SetAxes(values=values):
-                for axis, value in values:
-                    self.check(cmd.SetJoint(axis, value))
+            case cmd.AxisCommand():
+                command.targets(np.zeros(joints.n))
             case cmd.SetJoints(q=q) | cmd.Servo(q=q):
                 joints.check(q)
             case cmd.Batch(commands=commands):
                 for each in commands:
                     self.check(each)
-            case _ if not isinstance(command, (*MOTIONS, *STOPS, *SAFE)):
+            case _ if not command.traits.joints_only:
                 self.refuse()
 
     def refuse(self) -> NoReturn:
@@ -120,7 +110,7 @@ class JointSession:
         return stream_step(limiter, motion, servo, state.t, dt, state.speed)
 
     def _take(self, state: State, command: cmd.Command) -> State:
-        if state.stopped is not None and not isinstance(command, SAFE):
+        if state.stopped is not None and not command.traits.while_stopped:
             return state
         match command:
             case cmd.Stop():
@@ -136,8 +126,8 @@ class JointSession:
                 return self._aim(state, self._limiter.halt(state.motion))
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
-            case cmd.SetJoint() | cmd.SetAxes():
-                return self._aim(state, turned(state, command).q)
+            case cmd.AxisCommand():
+                return self._aim(state, command.targets(state.goal))
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
             case cmd.Servo(q=q):

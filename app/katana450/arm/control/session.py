@@ -19,7 +19,6 @@ from katana450.arm.control.aims import (
     resumed,
     stamped,
     streamed,
-    turned,
     without,
 )
 from katana450.arm.control.arm import Arm
@@ -57,9 +56,6 @@ TOOL_SPEED = 0.5
 
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
-
-SAFE = (cmd.Stop, cmd.ClearStop, cmd.SpeedScale, cmd.Batch, *cmd.THINGS)
-"""What counts while a stop holds the arm."""
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -170,7 +166,7 @@ class Session:
         return replace(held, findings=(Finding(Reason.INTERNAL),))
 
     def _take(self, state: State, command: cmd.Command) -> State:
-        if state.stopped is not None and not isinstance(command, SAFE):
+        if state.stopped is not None and not command.traits.while_stopped:
             return state
         match command:
             case cmd.Stop():
@@ -194,8 +190,8 @@ class Session:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
                 return leaving(replace(state, mode=jogging, target=JointTarget(state.goal)))
-            case cmd.SetJoint() | cmd.SetAxes():
-                return self._aim(state, turned(state, command))
+            case cmd.AxisCommand():
+                return self._aim(state, JointTarget(command.targets(state.goal)))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
             case cmd.Servo(q=q):

@@ -223,7 +223,7 @@ class FrontEnd:
             # The sooner it is stamped, the less of our own delays looks like its motion.
             command = replace(command, t=MonotonicClock().now())
         with self._sending:
-            if isinstance(command, cmd.Stop):
+            if command.traits.safety:
                 # What has not gone yet is dead the moment it comes.
                 self._unsent.clear()
             elif age > UNANSWERED:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
@@ -99,6 +100,34 @@ def tag_of(name: str) -> str:
     return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
 
 
+@dataclass(frozen=True, kw_only=True)
+class RequestTraits:
+    """Traits of one class of requests. The default commands the arm.
+
+    Attributes:
+        free: costs nothing of the budget, however much else was asked.
+        question: changes nothing.
+        answered: is answered without an ``id`` too.
+        stream: one of many in a row, answered at once, before the arm's process has taken it.
+        for_program: is given to the program that runs, if the sender is its owner.
+        safety: is never too frequent.
+    """
+
+    free: bool = False
+    question: bool = False
+    answered: bool = False
+    stream: bool = False
+    for_program: bool = False
+    safety: bool = False
+
+
+COMMAND = RequestTraits()
+"""Traits of a request for one command of the arm, which costs what it takes."""
+
+LEASE = RequestTraits(free=True)
+"""Traits of a request about who holds the arm."""
+
+
 class Request(
     msgspec.Struct,
     frozen=True,
@@ -107,6 +136,11 @@ class Request(
     tag_field="do",
     tag=tag_of,
 ):
-    """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it."""
+    """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it.
+
+    Each class declares ``traits``.
+    """
+
+    traits: ClassVar[RequestTraits]
 
     id: Id = None

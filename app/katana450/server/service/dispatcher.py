@@ -29,22 +29,6 @@ BARE: dict[type[requests.AnyRequest], cmd.Command] = {
 }
 """What says all there is to say by its name."""
 
-FREE = (
-    requests.Stop,
-    requests.ClearStop,
-    requests.Heartbeat,
-    requests.Acquire,
-    requests.Take,
-    requests.Ask,
-    requests.Withdraw,
-    requests.Give,
-    requests.ReleaseLease,
-)
-"""Requests that cost nothing, however much else was asked: STOP, signs of life, and who drives."""
-
-QUESTIONS = (requests.Query, requests.Get, requests.Watch)
-"""Requests that change nothing."""
-
 
 def driver_key(hub: Hub, window: Window) -> str:
     """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
@@ -62,11 +46,11 @@ class Dispatcher:
     def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life.
 
-        What it costs is taken from ``budget``; raises BusyError when that is used up. FREE requests
-        cost nothing, nor does what steers the arm for whoever holds it.
+        What it costs is taken from ``budget``; raises BusyError when that is used up. A request
+        that is ``free`` costs nothing, nor does what steers the arm for whoever holds it.
         """
-        question, driver = isinstance(request, QUESTIONS), driver_key(self._hub, window)
-        free = isinstance(request, FREE) or (driver and not question)
+        question, driver = request.traits.question, driver_key(self._hub, window)
+        free = request.traits.free or (driver and not question)
         with nullcontext() if free else budget.charged(driver, question=question):
             return msgspec.structs.replace(self._done(window, request), id=request.id)
 
@@ -83,7 +67,7 @@ class Dispatcher:
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
-        if isinstance(request, requests.Pause | requests.Resume | requests.Speed):
+        if request.traits.for_program:
             window = hub.performer.actor(window)
         command = self._command(request)
         if command is None:
