@@ -42,7 +42,7 @@ def point(arm: Arm, q: FloatArray) -> FloatArray:
 def at_the_edge(session: Session, state: State) -> State:
     """Dragged slowly until the limits let the pitch go no further."""
     T = se3.from_rotation_translation(so3.rotation_y(SPLIT_PITCH), SPLIT - 0.02 * ACROSS)
-    before = take(session, state, cmd.SetPose(T), cmd.Settle())
+    before = take(session, state, cmd.SetPose(T), cmd.EndDrag())
     assert before.status is Status.OK
     for along in np.arange(-0.02, 0.02, 5e-4):
         before = take(session, before, cmd.MoveTool(SPLIT + along * ACROSS))
@@ -95,7 +95,7 @@ def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
 ) -> None:
     """From a place that all four branches reach: high over the base."""
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
-    state = take(session, state, cmd.SetPose(T), cmd.Settle())
+    state = take(session, state, cmd.SetPose(T), cmd.EndDrag())
     badge = choices(arm, state)[BRANCHES.index(branch)].badge
     taken = take(session, state, cmd.TakeBranch(branch))
     assert taken.branch == branch

@@ -129,26 +129,26 @@ def test_letting_go_before_a_contact_gives_the_rest_of_the_way_up(guarded: Sessi
     state = standing(guarded, LOW)
     blocked, _ = run(guarded, state, [cmd.MoveTool(np.array([0.40, 0.23, -0.35]))])
     assert blocked.blocked
-    let_go = guarded.step(blocked, [cmd.Settle()], blocked.t + TICK)
+    let_go = guarded.step(blocked, [cmd.EndDrag()], blocked.t + TICK)
     assert (let_go.goal == blocked.setpoint).all()
     assert isinstance(let_go.target, JointTarget)
     assert not let_go.under_way
     assert let_go.findings[0].reason is Reason.CONTACT
 
 
-def test_reset_forgets_the_contact(guarded: Session) -> None:
+def test_hold_forgets_the_contact(guarded: Session) -> None:
     start, commands, _ = INTO["table"]
     blocked, _ = run(guarded, standing(guarded, start), commands)
-    reset = guarded.step(blocked, [cmd.Reset()], blocked.t + TICK)
-    assert reset.findings == ()
-    assert reset.status is Status.OK
+    held = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
+    assert held.findings == ()
+    assert held.status is Status.OK
 
 
 def test_fingers_do_not_open_into_a_cup_and_the_arm_goes_on(guarded: Session) -> None:
     """The tool beside the cup, closed; then both are told to move."""
     start, commands, _ = INTO["cup"]
     blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), commands)
-    at_cup = guarded.step(blocked, [cmd.Reset()], blocked.t + TICK)
+    at_cup = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
     state, near = run(guarded, at_cup, [cmd.SetGripper(0.30)])
     assert state.blocked
     assert state.gripper_setpoint < 0.30

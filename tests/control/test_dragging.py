@@ -143,7 +143,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
         assert state.branch == branch
         yield state
         if number % trip.grab == trip.grab - 1:
-            state = session.step(state, [cmd.Settle()], state.t)
+            state = session.step(state, [cmd.EndDrag()], state.t)
             target = tool(chain, state.goal)
 
 

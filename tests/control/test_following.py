@@ -234,7 +234,7 @@ def test_without_a_plan_there_is_nowhere_to_go_along(session: Session, state: St
         cmd.Home(),
         cmd.MoveTool(np.array([0.3, 0.1, 0.0])),
         cmd.Jog(np.array([0.05, 0.0, 0.0, 0.0, 0.0])),
-        cmd.Reset(),
+        cmd.Hold(),
     ],
 )
 def test_any_other_motion_ends_it_inside_the_limits(
@@ -255,7 +255,7 @@ def test_any_other_motion_ends_it_inside_the_limits(
 
 def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
-    orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.Settle()]
+    orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.EndDrag()]
     states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 900)
     assert (states[-1].setpoint == poured.end).all()
     assert states[-1].gripper_setpoint == 0.2
@@ -265,20 +265,20 @@ def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, pour
 def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)[-1]
-    halted = run(session, under_way, [cmd.Stop()])
-    (finding,) = halted[-1].findings
-    assert finding.reason is Reason.HALTED
-    assert len(halted) * TICK == pytest.approx(finding.time, abs=2 * TICK)
+    stopped = run(session, under_way, [cmd.Stop()])
+    (finding,) = stopped[-1].findings
+    assert finding.reason is Reason.STOPPED
+    assert len(stopped) * TICK == pytest.approx(finding.time, abs=2 * TICK)
     way = math.dist(
-        *(forward(session.arm.chain, each.setpoint)[:3, 3] for each in (under_way, halted[-1]))
+        *(forward(session.arm.chain, each.setpoint)[:3, 3] for each in (under_way, stopped[-1]))
     )
     assert finding.amount == pytest.approx(way, abs=1e-4)
-    assert halted[0].following is None
+    assert stopped[0].following is None
     for order in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
-        after = trace(session, halted[-1], {0: [order]}, 20)[-1]
-        assert (after.setpoint == halted[-1].setpoint).all()
-    free = trace(session, halted[-1], {0: [cmd.Release()]}, 50)[-1]
-    assert (free.setpoint == halted[-1].setpoint).all()
+        after = trace(session, stopped[-1], {0: [order]}, 20)[-1]
+        assert (after.setpoint == stopped[-1].setpoint).all()
+    free = trace(session, stopped[-1], {0: [cmd.ClearStop()]}, 50)[-1]
+    assert (free.setpoint == stopped[-1].setpoint).all()
 
 
 def clearance(world: World, state: State) -> float:
@@ -315,11 +315,11 @@ def test_a_stop_beside_the_cup_keeps_clear_of_it(
     states = run(guarded, start, [cmd.Follow(round_cup)])
     along = 0
     for at in range(60, len(states) - 40, 12):
-        halted = run(guarded, states[at], [cmd.Stop()])
-        along += halted[0].following is not None
-        assert min(clearance(world, each) for each in halted) >= STOP - SLIGHTLY
-        assert halted[-1].motion.at_rest
-        check_limits(guarded, [*states[at - 3 : at + 1], *halted])
+        stopped = run(guarded, states[at], [cmd.Stop()])
+        along += stopped[0].following is not None
+        assert min(clearance(world, each) for each in stopped) >= STOP - SLIGHTLY
+        assert stopped[-1].motion.at_rest
+        check_limits(guarded, [*states[at - 3 : at + 1], *stopped])
     assert along > 0
     for at in range(60, len(states) - 40, 60):
         away = trace(guarded, states[at], {0: [cmd.Home()]}, 100)

@@ -107,17 +107,17 @@ def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
 ) -> None:
     moving = after(session, state, 0.8, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
     stopped = after(session, moving, DT, cmd.Stop())
-    assert stopped.halted is not None
-    rest = after(session, stopped, stopped.halted.time)
+    assert stopped.stopped is not None
+    rest = after(session, stopped, stopped.stopped.time)
     assert rest.motion.at_rest
     np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
     far = np.abs(moving.setpoint - rest.q).max()
-    assert stopped.halted.way == pytest.approx(far, abs=1e-9)
+    assert stopped.stopped.way == pytest.approx(far, abs=1e-9)
     ignored = after(session, rest, 0.5, cmd.Home(), cmd.Dress("a", Trait.CHOICE, -1))
     np.testing.assert_array_equal(ignored.q, rest.q)
     assert ignored.looks.of("a").choice is Choice.HIDDEN
-    free = after(session, ignored, 0.5, cmd.Release())
-    assert (free.halted, free.findings, free.moving) == (None, (), False)
+    free = after(session, ignored, 0.5, cmd.ClearStop())
+    assert (free.stopped, free.findings, free.moving) == (None, (), False)
     home = after(session, free, 10.0, cmd.Home())
     np.testing.assert_array_equal(home.q, JOINTS.ready)
 
@@ -131,7 +131,7 @@ def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: JointSession, sta
     share = (paused.q - state.q) / (goal - state.q)
     np.testing.assert_allclose(share, share[0], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(after(session, paused, 10.0, cmd.Resume()).q, goal)
-    held = after(session, moving, 3.0, cmd.Reset())
+    held = after(session, moving, 3.0, cmd.Hold())
     assert not held.moving
     assert not np.allclose(held.q, goal)
 
@@ -154,7 +154,7 @@ def test_a_stream_is_followed_and_its_end_is_a_rest(session: JointSession, state
     [
         cmd.SetPose(np.eye(4)), cmd.MoveTool(np.zeros(3)), cmd.TurnTool(0.0, 0.0), cmd.Fill(1e-4),
         cmd.SetTool("tcp"), cmd.SetGripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.ones(5)),
-        cmd.Remove("cup"), cmd.Together((cmd.Home(), cmd.SetGripper(0.0))),
+        cmd.Remove("cup"), cmd.Batch((cmd.Home(), cmd.SetGripper(0.0))),
     ],
 )  # fmt: skip
 def test_what_wants_a_tool_is_refused_with_the_reason(
@@ -167,7 +167,7 @@ def test_what_wants_a_tool_is_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (cmd.SetJoint(3, 0.0), "axis 4: this mechanism has 3"),
+        (cmd.SetJoint(3, 0.0), "axis 4, only 3"),
         (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
         (cmd.SetJoints(np.zeros(5)), "3 driven joints, the command 5"),
         (cmd.Servo(np.zeros(2)), "3 driven joints, the command 2"),

@@ -67,7 +67,7 @@ def test_a_drag_during_a_jog_is_followed_and_leaves_nothing_behind(
     wanted = FAR_DRAG.position
     np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
     # The next drag takes its goal along its own line.
-    settled = run(session, dragged, cmd.Settle())
+    settled = run(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
     for share in np.linspace(0.05, 1.0, 20):
         settled = run(session, settled, cmd.MoveTool(start + share * way))
@@ -107,23 +107,23 @@ def test_random_orders_never_leave_a_drag_without_its_target(
         lambda state: cmd.Servo(state.goal + rng.normal(scale=0.01, size=5)),
         lambda state: cmd.MoveTool(point(session, state.goal) + rng.normal(scale=0.1, size=3)),
         lambda _: cmd.TurnTool(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)),
-        lambda _: cmd.Settle(),
+        lambda _: cmd.EndDrag(),
         lambda _: cmd.Home(),
         lambda _: cmd.SetTool(str(rng.choice(list(session.arm.tools)))),
-        lambda _: cmd.Reset(),
+        lambda _: cmd.Hold(),
         lambda _: cmd.Pause(),
         lambda _: cmd.Resume(),
         lambda _: cmd.Stop(),
-        lambda _: cmd.Release(),
+        lambda _: cmd.ClearStop(),
     ]
     for _ in range(1500):
         command = kinds[rng.integers(len(kinds))](state)
         state = run(session, state, command, int(rng.integers(1, 4)))
         assert isinstance(state.target, ToolTarget) or not isinstance(state.mode, Dragging)
-        if state.halted is not None:
+        if state.stopped is not None:
             assert state.mode is None
     # Left alone, every mode but a pause comes to an end.
-    state = run(session, run(session, state, cmd.Release()), cmd.Resume())
+    state = run(session, run(session, state, cmd.ClearStop()), cmd.Resume())
     assert not math.isnan(state.setpoint.sum())
     over = run(session, state, None, 600)
     assert over.mode is None

@@ -53,21 +53,21 @@ def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
     chain = session.arm.chain
     moving = run(session, state, [cmd.SetJoints(FAR)], 60)
     assert speed(chain, moving.motion) > 0.1
-    halted = run(session, moving, [cmd.Stop()])
-    assert halted.status is Status.HALTED
-    (finding,) = halted.findings
-    assert finding.reason is Reason.HALTED
+    stopped = run(session, moving, [cmd.Stop()])
+    assert stopped.status is Status.STOPPED
+    (finding,) = stopped.findings
+    assert finding.reason is Reason.STOPPED
     ticks = 1
-    while halted.moving:
+    while stopped.moving:
         # Braking from the first tick on.
-        before, halted = halted, run(session, halted, [])
-        assert speed(chain, halted.motion) <= speed(chain, before.motion) + 0.05
+        before, stopped = stopped, run(session, stopped, [])
+        assert speed(chain, stopped.motion) <= speed(chain, before.motion) + 0.05
         ticks += 1
-    assert halted.motion.at_rest
+    assert stopped.motion.at_rest
     assert ticks * TICK == pytest.approx(finding.time, abs=2 * TICK)
-    way = math.dist(point(chain, moving.setpoint), point(chain, halted.setpoint))
+    way = math.dist(point(chain, moving.setpoint), point(chain, stopped.setpoint))
     assert finding.amount == pytest.approx(way, abs=1e-4)
-    assert halted.findings == (finding,)
+    assert stopped.findings == (finding,)
 
 
 ORDERS: list[cmd.Command] = [
@@ -78,9 +78,9 @@ ORDERS: list[cmd.Command] = [
     cmd.SetPose(np.eye(4)),
     cmd.SetGripper(0.2),
     cmd.Home(),
-    cmd.Stretch(),
-    cmd.Reset(),
-    cmd.Settle(),
+    cmd.GoToZero(),
+    cmd.Hold(),
+    cmd.EndDrag(),
     cmd.Pause(),
     cmd.Resume(),
     cmd.Jog(np.array([0.1, 0.0, 0.0, 0.0, 0.0])),
@@ -91,16 +91,16 @@ def test_nothing_moves_after_a_stop_until_it_is_released_and_told_afresh(
     session: Session, state: State
 ) -> None:
     moving = run(session, state, [cmd.SetJoints(FAR), cmd.SetGripper(0.3)], 30)
-    halted = run(session, moving, [cmd.Stop()], 200)
+    stopped = run(session, moving, [cmd.Stop()], 200)
     grip = moving.gripper_setpoint
     for order in ORDERS:
-        after = run(session, halted, [order], 50)
-        assert (after.setpoint == halted.setpoint).all(), order
-        assert after.gripper_setpoint == halted.gripper_setpoint == grip
-        assert after.status is Status.HALTED
-    released = run(session, halted, [cmd.Release()], 100)
+        after = run(session, stopped, [order], 50)
+        assert (after.setpoint == stopped.setpoint).all(), order
+        assert after.gripper_setpoint == stopped.gripper_setpoint == grip
+        assert after.status is Status.STOPPED
+    released = run(session, stopped, [cmd.ClearStop()], 100)
     assert released.status is Status.OK
-    assert (released.setpoint == halted.setpoint).all()
+    assert (released.setpoint == stopped.setpoint).all()
     assert isinstance(released.target, JointTarget)
     assert released.gripper_setpoint == grip
     assert run(session, released, [cmd.SetJoint(0, 1.0)], 5).moving
@@ -114,7 +114,7 @@ def test_a_stop_in_the_same_tick_beats_what_came_with_it(session: Session, state
     for batch in batches:
         after = run(session, state, batch, 100)
         assert (after.setpoint == state.setpoint).all()
-        assert after.status is Status.HALTED
+        assert after.status is Status.STOPPED
 
 
 def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
@@ -122,7 +122,7 @@ def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
     once = run(session, moving, [cmd.Stop()], 20)
     twice = run(session, once, [cmd.Stop()])
     assert twice.findings == once.findings
-    assert twice.halted == once.halted
+    assert twice.stopped == once.stopped
 
 
 def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: State) -> None:

@@ -144,7 +144,7 @@ def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
 ) -> None:
     away = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=10)
     assert not isinstance(away.target, JointTarget)
-    away = run(session, away, [cmd.Settle()])
+    away = run(session, away, [cmd.EndDrag()])
     assert isinstance(away.target, JointTarget)
     assert away.target.q is away.goal
     assert reasons(away) == {Reason.OUT_OF_REACH, Reason.LINKS}
@@ -159,7 +159,7 @@ def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
 ) -> None:
     """One tick has no time for all the way; what was wished is not lost with the hand."""
     wanted = np.array([-0.2, 0.35, 0.1])
-    flung = run(session, state, [cmd.MoveTool(wanted), cmd.Settle()])
+    flung = run(session, state, [cmd.MoveTool(wanted), cmd.EndDrag()])
     assert flung.since is not None
     assert flung.findings == ()
     assert math.dist(tool_point(arm, flung), wanted) > 0.1
@@ -173,7 +173,7 @@ def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
     assert np.allclose(tool_point(arm, again), wanted, atol=1e-12)
     assert not isinstance(again.target, JointTarget)
     # Whatever else is asked of the arm ends it.
-    for command in (cmd.Reset(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
+    for command in (cmd.Hold(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
         ended = run(session, flung, [command])
         assert ended.since is None
         assert isinstance(ended.target, JointTarget)
@@ -236,11 +236,11 @@ def test_sliders_may_change_the_branch_because_a_person_says_so(
 
 
 def test_home_stretch_and_reset(session: Session, state: State) -> None:
-    state = run(session, state, [cmd.Stretch()])
+    state = run(session, state, [cmd.GoToZero()])
     assert (state.goal == 0.0).all()
     state = run(session, state, [], ticks=20)
     assert state.moving
-    held = run(session, state, [cmd.Reset()], ticks=100)
+    held = run(session, state, [cmd.Hold()], ticks=100)
     assert not held.moving
     assert (held.goal == held.setpoint).all()
     home = run(session, held, [cmd.Home()])

@@ -31,8 +31,8 @@ ORDERS: dict[str, list[Order]] = {
     "jogs": [lambda rng, _: cmd.Jog(rng.uniform(-0.5, 0.5, 5))],
     "turns": [lambda rng, _: cmd.TurnTool(rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0))],
     "joints": [lambda rng, arm: cmd.SetJoints(anywhere(rng, arm))],
-    "pauses": [lambda *_: cmd.Pause(), lambda *_: cmd.Resume(), lambda *_: cmd.Reset()],
-    "stops": [lambda *_: cmd.Together((cmd.Stop(), cmd.Release()))],
+    "pauses": [lambda *_: cmd.Pause(), lambda *_: cmd.Resume(), lambda *_: cmd.Hold()],
+    "stops": [lambda *_: cmd.Batch((cmd.Stop(), cmd.ClearStop()))],
 }
 
 

@@ -483,7 +483,7 @@ def test_a_driver_whose_page_hangs_stops_the_arm_in_time() -> None:
                 await control.wait(mood="stopped")
                 took.append(time.perf_counter() - control.last_beat)
                 control.alive = True
-                await control.say("reset")
+                await control.say("clear_stop")
                 await control.wait(stopped=None)
                 assert await peer.listen()
         return took

@@ -15,7 +15,7 @@ from katana450.arm.control.lease import LOST_AFTER, Lease, Role
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Halt, Reason, State
+from katana450.arm.control.state import Finding, Reason, State, StoppingDistance
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
@@ -57,7 +57,7 @@ class FakeArm:
         self.holds = 0
         self.stops = 0
         self.beats = 0
-        self.halted = False
+        self.stopped = False
         self.age = 0.0
         self.taken: int | None = None
         self.jogs: list[tuple[Rates, JogFrame]] = []
@@ -67,10 +67,10 @@ class FakeArm:
 
     @property
     def state(self) -> State:
-        halted = Halt(0.0, 0.0) if self.halted else None
+        stopped = StoppingDistance(0.0, 0.0) if self.stopped else None
         if not self.moves:
-            return replace(self.rest, halted=halted)
-        return replace(self.rest, goal=self.rest.setpoint + 0.1, halted=halted)
+            return replace(self.rest, stopped=stopped)
+        return replace(self.rest, goal=self.rest.setpoint + 0.1, stopped=stopped)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -91,12 +91,12 @@ class FakeArm:
     def stop(self) -> int:
         self.stops += 1
         if self.taken is None:
-            self.halted = True
+            self.stopped = True
             self.moves = False
         return self.stops
 
-    def release(self) -> None:
-        self.halted = False
+    def clear_stop(self) -> None:
+        self.stopped = False
 
     def hold(self) -> None:
         self.holds += 1
@@ -146,7 +146,7 @@ class Table:
 
 
 def stands_still(table: Table) -> bool:
-    return table.arm.halted
+    return table.arm.stopped
 
 
 def moves(table: Table) -> bool:
@@ -173,7 +173,7 @@ def test_the_journal_has_who_drove_and_who_stopped(table: Table) -> None:
     entries = [
         Entry(table.t, Finding(Reason.AXIS_LIMIT, 0.5, axis=1), began=True),
         Entry(table.t, Finding(Reason.CONTACT, 0.006, parts=("finger_left_link", "table")), True),
-        Entry(table.t, Finding(Reason.HALTED, 0.02, time=0.3), began=True),
+        Entry(table.t, Finding(Reason.STOPPED, 0.02, time=0.3), began=True),
     ]
     table.arm.ledger = tuple(entries[:1])
     table.wait(TICK)
@@ -186,12 +186,12 @@ def test_the_journal_has_who_drove_and_who_stopped(table: Table) -> None:
     lines = [serialize.line(line) for line in table.hub.journal.lines]
     assert [line.who for line in lines] == [None, driver.person.name, "Vera"]
     told = [line.finding for line in lines]
-    assert [each.reason for each in told] == ["axis limit", "contact", "halted"]
+    assert [each.reason for each in told] == ["axis limit", "contact", "stopped"]
     assert [(each.amount, each.unit) for each in told] == [(0.5, "rad"), (0.006, "m"), (0.02, "m")]
     assert told[0].axis == 2
     assert told[1].parts == ("finger_left_link", "table")
     assert told[2].seconds == 0.3
-    assert "Reset in the bar" in told[2].said
+    assert "Clear stop in the bar" in told[2].said
 
 
 def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:
@@ -219,7 +219,7 @@ def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
     table.hub.stop("Vera")
     assert table.arm.stops == 1
     with pytest.raises(LeaseError):
-        table.hub.reset(watcher)
+        table.hub.clear_stop(watcher)
     assert table.hub.stopped is not None
 
 
@@ -241,9 +241,9 @@ def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
             act()
     # Only who drives may end it.
     with pytest.raises(LeaseError, match="Window 1 holds"):
-        table.hub.reset(other)
+        table.hub.clear_stop(other)
     assert stands_still(table)
-    table.hub.reset(driver)
+    table.hub.clear_stop(driver)
     assert not stands_still(table)
     assert not moves(table)
     table.hub.drive(driver.person.key)
@@ -253,25 +253,25 @@ def test_a_press_of_stop_counts_once_however_late_it_is_told_again(table: Table)
     driver = table.join(PAGES[0])
     table.hub.stop("Window 1", "a press")
     table.hub.stop("Window 1", "a press")
-    table.hub.reset(driver)
+    table.hub.clear_stop(driver)
     table.hub.stop("Window 1", "a press")
     assert not stands_still(table)
     table.hub.stop("Window 1", "another")
     assert stands_still(table)
-    table.hub.reset(driver)
+    table.hub.clear_stop(driver)
     # Without a name every one counts.
     for _ in range(2):
         table.hub.stop("Window 1")
         assert stands_still(table)
-        table.hub.reset(driver)
+        table.hub.clear_stop(driver)
 
 
 def test_an_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.hub.stop("Window 1")
-    table.arm.halted, table.arm.moves = False, True
+    table.arm.stopped, table.arm.moves = False, True
     table.wait(TICK, driver)
-    assert table.arm.halted
+    assert table.arm.stopped
     assert not moves(table)
 
 
@@ -293,7 +293,7 @@ def test_a_driver_who_falls_silent_while_the_arm_moves_stops_it_in_time(table: T
     assert table.hub.stopped.why == "Window 1 fell silent while the arm moved."
     # A word that comes late starts nothing anew.
     table.hub.beat(driver)
-    with pytest.raises(LeaseError, match="reset"):
+    with pytest.raises(LeaseError, match="clear the stop first"):
         table.hub.drive(driver.person.key)
 
 
@@ -311,7 +311,7 @@ def test_a_driver_who_falls_silent_at_rest_loses_the_arm_and_stops_nothing(table
     [
         lambda hub, driver, other: hub.hand_over(driver, other.number),
         lambda hub, _, other: hub.take(other),
-        lambda hub, driver, _: hub.give_up(driver),
+        lambda hub, driver, _: hub.release_lease(driver),
     ],
     ids=["handed over", "taken", "given up"],
 )
@@ -396,4 +396,4 @@ def test_before_the_arm_is_there_nobody_drives_it() -> None:
         hub.drive(window.person.key)
     hub.tick()
     hub.stop("Window 1")
-    hub.reset(window)
+    hub.clear_stop(window)

@@ -96,17 +96,17 @@ def test_stop_is_requested_until_a_newer_state_is_stopped(table: Table) -> None:
     table.hub.drive(driver.person.key)
     table.hub.stop("Vera")
     table.wait(0.2, driver)
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
     # A state that is stopped, but older than the request, confirms nothing.
-    table.arm.halted = True
+    table.arm.stopped = True
     table.wait(TICK, driver)
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
     table.arm.taken = table.arm.stops
     table.wait(TICK, driver)
     assert stage(table) == ("stopped", "confirmed")
     # So does every further press.
     table.hub.stop("Vera")
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
     assert table.arm.stops == 2
 
 
@@ -131,7 +131,7 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
     assert table.hub.stopped == Stopped(
         None, "The arm's process did not answer for 0.6 s.", ticket=1, confirmed=False
     )
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
 
 
 @pytest.fixture

@@ -157,7 +157,7 @@ def test_what_is_refused_says_when_to_ask_again(server: AppServer) -> None:
             # No more on each than one connection may say at once.
             for _ in range(700):
                 for line in lines:
-                    await line.send('{"do":"look","at":"world"}')
+                    await line.send('{"do": "query","at":"world"}')
             while True:
                 for line in lines:
                     heard: dict[str, Any] = json.loads(await asyncio.wait_for(line.recv(), 5.0))

@@ -67,7 +67,7 @@ def test_every_link_is_where_another_program_has_it(
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
         # It is told driven joints alone, and works out by itself what follows them.
         urdf.update_cfg(dict(zip(machine.joints.names, q.tolist(), strict=True)))
-        told = {link.name: link.T for link in program.look(answers.Links).links}
+        told = {link.name: link.T for link in program.query(answers.Links).links}
         assert set(told) == set(urdf.link_map)
         for name, T in told.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
@@ -76,7 +76,7 @@ def test_every_link_is_where_another_program_has_it(
 def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
     server: AppServer, program: Client, machine: Machine
 ) -> None:
-    told = program.look(answers.Arm)
+    told = program.query(answers.Arm)
     assert told.joints == list(machine.joints.names)
     assert told.slides == list(machine.joints.slides)
     assert (told.tools, told.default_tool, told.gripper, told.T_base_shoulder) == (
@@ -86,7 +86,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         None,
     )
     assert "no link that hangs on five turning joints" in told.joints_only
-    state = program.look(answers.State)
+    state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
     cartesian: list[requests.Request] = [
@@ -130,19 +130,19 @@ def test_stop_pause_and_lease_are_those_of_an_arm(
     with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
     program.ask(requests.Pause())
-    while (now := program.look(answers.State)).moving:
+    while (now := program.query(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "paused"
     assert now.q[0] != far[0]
     program.ask(requests.Resume())
     with connect(server.url, "Other") as other:
         other.ask(requests.Stop())
-    while (now := program.look(answers.State)).moving:
+    while (now := program.query(answers.State)).moving:
         time.sleep(0.02)
-    assert now.status == "halted"
+    assert now.status == "stopped"
     assert now.stopped == "Other pressed STOP."
     assert now.q[0] != far[0]
-    with pytest.raises(RefusedError, match="reset it first"):
+    with pytest.raises(RefusedError, match="clear the stop first"):
         program.joints(far)
 
 
@@ -150,9 +150,9 @@ def test_its_world_is_named_too(program: Client, machine: Machine) -> None:
     slide = machine.joints.names[machine.joints.slides.index(True)]
     axis = machine.mechanism.axis(machine.mechanism.joints[slide])
     program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert program.look(answers.State).q[machine.joints.names.index(slide)] == pytest.approx(0.05)
+    assert program.query(answers.State).q[machine.joints.names.index(slide)] == pytest.approx(0.05)
     program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
-    world = {node.node: node for node in program.look(answers.World).nodes}
+    world = {node.node: node for node in program.query(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
     program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
@@ -176,7 +176,7 @@ def test_a_slider_moves_it_in_its_own_unit(server: AppServer, machine: Machine) 
                     await asyncio.sleep(0.05)
             await control.say("home")
             await control.wait(mood="ok")
-            await control.say("release")
+            await control.say("release_lease")
 
     asyncio.run(act())
 

@@ -137,7 +137,7 @@ def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
             setting("finger_right_joint", "rotation", [0, 0, 1, 0.3]),
         ],
     )
-    assert isinstance(said, cmd.Together)
+    assert isinstance(said, cmd.Batch)
     turned, moved, spun, painted, gripped = said.commands
     assert turned == cmd.SetAxes(((0, 0.1), (1, -1.0)))
     assert isinstance(moved, cmd.Shift)
@@ -261,7 +261,7 @@ def test_what_slides_has_a_translation_along_its_axis(session: Session) -> None:
 
 def arrived(lines: Lines, ticket: int) -> None:
     """Once the arm is at rest with that order in it."""
-    while (now := lines.answer(do="look"))["ticket"] < ticket or now["moving"]:
+    while (now := lines.answer(do="query"))["ticket"] < ticket or now["moving"]:
         time.sleep(0.02)
 
 
@@ -273,7 +273,7 @@ def all_joints(q: dict[str, float]) -> dict[str, Any]:
 
 def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
     with speaking(server, "VR Sink") as lines:
-        before = lines.answer(do="look")["q"]
+        before = lines.answer(do="query")["q"]
         done = lines.answer(do="set", **all_joints(THERE))
         assert done["is"] == "done"
         soon = lines.answer(do="get", node="axis_1", field="rotation")["values"][0]["value"][3]
@@ -291,14 +291,14 @@ def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
         refused = lines.answer(do="set", **bad)
         assert refused["is"] == "refused"
         assert "axis_5 turns about 1 0 0" in refused["why"]
-        assert lines.answer(do="look")["goal"][0] == THERE["axis_1"]
+        assert lines.answer(do="query")["goal"][0] == THERE["axis_1"]
         # STOP is stronger than any name.
         lines.answer(do="stop")
         stopped = lines.answer(do="set", node="axis_1", field="rotation", value=[0, 0, 1, 0])
-        assert "reset it first" in stopped["why"]
-        assert lines.answer(do="reset")["is"] == "done"
+        assert "clear the stop first" in stopped["why"]
+        assert lines.answer(do="clear_stop")["is"] == "done"
         arrived(lines, lines.answer(do="home")["ticket"])
-        lines.answer(do="release")
+        lines.answer(do="release_lease")
 
 
 def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
@@ -335,11 +335,11 @@ def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
             with pytest.raises(RefusedError, match="Painter holds"):
                 watcher.ask(requests.Set(node="pan_link_look", field="whichChoice", value=-1))
             assert not painted(watcher)
-        lines.answer(do="release")
+        lines.answer(do="release_lease")
 
 
 def painted(client: Client) -> bool:
-    world = client.look(answers.World)
+    world = client.query(answers.World)
     return any(
         field.value != 0.0
         for node in world.nodes
@@ -363,5 +363,5 @@ def test_it_is_the_same_over_http(server: AppServer) -> None:
     assert (status, said["is"]) == (200, "values")
     status, said = post(server, do="set", node="axis_5", field="rotation", value="round")
     assert (status, said["is"]) == (422, "refused")
-    status, said = post(server, do="release")
+    status, said = post(server, do="release_lease")
     assert status == 200

@@ -103,11 +103,11 @@ def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> 
         with pytest.raises(LeaseError, match=said):
             performer.touch(window)
         with pytest.raises(LeaseError, match=said):
-            performer.steer(window, Order.HALT)
+            performer.steer(window, Order.END)
     with pytest.raises(LeaseError, match="end it first"):
         table.plan(other)
     performer.touch(admin)
-    performer.steer(admin, Order.HALT)
+    performer.steer(admin, Order.END)
     assert table.status == "stopped"
     assert table.hub.lease.holder is None
 
@@ -129,8 +129,8 @@ def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
     table.hub.stop("Somebody")
     table.wait(0.1, window)
     assert table.status == "stopped"
-    table.hub.reset(window)
-    table.hub.give_up(window)
+    table.hub.clear_stop(window)
+    table.hub.release_lease(window)
     table.hub.performer.steer(window, Order.RUN)
     table.wait(0.5, window)
     table.hub.leave(window)
@@ -163,7 +163,7 @@ def test_what_was_asked_for_before_a_stop_is_not_done_after_it(table: Staged) ->
     performer.touch(window)
     performer.plan(SCRIPT, Order.RUN)
     table.hub.stop("Anybody")
-    table.hub.reset(window)
+    table.hub.clear_stop(window)
     due = time.monotonic() + 10.0
     while table.status == "planning" and time.monotonic() < due:
         time.sleep(0.005)

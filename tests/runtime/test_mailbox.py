@@ -19,7 +19,7 @@ def mailbox(session: Session) -> Mailbox:
 
 
 def test_commands_come_out_once_in_the_order_they_went_in(mailbox: Mailbox) -> None:
-    sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Reset()]
+    sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Hold()]
     tickets = [mailbox.put(command) for command in sent]
     assert tickets == [1, 2, 3]
     assert mailbox.drain() == (sent, 3)

@@ -83,7 +83,7 @@ def test_it_previews_steers_and_teaches(
         panel._orders.value = said  # type: ignore[misc]  # likewise
         panel._order()
     assert [order for _, order in performer.asked] == [
-        Order.RUN, Order.PAUSE, Order.RUN, Order.HALT
+        Order.RUN, Order.PAUSE, Order.RUN, Order.END
     ]  # fmt: skip
     assert parse(performer.asked[0][0]).name == "Circle with gripper"
 

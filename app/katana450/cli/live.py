@@ -41,7 +41,7 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
         except KeyboardInterrupt:
             # Before all of the script is sent there is nothing to end.
             with suppress(RefusedError):
-                arm.ask(requests.Steer(order=requests.Order.HALT))
+                arm.ask(requests.Steer(order=requests.Order.END))
             print("\nkatana450: the program is ended; the arm holds.", file=sys.stderr)
             return 130
 
@@ -52,7 +52,7 @@ def _send(arm: Client, text: str, speed: float) -> None:
     for part in parts[:-1]:
         arm.ask(requests.Program(text=part, more=True))
     arm.ask(requests.Program(text=parts[-1], speed=speed))
-    while (now := arm.look(answers.State).program) is not None and now.status == "planning":
+    while (now := arm.query(answers.State).program) is not None and now.status == "planning":
         if now.steps and sys.stderr.isatty():
             line = f"{now.task}, step {now.step} of {now.steps}, {now.share:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)

@@ -45,7 +45,7 @@ class AsyncClient:
         self._waiting: dict[Id, asyncio.Future[answers.Answer]] = {}
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
-        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
+        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._heartbeat())]
 
     async def close(self) -> None:
         """Hang up."""
@@ -73,9 +73,9 @@ class AsyncClient:
         """Say ``request`` and wait for no answer: for streams, Servo and Jog."""
         await self._say(request)
 
-    async def look(self, kind: type[A]) -> A:
+    async def query(self, kind: type[A]) -> A:
         """One of answers.State, Arm, Ledger, Branches, Loop, Things, World, Links."""
-        answer = await self.ask(requests.Look(at=kind.__name__.lower()))  # type: ignore[arg-type]
+        answer = await self.ask(requests.Query(at=kind.__name__.lower()))  # type: ignore[arg-type]
         if not isinstance(answer, kind):
             raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
         return answer
@@ -150,10 +150,10 @@ class AsyncClient:
             self._lose(f"The server has read nothing for {ASKED_FOR:g} s.")
             raise LostError(f"The server has read nothing for {ASKED_FOR:g} s.") from error
 
-    async def _beat(self) -> None:
+    async def _heartbeat(self) -> None:
         while True:
-            await self._say(requests.Beat())
-            await asyncio.sleep(self.welcome.beat)
+            await self._say(requests.Heartbeat())
+            await asyncio.sleep(self.welcome.heartbeat)
 
     async def _listen(self) -> None:
         try:

@@ -38,9 +38,9 @@ class Client:
         """See ``AsyncClient.tell``."""
         self._wait(self._client.tell(request))
 
-    def look(self, kind: type[A]) -> A:
-        """See ``AsyncClient.look``."""
-        return self._wait(self._client.look(kind))
+    def query(self, kind: type[A]) -> A:
+        """See ``AsyncClient.query``."""
+        return self._wait(self._client.query(kind))
 
     def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
         """See ``AsyncClient.go``."""

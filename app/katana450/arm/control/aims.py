@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.commands import Command, Servo, SetAxes, SetJoint
+from katana450.arm.control.commands import Command, Servo
 from katana450.arm.control.following import Following
 from katana450.arm.control.state import GRIPPER_LIMITS, Finding, JointTarget, Reason, State, Target
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.stream import Stream
@@ -48,16 +48,6 @@ def leaving(state: State) -> State:
     if state.following is None:
         return state
     return replace(state, following=replace(state.following, leaving=True))
-
-
-def turned(state: State, command: SetJoint | SetAxes) -> JointTarget:
-    """Some axes to other angles, the rest to where they were going."""
-    q = np.array(state.goal)
-    for axis, value in (
-        ((command.axis, command.value),) if isinstance(command, SetJoint) else command.values
-    ):
-        q[axis] = value
-    return JointTarget(frozen(q))
 
 
 def paused(state: State) -> State:

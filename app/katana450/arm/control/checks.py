@@ -20,12 +20,9 @@ def check(
     """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
     n = arm.chain.n
     match command:
-        case cmd.SetJoint(axis=axis) if axis >= n:
-            raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
-        case cmd.SetAxes(values=values):
-            for axis, value in values:
-                check(arm, pouring, surroundings, cmd.SetJoint(axis, value))
-        case cmd.Together(commands=commands):
+        case cmd.AxisCommand():
+            command.targets(np.zeros(n))
+        case cmd.Batch(commands=commands):
             for each in commands:
                 check(arm, pouring, surroundings, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):

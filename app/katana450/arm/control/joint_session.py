@@ -15,26 +15,19 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.aims import gone, paused, resumed, stamped, streamed, turned, without
+from katana450.arm.control.aims import gone, paused, resumed, stamped, streamed, without
 from katana450.arm.control.arrangement import dressed
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.joints import Joints
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import LONGEST_STEP
-from katana450.arm.control.state import Finding, Halt, JointTarget, Reason, State
+from katana450.arm.control.state import Finding, JointTarget, Reason, State, StoppingDistance
 from katana450.arm.control.things import Environment
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.motion.limiter import Limiter, Motion
 from katana450.maths.motion.pursuit import stream_step
-
-MOTIONS = (cmd.SetJoint, cmd.SetAxes, cmd.SetJoints, cmd.Servo, cmd.Home, cmd.Stretch, cmd.Settle)
-
-STOPS = (cmd.Stop, cmd.Release, cmd.Pause, cmd.Resume, cmd.Reset)
-
-SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Dress, cmd.Together)
-"""What counts while a stop holds the joints."""
 
 NO_BRANCH = BRANCHES[0]
 """Said where there is none: without a tool nobody reads it."""
@@ -60,17 +53,14 @@ class JointSession:
         """Refuse, with an InputError for the sender, what cannot even be asked."""
         joints = self.joints
         match command:
-            case cmd.SetJoint(axis=axis) if axis >= joints.n:
-                raise InputError(f"There is no axis {axis + 1}: this mechanism has {joints.n}.")
-            case cmd.SetAxes(values=values):
-                for axis, value in values:
-                    self.check(cmd.SetJoint(axis, value))
+            case cmd.AxisCommand():
+                command.targets(np.zeros(joints.n))
             case cmd.SetJoints(q=q) | cmd.Servo(q=q):
                 joints.check(q)
-            case cmd.Together(commands=commands):
+            case cmd.Batch(commands=commands):
                 for each in commands:
                     self.check(each)
-            case _ if not isinstance(command, (*MOTIONS, *STOPS, *SAFE)):
+            case _ if not command.traits.joints_only:
                 self.refuse()
 
     def refuse(self) -> NoReturn:
@@ -111,7 +101,7 @@ class JointSession:
 
     def _ahead(self, state: State, dt: float) -> Motion:
         limiter, motion, servo = self._limiter, state.motion, state.servo
-        if state.halted is not None:
+        if state.stopped is not None:
             return limiter.stop(motion, dt)
         if state.paused:
             return limiter.pause(motion, state.goal, dt)
@@ -120,34 +110,34 @@ class JointSession:
         return stream_step(limiter, motion, servo, state.t, dt, state.speed)
 
     def _take(self, state: State, command: cmd.Command) -> State:
-        if state.halted is not None and not isinstance(command, SAFE):
+        if state.stopped is not None and not command.traits.while_stopped:
             return state
         match command:
             case cmd.Stop():
-                return self._halt(state)
-            case cmd.Release():
-                free = self._aim(replace(state, halted=None), self._limiter.halt(state.motion))
-                return without(free, Reason.HALTED)
+                return self._stop(state)
+            case cmd.ClearStop():
+                free = self._aim(replace(state, stopped=None), self._limiter.halt(state.motion))
+                return without(free, Reason.STOPPED)
             case cmd.Pause():
                 return paused(state)
             case cmd.Resume():
                 return resumed(state)
-            case cmd.Reset():
+            case cmd.Hold():
                 return self._aim(state, self._limiter.halt(state.motion))
             case cmd.SpeedScale(value=value):
                 return replace(state, speed=value)
-            case cmd.SetJoint() | cmd.SetAxes():
-                return self._aim(state, turned(state, command).q)
+            case cmd.AxisCommand():
+                return self._aim(state, command.targets(state.goal))
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
             case cmd.Servo(q=q):
                 aimed = self._aim(state, q)
                 return streamed(state, aimed, command, self._limiter.limits.acceleration)
-            case cmd.Home() | cmd.Stretch():
+            case cmd.Home() | cmd.GoToZero():
                 return self._aim(state, self.ready)
             case cmd.Dress():
                 return dressed(state, command)
-            case cmd.Together(commands=commands):
+            case cmd.Batch(commands=commands):
                 return functools.reduce(self._take, commands, state)
         return state
 
@@ -165,11 +155,13 @@ class JointSession:
         )
         return gone(state, JointTarget(q), goal, findings)
 
-    def _halt(self, state: State) -> State:
+    def _stop(self, state: State) -> State:
         """Brake, and forget every wish."""
-        if state.halted is not None:
+        if state.stopped is not None:
             return state
         goal = frozen(self.joints.clamp(self._limiter.halt(state.motion)))
         way, time = self._way(state.setpoint, goal), self._limiter.time_to_halt(state.motion)
-        halted = replace(self._aim(state, goal), halted=Halt(way, time), paused=False, goal=goal)
-        return replace(halted, findings=(Finding(Reason.HALTED, way, time=time),))
+        stopped = replace(
+            self._aim(state, goal), stopped=StoppingDistance(way, time), paused=False, goal=goal
+        )
+        return replace(stopped, findings=(Finding(Reason.STOPPED, way, time=time),))

@@ -19,7 +19,6 @@ from katana450.arm.control.aims import (
     resumed,
     stamped,
     streamed,
-    turned,
     without,
 )
 from katana450.arm.control.arm import Arm
@@ -33,12 +32,12 @@ from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.state import (
     Dragging,
     Finding,
-    Halt,
     Jogging,
     JointTarget,
     PoseTarget,
     Reason,
     State,
+    StoppingDistance,
     Target,
     ToolTarget,
 )
@@ -57,9 +56,6 @@ TOOL_SPEED = 0.5
 
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
-
-SAFE = (cmd.Stop, cmd.Release, cmd.SpeedScale, cmd.Together, *cmd.THINGS)
-"""What counts while a stop holds the arm."""
 
 LONGEST_STEP = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
@@ -170,15 +166,15 @@ class Session:
         return replace(held, findings=(Finding(Reason.INTERNAL),))
 
     def _take(self, state: State, command: cmd.Command) -> State:
-        if state.halted is not None and not isinstance(command, SAFE):
+        if state.stopped is not None and not command.traits.while_stopped:
             return state
         match command:
             case cmd.Stop():
-                return self._halt(state)
-            case cmd.Release():
+                return self._stop(state)
+            case cmd.ClearStop():
                 goal = self._mover(state).halt(state)[0]
-                free = replace(state, halted=None, goal=goal, target=JointTarget(goal), mode=None)
-                return leaving(without(free, Reason.HALTED))
+                free = replace(state, stopped=None, goal=goal, target=JointTarget(goal), mode=None)
+                return leaving(without(free, Reason.STOPPED))
             case cmd.Pause():
                 return paused(state)
             case cmd.Resume():
@@ -194,8 +190,8 @@ class Session:
                     return state
                 jogging = Jogging(rates, frame, state.t + cmd.JOG_TIME)
                 return leaving(replace(state, mode=jogging, target=JointTarget(state.goal)))
-            case cmd.SetJoint() | cmd.SetAxes():
-                return self._aim(state, turned(state, command))
+            case cmd.AxisCommand():
+                return self._aim(state, JointTarget(command.targets(state.goal)))
             case cmd.SetJoints(q=q):
                 return self._aim(state, JointTarget(q))
             case cmd.Servo(q=q):
@@ -203,9 +199,9 @@ class Session:
                 return streamed(state, aimed, command, self.arm.limits.acceleration)
             case cmd.Home():
                 return self._aim(state, JointTarget(self.ready))
-            case cmd.Stretch():
+            case cmd.GoToZero():
                 return self._aim(state, JointTarget(frozen(np.zeros(self.arm.chain.n))))
-            case cmd.Reset():
+            case cmd.Hold():
                 held = replace(state, gripper_goal=state.gripper_setpoint)
                 held = without(held, Reason.CONTACT)
                 return self._aim(held, JointTarget(self._mover(state).halt(state)[0]))
@@ -215,7 +211,7 @@ class Session:
                 return self._drag(state, replace(wish(self.arm, state), pitch=pitch, roll=roll))
             case cmd.SetPose(T=T):
                 return self._aim(state, PoseTarget(T))
-            case cmd.Settle():
+            case cmd.EndDrag():
                 if isinstance(state.mode, Dragging):
                     return replace(state, mode=replace(state.mode, let_go=True))
                 # The findings stay: they say why the handle springs back.
@@ -237,7 +233,7 @@ class Session:
                 return shifted(state, command)
             case cmd.Dress():
                 return dressed(state, command)
-            case cmd.Together(commands=commands):
+            case cmd.Batch(commands=commands):
                 return functools.reduce(self._take, commands, state)
             case cmd.Attach(name=name, to=to):
                 x = state.x_setpoint
@@ -306,24 +302,24 @@ class Session:
         wished = JointTarget(tracked.best.q) if dragging.let_go else target
         return gone(state, wished, tracked.best.q, of_tracked(chain, tracked, state.reading))
 
-    def _halt(self, state: State) -> State:
+    def _stop(self, state: State) -> State:
         """Brake, and forget every wish. The grip stays: what is held must not be dropped."""
-        if state.halted is not None:
+        if state.stopped is not None:
             return state
         if state.following is not None:
             left = None if self._mover(state).may_leave(state) else leaving(state).following
             state = replace(state, following=left)
         goal, way, time = self._mover(state).halt(state)
-        halted = replace(
+        stopped = replace(
             state,
-            halted=Halt(way, time),
+            stopped=StoppingDistance(way, time),
             paused=False,
             goal=goal,
             gripper_goal=state.gripper_setpoint,
             target=JointTarget(goal),
             mode=None,
         )
-        return replace(halted, findings=(Finding(Reason.HALTED, way, time=time),))
+        return replace(stopped, findings=(Finding(Reason.STOPPED, way, time=time),))
 
     def _jogged(self, state: State) -> State:
         """The goal is where the jog would come to rest, so that it does when no more comes."""

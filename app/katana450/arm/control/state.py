@@ -22,7 +22,6 @@ from katana450.maths.motion.stream import Stream
 __all__ = [
     "Dragging",
     "Finding",
-    "Halt",
     "Jogging",
     "JointTarget",
     "Mode",
@@ -30,6 +29,7 @@ __all__ = [
     "Reason",
     "State",
     "Status",
+    "StoppingDistance",
     "Target",
     "ToolTarget",
 ]
@@ -60,14 +60,14 @@ class Status(Enum):
     PAUSED = "paused"
     BLOCKED = "blocked"
     HELD = "held"
-    HALTED = "halted"
+    STOPPED = "stopped"
     FAULT = "fault"
 
 
 class Reason(Enum):
     """Why the goal differs from what was wished."""
 
-    HALTED = "halted"
+    STOPPED = "stopped"
     PAUSED = "paused"
     CONTACT = "contact"
     ACROSS_GAP = "across a gap"
@@ -115,9 +115,9 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Halt:
-    """A stop: how far the tool, or else any link, went until it was at rest [m], and how long that
-    took [s]."""
+class StoppingDistance:
+    """Distance that the tool, or else any link, travels until it is at rest [m], and the time that
+    takes [s]."""
 
     way: float
     time: float
@@ -167,7 +167,7 @@ class State:
         reading: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished, or is not gone to; else empty.
         blocked: whether the arm waits on its way because it would touch something.
-        halted: the stop that holds the arm until a person releases it; None when there is none.
+        stopped: the stop that holds the arm until it is cleared; None when there is none.
         paused: whether the arm waits on its way because a person wants it to.
         speed: the share of every greatest speed that is allowed, above 0 and up to 1.
         mode: the jog, stream or drag that moves the goal, if one does. A drag is over once the goal
@@ -193,7 +193,7 @@ class State:
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
     blocked: bool = False
-    halted: Halt | None = None
+    stopped: StoppingDistance | None = None
     paused: bool = False
     speed: float = 1.0
     mode: Mode | None = None
@@ -232,8 +232,8 @@ class State:
         """What the findings come to."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
-        if self.halted is not None:
-            return Status.HALTED
+        if self.stopped is not None:
+            return Status.STOPPED
         if self.paused:
             return Status.PAUSED
         if any(finding.reason is Reason.CONTACT for finding in self.findings):
@@ -260,7 +260,7 @@ class State:
     @property
     def moving(self) -> bool:
         """Whether the arm or the gripper is still on its way."""
-        resting = self.blocked or self.paused or self.halted is not None
+        resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
 
     @property

@@ -6,23 +6,11 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import Command
 from katana450.errors import InputError
 
 CAPACITY = 256
 """Commands that may wait for one tick: far more than people make in 10 ms, few enough to do."""
-
-STREAMS = (
-    cmd.SetJoint,
-    cmd.SetJoints,
-    cmd.Servo,
-    cmd.MoveTool,
-    cmd.TurnTool,
-    cmd.SetPose,
-    cmd.SetGripper,
-)
-"""Commands of which the last one is enough when several of a kind follow each other."""
 
 
 class CommandSink(Protocol):
@@ -56,10 +44,10 @@ class Mailbox:
         """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
         self._check(command)
         with self._lock:
-            if isinstance(command, cmd.Stop):
+            if command.traits.safety:
                 # Never refused, and what waits before it is dead the moment it comes.
                 self._waiting = [command]
-            elif self._waiting and _supersedes(command, self._waiting[-1]):
+            elif self._waiting and command.replaces(self._waiting[-1]):
                 self._waiting[-1] = command
             elif len(self._waiting) >= CAPACITY:
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
@@ -79,11 +67,3 @@ class Mailbox:
         """The ticket of the newest command."""
         with self._lock:
             return self._tickets
-
-
-def _supersedes(new: Command, old: Command) -> bool:
-    if not isinstance(new, STREAMS) or type(new) is not type(old):
-        return False
-    return not (isinstance(new, cmd.SetJoint) and isinstance(old, cmd.SetJoint)) or (
-        new.axis == old.axis
-    )

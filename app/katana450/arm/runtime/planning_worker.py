@@ -20,12 +20,6 @@ log = logging.getLogger(__name__)
 REST_SECONDS = 5.0
 """[s] In which an arm that is to set out from rest has come to it."""
 
-PASSIVE = (cmd.SpeedScale, cmd.SetGripper, *cmd.THINGS)
-"""Commands that leave a way under work as it is."""
-
-WAITING = (cmd.Pause, cmd.Resume)
-"""Commands that decide when the arm moves, not where."""
-
 
 class PlanningWorker:
     """Between whoever commands and the arm: a branch is taken on a planned way, clear from end to
@@ -54,10 +48,10 @@ class PlanningWorker:
 
     def put(self, command: cmd.Command) -> int:
         """See ``CommandSink``; the command that follows a way found later has no ticket."""
-        said = command.commands if isinstance(command, cmd.Together) else (command,)
-        if not all(isinstance(each, PASSIVE) for each in said):
+        traits = [each.traits for each in command.parts]
+        if not all(each.passive for each in traits):
             self.cancel()
-        if not all(isinstance(each, PASSIVE + WAITING) for each in said):
+        if any(each.supersedes for each in traits):
             self.redirected()
         if isinstance(command, cmd.TakeBranch):
             self._set_out(command)
@@ -100,7 +94,7 @@ class PlanningWorker:
     def _at_rest(self, cancelled: threading.Event) -> State:
         """The state of an arm that stands, which it is made to."""
         if self._board.snapshot.state.moving:
-            self._unless(cancelled, cmd.Reset())
+            self._unless(cancelled, cmd.Hold())
         end = time.monotonic() + REST_SECONDS
         snapshot = self._board.snapshot
         while snapshot.state.moving or snapshot.ticket < self._arm.last_ticket:

@@ -26,14 +26,14 @@ class Answer(
 class Welcome(Answer, frozen=True, kw_only=True):
     """The first thing said: who you are here, and what you may do.
 
-    ``name`` is as others see it. ``role``: viewer, operator or admin. ``beat``: signs of life are
+    ``name`` is as others see it. ``role``: viewer, operator or admin. ``heartbeat``: heartbeats are
     to come so many seconds apart from whoever holds the arm.
     """
 
     name: str
     number: int
     role: str
-    beat: float
+    heartbeat: float
     api: int = VERSION
 
 
@@ -150,7 +150,7 @@ class State(Answer, frozen=True, kw_only=True):
         branch: shoulder and elbow. reading: which numbers of a target count.
         Where there are only joints, tool to roll, tool_speed, margins, branch and reading are null;
             see ``arm``.
-        status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
+        status: ok, limited, paused, blocked, held, stopped or fault. why: in words; else empty.
         speed: share of full speed. holder: name of who holds the arm.
         stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
             newer than the request is stopped, then confirmed.

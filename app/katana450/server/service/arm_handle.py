@@ -160,19 +160,19 @@ class Motion:
         return self._link.age
 
     def stop(self) -> int:
-        """Rest as fast as the arm can, and obey nothing until it is released; its ticket."""
+        """Rest as fast as the arm can, and obey nothing until the stop is cleared; its ticket."""
         ticket = self._sink.put(cmd.Stop())
         self._let_go()
         return ticket
 
-    def release(self) -> None:
+    def clear_stop(self) -> None:
         """After a stop: obey again. Nothing moves by this. Raises InputError when it cannot be."""
-        self._sink.put(cmd.Release())
+        self._sink.put(cmd.ClearStop())
 
     def hold(self) -> None:
         """Come to rest and forget every target; no hand holds a handle any more."""
         self._let_go()
-        self._put(cmd.Reset())
+        self._put(cmd.Hold())
 
     def jog(self, rates: Rates, frame: JogFrame) -> None:
         """Go with these rates for a moment. Raises InputError where there are only joints."""

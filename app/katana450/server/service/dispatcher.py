@@ -20,30 +20,14 @@ from katana450.server.service.interfaces import Arm
 from katana450.server.service.object_requests import ObjectRequests
 
 BARE: dict[type[requests.AnyRequest], cmd.Command] = {
-    requests.Settle: cmd.Settle(),
+    requests.EndDrag: cmd.EndDrag(),
     requests.Home: cmd.Home(),
-    requests.Stretch: cmd.Stretch(),
-    requests.Hold: cmd.Reset(),
+    requests.GoToZero: cmd.GoToZero(),
+    requests.Hold: cmd.Hold(),
     requests.Pause: cmd.Pause(),
     requests.Resume: cmd.Resume(),
 }
 """What says all there is to say by its name."""
-
-FREE = (
-    requests.Stop,
-    requests.Reset,
-    requests.Beat,
-    requests.Acquire,
-    requests.Take,
-    requests.Ask,
-    requests.Withdraw,
-    requests.Give,
-    requests.Release,
-)
-"""Requests that cost nothing, however much else was asked: STOP, signs of life, and who drives."""
-
-QUESTIONS = (requests.Look, requests.Get, requests.Watch)
-"""Requests that change nothing."""
 
 
 def driver_key(hub: Hub, window: Window) -> str:
@@ -62,11 +46,11 @@ class Dispatcher:
     def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life.
 
-        What it costs is taken from ``budget``; raises BusyError when that is used up. FREE requests
-        cost nothing, nor does what steers the arm for whoever holds it.
+        What it costs is taken from ``budget``; raises BusyError when that is used up. A request
+        that is ``free`` costs nothing, nor does what steers the arm for whoever holds it.
         """
-        question, driver = isinstance(request, QUESTIONS), driver_key(self._hub, window)
-        free = isinstance(request, FREE) or (driver and not question)
+        question, driver = request.traits.question, driver_key(self._hub, window)
+        free = request.traits.free or (driver and not question)
         with nullcontext() if free else budget.charged(driver, question=question):
             return msgspec.structs.replace(self._done(window, request), id=request.id)
 
@@ -74,16 +58,16 @@ class Dispatcher:
         hub = self._hub
         hub.beat(window)
         match request:
-            case requests.Beat(n=n):
+            case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
-            case requests.Look(at=at):
-                return self.look(at)
+            case requests.Query(at=at):
+                return self.query(at)
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.Named(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
-        if isinstance(request, requests.Pause | requests.Resume | requests.Speed):
+        if request.traits.for_program:
             window = hub.performer.actor(window)
         command = self._command(request)
         if command is None:
@@ -97,8 +81,8 @@ class Dispatcher:
         match request:
             case requests.Stop(press=press):
                 hub.stop(window.person.name, press)
-            case requests.Reset():
-                hub.reset(window)
+            case requests.ClearStop():
+                hub.clear_stop(window)
             case requests.Acquire():
                 hub.acquire(window)
             case requests.Take():
@@ -107,8 +91,8 @@ class Dispatcher:
                 hub.request(window)
             case requests.Withdraw():
                 hub.withdraw(window)
-            case requests.Release():
-                hub.give_up(window)
+            case requests.ReleaseLease():
+                hub.release_lease(window)
             case requests.Give(to=number):
                 hub.hand_over(window, number)
             case requests.Jog(rates=rates, frame=frame):
@@ -159,7 +143,7 @@ class Dispatcher:
             return np.eye(4)
         return se3.inverse(self._hub.present().robot.T_base_shoulder)
 
-    def look(self, at: str) -> answers.Answer:
+    def query(self, at: str) -> answers.Answer:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
         match at:

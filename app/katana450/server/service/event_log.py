@@ -17,7 +17,7 @@ from katana450.server.view.texts import told
 log = logging.getLogger(__name__)
 
 UNITS = {
-    Reason.HALTED: "m",
+    Reason.STOPPED: "m",
     Reason.CONTACT: "m",
     Reason.ACROSS_GAP: "rad",
     Reason.OUT_OF_REACH: "m",

@@ -86,7 +86,7 @@ class Hub:
     ) -> Window:
         """A page opens its control socket; one that comes back is who it was.
 
-        ``heartbeat``: its newest sign of life; without one, what ``beat`` says.
+        ``heartbeat``: its newest sign of life; without one, what ``heartbeat`` says.
         """
         key = key_of(visitor, page)
         known = self._remembered.pop(key) if key in self._remembered else None
@@ -112,8 +112,8 @@ class Hub:
         self.performer.leave(window)
         if self.lease.holder == person:
             if self.stopped is None and self._moves(self.clock()):
-                self._halt(Stopped(None, f"{person.name} left while the arm moved."))
-            self._change(self.lease.give_up(person))
+                self._stop_arm(Stopped(None, f"{person.name} left while the arm moved."))
+            self._change(self.lease.release(person))
 
     def present(self) -> Arm:
         """The arm. Raises LeaseError while there is none yet."""
@@ -158,17 +158,17 @@ class Hub:
     def stop(self, name: str, press: str | None = None) -> None:
         """Anybody may, at any time. A ``press`` counts once, however often it is told."""
         if self._presses.is_new(press):
-            self._halt(Stopped(name, f"{name} pressed STOP."))
+            self._stop_arm(Stopped(name, f"{name} pressed STOP."))
 
-    def reset(self, window: Window) -> None:
+    def clear_stop(self, window: Window) -> None:
         """End a stop; the arm stays where it is until somebody moves it afresh."""
         self._grasp(window)
         if self.arm is not None:
-            self.arm.release()
+            self.arm.clear_stop()
         self.stopped = None
 
-    def may_reset(self, window: Window) -> bool:
-        """Whether ``reset`` is not refused to the window."""
+    def may_clear_stop(self, window: Window) -> bool:
+        """Whether ``clear_stop`` is not refused to the window."""
         holder = self.lease.holder
         return window.person.role.may_drive and holder in (None, window.person)
 
@@ -184,8 +184,8 @@ class Hub:
     def withdraw(self, window: Window) -> None:
         self.lease = self.lease.withdraw(window.person)
 
-    def give_up(self, window: Window) -> None:
-        self._change(self.lease.give_up(window.person))
+    def release_lease(self, window: Window) -> None:
+        self._change(self.lease.release(window.person))
 
     def hand_over(self, window: Window, number: int) -> None:
         """To the window of that number."""
@@ -256,20 +256,20 @@ class Hub:
         """Stop an arm whose process does not answer: it stops once it is there again."""
         age, due = arm.age, self._moves(self.clock()) or not arm.caught_up
         if self.stopped is None and due and age > 2 * self._hold_after:
-            self._halt(Stopped(None, f"The arm's process did not answer for {age:.1f} s."))
+            self._stop_arm(Stopped(None, f"The arm's process did not answer for {age:.1f} s."))
 
     def _agree_with(self, arm: Arm) -> None:
         """What is stopped here is stopped there, and the other way round."""
         snapshot = arm.snapshot
-        halted = snapshot.state.halted is not None
+        stopped = snapshot.state.stopped is not None
         if self.stopped is not None:
             self.stopped = self.stopped.seen(snapshot)
             sent = self.stopped.ticket
-            if not halted and (sent is None or snapshot.ticket >= sent):
+            if not stopped and (sent is None or snapshot.ticket >= sent):
                 # An arm that came after the stop, or an error that undid it.
                 self.stopped = self.stopped.requested(arm.stop())
-        elif self.stopped is None and halted and arm.caught_up:
-            self._halt(Stopped(None, "The arm lost the server and stopped."))
+        elif self.stopped is None and stopped and arm.caught_up:
+            self._stop_arm(Stopped(None, "The arm lost the server and stopped."))
 
     def _who(self) -> str | None:
         """Who has a hand in what the arm does now."""
@@ -286,7 +286,7 @@ class Hub:
         if silent and self.stopped is None and self._moves(t):
             there = holder.key in self._windows
             why = "fell silent" if there else "lost the connection"
-            self._halt(Stopped(None, f"{holder.name} {why} while the arm moved."))
+            self._stop_arm(Stopped(None, f"{holder.name} {why} while the arm moved."))
         self._change(self.lease.expire(t))
         return silent and self.lease.holder is not None
 
@@ -299,7 +299,7 @@ class Hub:
             self._hold()
         self.lease = lease
 
-    def _halt(self, stopped: Stopped) -> None:
+    def _stop_arm(self, stopped: Stopped) -> None:
         self._let_go()
         self.performer.stopped()
         if self.stopped is None:
@@ -321,7 +321,7 @@ class Hub:
     def _check_runs(self) -> Arm:
         arm = self.present()
         if self.stopped is not None:
-            raise LeaseError("The arm is stopped: reset it first.")
+            raise LeaseError("The arm is stopped: clear the stop first.")
         return arm
 
     def _grasp(self, window: Window) -> None:

@@ -145,10 +145,10 @@ class ProgramRunner:
         self._seen = self._hub.clock()
 
     def steer(self, window: Window, order: Order) -> None:
-        """Run, step, pause, resume or halt it. Raises LeaseError with the reason why not.
+        """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
 
         While it is planned, RUN and STEP are done as soon as it is, PAUSE and RESUME decide whether
-        it then starts paused, and HALT cancels the planning.
+        it then starts paused, and END cancels the planning.
         """
         self._check_may_drive(window)
         planning = self._planning
@@ -170,7 +170,7 @@ class ProgramRunner:
                 self._tell(*commands)
             case Order.PAUSE:
                 self._tell(cmd.Pause())
-            case Order.HALT:
+            case Order.END:
                 self._end(f"{window.person.name} ended it.")
 
     def _steer_planning(self, planning: Planning, window: Window, order: Order) -> None:
@@ -182,7 +182,7 @@ class ProgramRunner:
                 self._hub.move(window, cmd.Pause())
             case Order.RESUME:
                 self._hub.move(window, cmd.Resume())
-            case Order.HALT:
+            case Order.END:
                 self._then = None
                 planning.cancel(f"{window.person.name} cancelled the planning.")
 
@@ -297,7 +297,7 @@ class ProgramRunner:
             self._then = order
             return
         if hub.lease.holder == window.person:
-            hub.give_up(window)
+            hub.release_lease(window)
         planning.refused, planning.note = None, ""
         program = planning.program
         visitor = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
@@ -306,7 +306,7 @@ class ProgramRunner:
             hub.acquire(joined)
             # What was wanted before is over; a pause lasts until somebody resumes. This also finds
             # out whether the arm is stopped.
-            hub.move(joined, cmd.Reset())
+            hub.move(joined, cmd.Hold())
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise
@@ -330,7 +330,7 @@ class ProgramRunner:
 
     def _end(self, why: str) -> None:
         assert self._run is not None
-        self._run, commands = runner.halted(self._run, why)
+        self._run, commands = runner.stopped(self._run, why)
         # A stopped arm takes no commands, nor does one that does not answer.
         with suppress(LeaseError, InputError):
             self._tell(*commands)
@@ -346,7 +346,7 @@ class ProgramRunner:
             # A program's speed is its own.
             self._hub.arm.limit(self._speed)
         if self._hub.lease.holder == joined.person:
-            self._hub.give_up(joined)
+            self._hub.release_lease(joined)
         self._hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
@@ -372,9 +372,9 @@ class ProgramRunner:
         return t - self._seen > self._owner_silence
 
     def _check_not_stopped(self) -> None:
-        """A run that is asked for during a stop must not begin after the reset."""
+        """A run that is asked for during a stop must not begin after the stop is cleared."""
         if self._hub.stopped is not None:
-            raise LeaseError("The arm is stopped: reset it first.")
+            raise LeaseError("The arm is stopped: clear the stop first.")
 
     def _check_may_drive(self, window: Window) -> None:
         if not window.person.role.may_drive:

@@ -40,7 +40,7 @@ def finding(found: control.Finding) -> answers.Finding:
         unit=unit,
         axis=None if found.axis is None else found.axis + 1,
         parts=found.parts,
-        seconds=found.time if found.reason is control.Reason.HALTED else None,
+        seconds=found.time if found.reason is control.Reason.STOPPED else None,
     )
 
 

@@ -88,7 +88,7 @@ class _Orders:
         """All of them, at once."""
         turned = (cmd.SetAxes(tuple(self.axes.items())),) if self.axes else ()
         said = (*turned, *self.others)
-        return said[0] if len(said) == 1 else cmd.Together(said)
+        return said[0] if len(said) == 1 else cmd.Batch(said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +182,7 @@ class Nodes:
     def _field(self, state: State, node: str, field: str) -> _Field:
         found = self._nodes(state).get(node)
         if found is None:
-            raise InputError(f"There is no node {node!r}; `look` at `world` lists them.")
+            raise InputError(f"There is no node {node!r}; `query` of `world` lists them.")
         if field not in found.fields:
             known = ", ".join(found.fields)
             raise InputError(f"{node!r} is a {found.kind} with {known}, and has no {field!r}.")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from katana450.arm.control.commands import Command, MoveTool, Settle, TurnTool
+from katana450.arm.control.commands import Command, EndDrag, MoveTool, TurnTool
 from katana450.arm.control.state import State, ToolTarget
 from katana450.arm.robot.model import RobotModel
 from katana450.maths.geometry import so3
@@ -141,7 +141,7 @@ class Gizmo:
 
     def _settle(self, event: viser.TransformControlsEvent) -> None:
         if event.phase == "end":
-            self._put(Settle())
+            self._put(EndDrag())
 
     async def _pitched(self, event: viser.TransformControlsEvent) -> None:
         turn = self._turning(event, "pitch")

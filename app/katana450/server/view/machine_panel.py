@@ -19,7 +19,7 @@ from katana450.server.view.looks import add_themes
 from katana450.server.view.readout import style
 from katana450.server.view.texts import headline, mood, sentence, signed
 
-GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Reset()}
+GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
 
 STEPS = 400
 """Of a slider from end to end, at least."""

@@ -38,8 +38,8 @@ FARTHEST = 1000.0
 
 GESTURES: dict[str, cmd.Command] = {
     "Home": cmd.Home(),
-    "Stretch": cmd.Stretch(),
-    "Hold": cmd.Reset(),
+    "Go to zero": cmd.GoToZero(),
+    "Hold": cmd.Hold(),
 }
 
 
@@ -71,7 +71,7 @@ class Panel:
         self._gestures = self._gui.add_button_group(
             "Drive",
             tuple(GESTURES),
-            hint="Home: to the ready posture. Stretch: every joint to zero, the arm along x. "
+            hint="Home: to the ready posture. Go to zero: every joint to zero, the arm along x. "
             "Hold: stop here and forget the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])

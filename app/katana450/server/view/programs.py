@@ -38,7 +38,7 @@ ORDERS = {
     "Run": Order.RUN,
     "Step": Order.STEP,
     "Wait": Order.PAUSE,
-    "End": Order.HALT,
+    "End": Order.END,
 }
 
 

@@ -43,7 +43,7 @@ GHOST_COLOURS: dict[Status, Colour] = {
     Status.HELD: (234, 88, 12),
     Status.BLOCKED: (255, 153, 0),
     Status.PAUSED: (120, 130, 145),
-    Status.HALTED: (230, 45, 45),
+    Status.STOPPED: (230, 45, 45),
     Status.FAULT: (230, 45, 45),
 }
 

@@ -40,10 +40,6 @@ FAREWELL = 1.0
 """[s] That who is sent away has for being told so: who reads nothing cannot be told."""
 
 
-ANSWERED = (requests.Beat, requests.Look, requests.Get)
-"""Requests that are answered without an id too."""
-
-
 class GoneError(Exception):
     """The other side has hung up."""
 
@@ -116,7 +112,7 @@ class Channel(ABC):
     def answer(self, window: Window, request: requests.AnyRequest) -> None:
         """Do it and tell the answer, if the request has an id or is a question."""
         answer = self._desk.do(window, request, self.budget)
-        if request.id is not None or isinstance(request, ANSWERED):
+        if request.id is not None or request.traits.answered:
             self.tell(answer)
 
     async def run(self, window: Window) -> None:
@@ -146,7 +142,7 @@ class Channel(ABC):
                 self.refuse(str(error), requests.id_of(text))
                 continue
             # A hand that hammers on STOP is never too fast.
-            if not self._often.take(self.hub.clock()) and not isinstance(request, requests.Stop):
+            if not self._often.take(self.hub.clock()) and not request.traits.safety:
                 log.warning("%s asks too much at once and is sent away.", window.person.name)
                 await self._send_away(TOO_MUCH, "Too many requests.")
                 return

@@ -84,7 +84,7 @@ class Api:
                 self._hub.beat(window)
             try:
                 with self._budget(request).charged(driver, fixed=FIXED_HTTP):
-                    return as_json(self._desk.look(at))
+                    return as_json(self._desk.query(at))
             except LeaseError as error:
                 raise HTTPException(TOO_SOON, str(error)) from error
             except BusyError as error:

@@ -111,7 +111,7 @@ class Program(Channel):
         self._window, person = window, window.person
         self.tell(
             answers.Welcome(
-                name=person.name, number=window.number, role=person.role.value, beat=BEAT
+                name=person.name, number=window.number, role=person.role.value, heartbeat=BEAT
             )
         )
 
