@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import signal
 import socket
+from argparse import Namespace
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -36,8 +37,8 @@ class FrontendConfig:
     """What a front is given each time it is started.
 
     ``urdf``, ``tool``: see ``robot.model.load``. ``listening``: the port for browsers. ``lines``:
-    the one for JSON lines. ``workspace``: file of a reachability map. ``meshes``: those of the
-    things there are at first.
+    the one for JSON lines. ``options``: those of the extensions; None where none takes part.
+    ``meshes``: those of the things there are at first.
     """
 
     settings: Settings
@@ -45,7 +46,7 @@ class FrontendConfig:
     tool: str | None
     listening: socket.socket
     lines: socket.socket | None
-    workspace: Path | None
+    options: Namespace | None
     meshes: tuple[Mesh, ...]
 
 

@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
@@ -37,19 +38,40 @@ HUNG = 10.0
 log = logging.getLogger(__name__)
 
 
+def serve_with(options: Namespace) -> int:
+    """Run the app with the options of ``katana450 serve``; see ``serve``."""
+    settings = Settings(
+        host=options.host,
+        port=options.port,
+        silence=options.silence,
+        owner_silence=options.owner_silence,
+        access=options.access,
+        insecure=options.insecure,
+        tls_cert=options.tls_cert,
+        tls_key=options.tls_key,
+        public_url=options.public_url,
+        lines=options.lines,
+        bare=options.bare,
+        programs=options.programs,
+    )
+    # Sent to another process, which has no use for the command itself.
+    values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})
+    return serve(settings, options.urdf, options.tool, options.scene, options.objects, values)
+
+
 def serve(
     settings: Settings,
     urdf: Path = URDF_PATH,
     tool: str | None = None,
-    workspace: Path | None = None,
     scene: Path | None = None,
     objects: Sequence[str] = (),
+    options: Namespace | None = None,
 ) -> int:
     """Run the app until SIGINT or SIGTERM; returns the exit status, 1 if the control loop ended.
 
     ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.model.load``.
-    ``workspace``: file of a reachability map that can be shown. ``scene``, ``objects``: see
-    ``furnished``.
+    ``scene``, ``objects``: see ``furnished``. ``options``: those of the extensions; None where
+    none is to take part.
     """
     start_log()
     # Read before anything runs: the front shows what it is given here, each time it is started.
@@ -67,7 +89,7 @@ def serve(
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
     meshes = () if stored is None else stored.meshes
-    outfit = FrontendConfig(settings, urdf, tool, listening, lines, workspace, meshes)
+    outfit = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
     current, arm = Front(outfit), None
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from katana450.cli.arm_options import add_arm_options
+from katana450.extension import extensions
 from katana450.settings import Settings
 
 SHORTEST_SILENCE, LONGEST_SILENCE, LONGEST_OWNER_SILENCE = 0.2, 2.0, 10.0
@@ -21,12 +23,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--workspace",
-        type=Path,
-        metavar="FILE.npz",
-        help="a map written by `katana450 workspace --out`, to be shown in the scene",
     )
     parser.add_argument(
         "--scene",
@@ -94,6 +90,10 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help="a TCP port of this machine for programs that speak a line of JSON at a time",
     )
+    for extension in extensions():
+        if extension.serve is not None:
+            extension.serve.add_options(parser)
+    add_arm_options(parser)
 
 
 def _silence(text: str) -> float:

@@ -1,0 +1,170 @@
+"""Extensions found, left out and added: the command line in processes of their own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from katana450.extension import BUILT_IN, extensions
+from tests.browser.server import AppServer
+
+ROOT = Path(__file__).resolve().parents[2]
+LINE = '{"q": [0, 0, 0, 0, 0]}\n'
+
+BLOCKING = """
+import os, sys
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        for blocked in os.environ["BLOCKED"].split():
+            if name == blocked or name.startswith(blocked + "."):
+                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Blocked())
+"""
+
+STATION = """
+from katana450.extension import CliCommand, Extension
+
+def run(options):
+    print(f"It is {options.degrees} degrees.")
+    return 3
+
+def add_options(parser):
+    parser.add_argument("--degrees", type=int, default=20)
+
+EXTENSION = Extension("weather", (CliCommand(NAME, "tell the weather", add_options, run),))
+"""
+
+
+def katana450(*options: str, folder: Path | None = None, blocked: str = "", text: str = "") -> str:
+    """Return what a command prints, its errors too, after its exit status and a space."""
+    environment = os.environ | {"BLOCKED": blocked}
+    if folder is not None:
+        environment["PYTHONPATH"] = str(folder)
+    done = subprocess.run(
+        [sys.executable, "-m", "katana450", *options],
+        input=text,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env=environment,
+        timeout=60,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr
+    return f"{done.returncode} {done.stdout}{done.stderr}"
+
+
+@pytest.fixture
+def blocking(tmp_path: Path) -> Path:
+    """Return a folder that makes the packages in the variable BLOCKED impossible to import."""
+    (tmp_path / "sitecustomize.py").write_text(BLOCKING, encoding="utf-8")
+    return tmp_path
+
+
+def distribution(folder: Path, entry: str, module: str) -> Path:
+    """Write another distribution into ``folder``, with ``module`` and its entry point."""
+    information = folder / "weather-1.0.dist-info"
+    information.mkdir(parents=True)
+    lines = ("Metadata-Version: 2.1", "Name: weather", "Version: 1.0", "")
+    (information / "METADATA").write_text("\n".join(lines), encoding="utf-8")
+    points = f"[katana450.extensions]\nweather = {entry}\n"
+    (information / "entry_points.txt").write_text(points, encoding="utf-8")
+    (folder / "station.py").write_text(module, encoding="utf-8")
+    return folder
+
+
+def test_every_built_in_extension_is_found() -> None:
+    assert tuple(extension.name for extension in extensions()) == BUILT_IN
+
+
+@pytest.mark.parametrize(
+    ("name", "commands"),
+    [
+        ("reachability", ["workspace"]),
+        ("export", ["export", "render"]),
+        ("experiments", ["run", "demo"]),
+        ("render", ["render"]),
+    ],
+)
+def test_missing_extension_takes_its_commands_with_it(
+    blocking: Path, name: str, commands: list[str]
+) -> None:
+    blocked = f"katana450.extensions.{name}"
+    said = katana450("--help", folder=blocking, blocked=blocked)
+    listed = [line.split()[0] for line in said.splitlines() if line.startswith("    ")]
+    everything = ["serve", "fk", "ik", "access", "workspace", "export", "run", "demo", "render"]
+    assert [each for each in everything if each not in listed] == commands
+    refused = katana450(commands[0], folder=blocking, blocked=blocked)
+    assert refused.startswith("2 ")
+    assert f"invalid choice: '{commands[0]}'" in refused
+
+
+def test_core_commands_work_without_any_extension(blocking: Path) -> None:
+    blocked = "katana450.extensions"
+    helped = katana450("--help", folder=blocking, blocked=blocked)
+    assert helped.startswith("0 ")
+    assert "serve" in helped
+    assert "demo" not in helped
+    assert "left out" not in helped
+    assert '"T": [[1.0, ' in katana450("fk", folder=blocking, blocked=blocked, text=LINE)
+    assert "--workspace" not in katana450("serve", "--help", folder=blocking, blocked=blocked)
+
+
+def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
+    blocked = "katana450.extensions.report"
+    said = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
+    assert said.startswith("1 ")
+    assert "The extension report is needed and not installed." in said
+
+
+def test_server_runs_without_the_extensions_it_does_not_need(
+    blocking: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("reachability", "experiments", "report")
+    monkeypatch.setenv("BLOCKED", " ".join(f"katana450.extensions.{name}" for name in names))
+    monkeypatch.setenv("PYTHONPATH", str(blocking))
+    with AppServer() as server:
+        assert server.running
+
+
+def test_another_distribution_adds_a_command(tmp_path: Path) -> None:
+    module = STATION.replace("NAME", "'weather'")
+    folder = distribution(tmp_path, "station:EXTENSION", module)
+    assert "tell the weather" in katana450("--help", folder=folder)
+    assert katana450("weather", "--degrees", "7", folder=folder) == "3 It is 7 degrees.\n"
+
+
+@pytest.mark.parametrize(
+    ("entry", "module", "said"),
+    [
+        ("station:EXTENSION", "raise ValueError('no wind')", "weather cannot be loaded"),
+        ("station:EXTENSION", "import no_such_thing", "No module named 'no_such_thing'"),
+        ("station:EXTENSION", "EXTENSION = 7", "is not an Extension"),
+        ("station:EXTENSION", STATION.replace("NAME", "'fk'"), "two commands fk"),
+    ],
+)
+def test_broken_extension_of_another_distribution_is_reported_and_left_out(
+    tmp_path: Path, entry: str, module: str, said: str
+) -> None:
+    folder = distribution(tmp_path, entry, module)
+    answered = katana450("fk", folder=folder, text=LINE)
+    assert answered.startswith("0 ")
+    assert '"T": [[1.0, ' in answered
+    assert said in answered
+
+
+def test_reading_options_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; from katana450.cli.main import _parser; _parser();"
+        "print(*sorted({'numpy', 'viser', 'yaml', 'trimesh', 'asyncio'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.split() == []
