@@ -21,12 +21,17 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from starlette.routing import BaseRoute
+
+    from katana450.arm.control.session import Session
+    from katana450.arm.robot.initial_scene import InitialScene
     from katana450.server.view.layer import ViewLayer
+    from katana450.server.web.http_api import RouteContext
 
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
-BUILT_IN = ("reachability", "export", "experiments", "render")
+BUILT_IN = ("importers", "reachability", "export", "experiments", "render")
 """Built-in extensions, in the order of their commands in the help."""
 
 log = logging.getLogger(__name__)
@@ -51,16 +56,23 @@ class CliCommand:
 
 @dataclass(frozen=True)
 class ServeExtension:
-    """A part of ``katana450 serve``.
+    """A part of ``katana450 serve``. Each function is called once at the start, or never.
 
     Attributes:
         add_options: Adds options to the parser of ``serve``.
-        view_layer: Returns what to show in the scene with these options, or None. It runs in the
-            process of the view. Raises KatanaError.
+        initial_scene: Returns what stands around at first according to the options, or None. Its
+            second argument returns the session of the robot, and raises RobotDescriptionError if
+            that is not an arm. Called in the process of the arm. Raises KatanaError.
+        view_layer: Returns what to show in the scene according to the options, or None. Called in
+            the process of the view. Raises KatanaError.
+        routes: Returns routes for the web server, below ``/api/v1``. Called in the process of the
+            view.
     """
 
     add_options: Callable[[ArgumentParser], None]
-    view_layer: Callable[[Namespace], ViewLayer | None]
+    initial_scene: Callable[[Namespace, Callable[[], Session]], InitialScene | None] | None = None
+    view_layer: Callable[[Namespace], ViewLayer | None] | None = None
+    routes: Callable[[RouteContext], list[BaseRoute]] | None = None
 
 
 @dataclass(frozen=True)
@@ -86,6 +98,11 @@ def extensions() -> tuple[Extension, ...]:
     too, and logged.
     """
     return tuple(_loaded())
+
+
+def serve_extensions() -> tuple[ServeExtension, ...]:
+    """Return what the installed extensions add to ``katana450 serve``."""
+    return tuple(each.serve for each in extensions() if each.serve is not None)
 
 
 def missing_extension(error: ImportError) -> str | None:

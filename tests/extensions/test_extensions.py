@@ -5,11 +5,16 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import urllib.error
+import urllib.request
 from pathlib import Path
 
 import pytest
 
+from katana450.client import connect
 from katana450.extension import BUILT_IN, extensions
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import ROOT as ROOT_PATH
 from tests.browser.server import AppServer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,6 +43,28 @@ def add_options(parser):
     parser.add_argument("--degrees", type=int, default=20)
 
 EXTENSION = Extension("weather", (CliCommand(NAME, "tell the weather", add_options, run),))
+"""
+
+SERVED = """
+from starlette.responses import PlainTextResponse
+from starlette.routing import Route
+
+from katana450.extension import Extension, ServeExtension
+
+def add_options(parser):
+    parser.add_argument("--degrees", type=int, default=20)
+
+def routes(context):
+    async def weather(request):
+        context.visitor(request)
+        return PlainTextResponse(f"arm: {context.hub.arm is not None}")
+    return [Route("/api/v1/weather", weather)]
+
+def view_layer(options):
+    assert options.degrees == 7
+
+SERVE = ServeExtension(add_options, view_layer=view_layer, routes=routes)
+EXTENSION = Extension("weather", serve=SERVE)
 """
 
 
@@ -123,14 +150,45 @@ def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
     assert "The extension report is needed and not installed." in said
 
 
+NOT_NEEDED = ("importers", "scene", "reachability", "experiments", "report", "render")
+"""Extensions that a server runs without."""
+
+
 def test_server_runs_without_the_extensions_it_does_not_need(
     blocking: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    names = ("reachability", "experiments", "report")
-    monkeypatch.setenv("BLOCKED", " ".join(f"katana450.extensions.{name}" for name in names))
+    monkeypatch.setenv("BLOCKED", " ".join(f"katana450.extensions.{name}" for name in NOT_NEEDED))
     monkeypatch.setenv("PYTHONPATH", str(blocking))
     with AppServer() as server:
         assert server.running
+        with connect(server.url, "Test") as arm:
+            assert arm.look(answers.Things).things
+            arm.ask(requests.Home())
+        upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(upload, timeout=10)
+        with refused.value:
+            assert refused.value.code == 404
+
+
+def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
+    blocked = "katana450.extensions.importers"
+    said = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
+    assert said.startswith("2 ")
+    assert "unrecognized arguments: --scene" in said
+
+
+def test_another_distribution_adds_to_the_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = distribution(tmp_path, "station:EXTENSION", SERVED)
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    command = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+    with (
+        AppServer((*command, "--degrees", "7")) as server,
+        urllib.request.urlopen(f"{server.url}{ROOT_PATH}/weather", timeout=10) as answer,
+    ):
+        assert answer.read() == b"arm: True"
 
 
 def test_another_distribution_adds_a_command(tmp_path: Path) -> None:

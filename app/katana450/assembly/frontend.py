@@ -5,14 +5,14 @@ from __future__ import annotations
 from argparse import Namespace
 from multiprocessing.connection import Connection
 
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.robot_session import Described, Jointed, recognised
 from katana450.errors import ConfigurationError
-from katana450.extension import extensions
-from katana450.extensions.importers.meshes import Meshes
+from katana450.extension import serve_extensions
 from katana450.extensions.programs.script_files import Scripts
 from katana450.server.service.arm_handle import Motion
 from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
@@ -46,8 +46,7 @@ def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
     """Return what the extensions show in the scene of an arm."""
     if options is None:
         return ()
-    parts = [extension.serve for extension in extensions() if extension.serve is not None]
-    found = [part.view_layer(options) for part in parts]
+    found = [part.view_layer(options) for part in serve_extensions() if part.view_layer is not None]
     return tuple(layer for layer in found if layer is not None)
 
 

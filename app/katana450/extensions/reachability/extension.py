@@ -100,5 +100,5 @@ EXTENSION = Extension(
             _workspace,
         ),
     ),
-    ServeExtension(add_serve_options, _view_layer),
+    ServeExtension(add_serve_options, view_layer=_view_layer),
 )

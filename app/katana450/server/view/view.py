@@ -12,11 +12,11 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
 from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.errors import InputError
-from katana450.extensions.importers.meshes import Meshes
 from katana450.extensions.programs.script_files import Scripts
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
