@@ -16,18 +16,18 @@ import trimesh
 
 from katana450.arm.control.lease import Role
 from katana450.arm.robot.model import RobotModel
-from katana450.assembly.initial_scene import furnished
 from katana450.assembly.robot_session import described
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
+from katana450.extensions.importers.initial_scene import furnished
 from katana450.extensions.importers.scene_file import SCENE
 from katana450.extensions.importers.shape_file import MOST_BYTES
+from katana450.extensions.importers.uploads import AT_ONCE
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Matrix4
 from katana450.server.web.access_links import AccessFile
-from katana450.server.web.uploads import AT_ONCE
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.gateway import client
@@ -231,10 +231,10 @@ def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path)
     ):
         broken.write_text(text)
         with pytest.raises(InputError, match=said):
-            furnished(robot, broken, [])
+            furnished(robot.session, broken, [])
     for told in ("/nowhere/it.stl", f"{scene}@1,2,x"):
         with pytest.raises(InputError, match=r"it\.stl cannot be read|no format"):
-            furnished(robot, None, [told])
+            furnished(robot.session, None, [told])
 
 
 def _rows(T: Any) -> Matrix4:

@@ -17,9 +17,10 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Look
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.things import Environment, Form, Thing
+from katana450.arm.robot.creases import drawn, glb
+from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
-from katana450.extensions.importers.creases import drawn, glb
-from katana450.extensions.importers.meshes import Mesh, Meshes, read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.maths.water.environment import Table
 from katana450.server.view.objects import NOTHING, ObjectsPanel
 from katana450.server.view.things import ThingNodes

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from multiprocessing.connection import Connection
 
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.robot_session import Described, Jointed, recognised
 from katana450.errors import ConfigurationError
-from katana450.extensions.export.reachability_file import load_map
-from katana450.extensions.importers.meshes import Meshes
+from katana450.extension import serve_extensions
 from katana450.extensions.programs.script_files import Scripts
 from katana450.server.service.arm_handle import Motion
 from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
 from katana450.server.view.follower import Follower
+from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.view import View, ViewOptions
 from katana450.server.web.web_server import Gateway
@@ -29,18 +31,23 @@ def attached(
 
     ``meshes``: those that things are of. Raises ConfigurationError, EOFError.
     """
-    settings, workspace = outfit.settings, outfit.workspace
+    settings, layers = outfit.settings, _layers(outfit.options)
     found = recognised(settings, outfit.urdf, outfit.tool)
     link = FrontEnd(pipe, found.session.check)
     if isinstance(found, Jointed):
-        if workspace is not None:
-            raise ConfigurationError(
-                f"{workspace} maps where a tool can be. {found.machine.joints.why}"
-            )
+        for layer in layers:
+            raise ConfigurationError(f"{layer.what} {found.machine.joints.why}")
         return link, _machine(gateway, settings, found, link)
-    stored = None if workspace is None else load_map(workspace)
-    besides = ViewOptions(stored, (gateway.steering, Scripts(settings.programs)), meshes)
+    besides = ViewOptions(layers, (gateway.steering, Scripts(settings.programs)), meshes)
     return link, _arm(gateway, outfit, found, link, besides)
+
+
+def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
+    """Return what the extensions show in the scene of an arm."""
+    if options is None:
+        return ()
+    found = [part.view_layer(options) for part in serve_extensions() if part.view_layer is not None]
+    return tuple(layer for layer in found if layer is not None)
 
 
 def _arm(

@@ -10,13 +10,13 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.session import Session
 from katana450.arm.control.things import Hand, Thing
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.machine import Machine, load_machine
 from katana450.arm.robot.model import RobotModel, load
 from katana450.arm.robot.props import load_props
@@ -26,7 +26,6 @@ from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.scene.scene import Scene
 from katana450.server.view.texts import UNCHECKED
 from katana450.settings import Settings
 
@@ -97,7 +96,7 @@ class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
     def __init__(
-        self, settings: Settings, robot: Described | Jointed, scene: Scene | None = None
+        self, settings: Settings, robot: Described | Jointed, scene: InitialScene | None = None
     ) -> None:
         """``scene``: what stands around in place of the robot's own, and where the arm stands."""
         arm = robot.model.arm if isinstance(robot, Described) else robot.machine.joints
@@ -106,7 +105,7 @@ class RunningArm:
         driver = SimulatedDriver(arm, start, gripper=0.0)
         self._mailbox = Mailbox(session.check)
         if scene is not None:
-            self._mailbox.put(cmd.Furnish(scene.things, scene.water))
+            self._mailbox.put(scene.command)
         self._loop = ControlLoop(
             session, driver, self._mailbox, MonotonicClock(), settings.rate, settings.silence
         )

@@ -14,8 +14,8 @@ import numpy as np
 
 from katana450.arm.control.arm import Arm
 from katana450.errors import ConfigurationError, installing
+from katana450.extensions.programs.simulation import Trace
 from katana450.extensions.report.measures import Along
-from katana450.extensions.report.trace import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import tool_speed
 

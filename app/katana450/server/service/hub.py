@@ -13,15 +13,15 @@ from typing import Any
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import JOG_TIME
 from katana450.arm.control.lease import Lease, Person
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
-from katana450.extensions.importers.meshes import Meshes
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import Rates
 from katana450.server.service.event_log import Journal
 from katana450.server.service.heartbeats import Heartbeat
 from katana450.server.service.interfaces import Arm, Behind
 from katana450.server.service.program_runner import ProgramRunner
-from katana450.server.service.scene_transfer import Scenes
+from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_state import Presses, Stopped
 from katana450.server.web.authenticator import Identity
 from katana450.settings import Settings

@@ -10,8 +10,8 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
-from katana450.extensions.importers.meshes import Meshes
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.traces import Traces
 from katana450.server.viser_bridge.viser_server import close_server, open_server

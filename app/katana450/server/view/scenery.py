@@ -10,8 +10,8 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
-from katana450.extensions.importers.meshes import Meshes
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.conduit import Conduits
 from katana450.server.view.room import furnish

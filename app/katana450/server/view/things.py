@@ -15,11 +15,11 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Form, Thing
+from katana450.arm.robot.creases import Drawn, drawn, glb
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.visual import Visual
 from katana450.errors import InputError
-from katana450.extensions.importers.creases import Drawn, drawn, glb
-from katana450.extensions.importers.meshes import Meshes
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.controls import refuse

@@ -12,12 +12,11 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
 from katana450.arm.robot.model import RobotModel
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.errors import InputError
-from katana450.extensions.export.reachability_file import StoredMap
-from katana450.extensions.importers.meshes import Meshes
 from katana450.extensions.programs.script_files import Scripts
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
@@ -25,12 +24,12 @@ from katana450.server.view.cameras import Cameras, Preset
 from katana450.server.view.ellipsoid import Ellipsoid
 from katana450.server.view.follower import Follower
 from katana450.server.view.gizmo import Gizmo
+from katana450.server.view.layer import ViewLayer
 from katana450.server.view.looks import Shows
 from katana450.server.view.objects import ObjectsPanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
 from katana450.server.view.programs import ProgramsPanel, Steering
-from katana450.server.view.reachability import ReachabilityCloud
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.texts import title
@@ -57,11 +56,11 @@ GHOST_FROM = np.deg2rad(0.2)
 class ViewOptions:
     """What is shown besides the arm.
 
-    workspace: a map of it. programs: who runs them, and which there are. meshes: those that things
-    are of.
+    layers: what extensions show. programs: who runs them, and which there are. meshes: those that
+    things are of.
     """
 
-    workspace: StoredMap | None = None
+    layers: tuple[ViewLayer, ...] = ()
     programs: tuple[Steering, Scripts] | None = None
     meshes: Meshes = field(default_factory=Meshes)
 
@@ -82,7 +81,7 @@ class View(Follower):
         """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
         second [Hz].
 
-        Raises ConfigurationError for the map of another arm.
+        Raises KatanaError where a layer cannot be shown.
         """
         super().__init__(server, board, frame_rate)
         besides = ViewOptions() if besides is None else besides
@@ -99,14 +98,11 @@ class View(Follower):
         self._traces = Traces(server, model)
         self._gizmo = Gizmo(server, model, self._put_dragged, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, model)
-        cloud = (
-            None
-            if besides.workspace is None
-            else ReachabilityCloud(server, model, besides.workspace)
-        )
+        for layer in besides.layers:
+            layer.attach(server, model)
         self._cameras = Cameras(server, model)
         shows = Shows(
-            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, cloud
+            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, besides.layers
         )
         self._goal: FloatArray | None = None
         self._tool = ""

@@ -6,7 +6,8 @@ import asyncio
 import logging
 import math
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
+from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -25,7 +26,6 @@ from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
 from katana450.server.web.authenticator import Authenticator, Identity
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
-from katana450.server.web.uploads import Uploads
 
 log = logging.getLogger(__name__)
 
@@ -45,15 +45,41 @@ LONGEST_PAUSE = 0.5
 """[s] Before too frequent a request is refused."""
 
 
+class RouteContext(NamedTuple):
+    """What a route of an extension can use.
+
+    Attributes:
+        hub: The arm and who drives it.
+        door: Knows people by their cookies and links.
+        visitor: Returns who sends a request, or raises the HTTPException that refuses it.
+    """
+
+    hub: Hub
+    door: Authenticator
+    visitor: Callable[[Request], Identity]
+
+
+RouteProvider = Callable[[RouteContext], list[BaseRoute]]
+"""Returns routes of an extension."""
+
+
 class Api:
     """Its routes."""
 
-    def __init__(self, hub: Hub, door: Authenticator, budgets: Budgets) -> None:
+    def __init__(
+        self,
+        hub: Hub,
+        door: Authenticator,
+        budgets: Budgets,
+        provided: Sequence[RouteProvider] = (),
+    ) -> None:
+        """``provided``: routes of the extensions."""
         self._hub = hub
         self._budgets = budgets
         self._door = door
         self._desk = Dispatcher(hub)
-        self._uploads = Uploads(hub, door, self._visitor)
+        context = RouteContext(hub, door, self._visitor)
+        self._provided = [route for provider in provided for route in provider(context)]
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
     def routes(self) -> list[BaseRoute]:
@@ -69,7 +95,7 @@ class Api:
             *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
             Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
             Route(f"{ROOT}/do", self._do, methods=["POST"]),
-            *self._uploads.routes(),
+            *self._provided,
             Route(f"{ROOT}/openapi.json", described),
             WebSocketRoute(f"{ROOT}/socket", socket),
         ]

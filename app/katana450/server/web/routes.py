@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 import msgspec
@@ -25,7 +26,7 @@ from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
 from katana450.server.web.authenticator import Address, Authenticator, Identity
 from katana450.server.web.bodies import body_of
-from katana450.server.web.http_api import Api
+from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -48,8 +49,9 @@ def application(
     proxy: Proxy,
     address: Address,
     acceptor: Acceptor,
+    provided: Sequence[RouteProvider] = (),
 ) -> ASGIApp:
-    """Everything that answers at the port."""
+    """Everything that answers at the port; ``provided``: routes of the extensions."""
     static = static_files.load()
     index = static.pop("index.html")
     viser = viser_page.load()
@@ -112,7 +114,7 @@ def application(
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
-        *Api(hub, door, budgets).routes(),
+        *Api(hub, door, budgets, provided).routes(),
     ]
     admission = Admission(Starlette(routes=routes), door, acceptor)
     return security.SecurityMiddleware(admission, address)

@@ -10,6 +10,7 @@ import ssl
 import threading
 import time
 from asyncio import BaseTransport, Transport
+from collections.abc import Sequence
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Any, cast
@@ -19,8 +20,8 @@ import viser
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import ConfigurationError
-from katana450.extensions.importers.meshes import Meshes
 from katana450.server.service.arm_handle import Motion
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival, keep_alive
@@ -34,6 +35,7 @@ from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator, public_origin
 from katana450.server.web.channel import ARRIVAL
+from katana450.server.web.http_api import RouteProvider
 from katana450.server.web.listen import reaches_beyond
 from katana450.server.web.program_socket import Lines
 from katana450.server.web.routes import application
@@ -64,9 +66,11 @@ class Gateway:
         listening: socket.socket,
         lines: socket.socket | None = None,
         meshes: Meshes | None = None,
+        routes: Sequence[RouteProvider] = (),
     ) -> None:
         """``listening``: the port; ``lines``: that for programs which speak JSON lines.
-        ``meshes``: those that things are of, where uploaded ones are kept too.
+        ``meshes``: those that things are of, where uploaded ones are kept too. ``routes``: of the
+        extensions.
 
         Raises ConfigurationError when it must not be served there as ``settings`` say.
         """
@@ -91,7 +95,7 @@ class Gateway:
             door = Authenticator(access, self.port, self.address)
             proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
             acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
-            app = application(self._hub, door, budgets, proxy, self.address, acceptor)
+            app = application(self._hub, door, budgets, proxy, self.address, acceptor, routes)
             self._lines = Lines(self._hub, door, budgets)
         except BaseException:
             self._listening.close()

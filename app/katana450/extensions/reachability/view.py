@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from enum import Enum
 from html import escape
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import viser
 
 from katana450.arm.robot.model import RobotModel
 from katana450.errors import ConfigurationError
-from katana450.extensions.export.reachability_file import StoredMap
 from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.reachability_file import StoredMap, load_map
 
 FILL = 0.2
 """Radius of a point to the edge of its voxel: the arm is seen between them."""
-
 
 STOPS = 9
 """Colours of the scale; a browser draws those between them."""
 
 
 class Cut(Enum):
-    """What of the map is drawn."""
+    """The part of the map that is drawn."""
 
     HIDDEN = "Hidden"
     SLICE = "Slice through axis 1"
@@ -30,19 +31,55 @@ class Cut(Enum):
     WHOLE = "Whole"
 
 
-class ReachabilityCloud:
-    """Hidden until a person asks for it."""
+class ReachabilityLayer:
+    """A stored map as a layer of the scene, hidden until a person chooses a cut of it."""
 
-    def __init__(self, server: viser.ViserServer, model: RobotModel, stored: StoredMap) -> None:
-        """Raises ConfigurationError when ``stored`` is the map of another arm."""
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    @property
+    def what(self) -> str:
+        """A sentence that says what needs an arm."""
+        return f"{self._path} maps where a tool can be."
+
+    def attach(self, server: viser.ViserServer, model: RobotModel) -> None:
+        """Read the map and prepare to draw it in the scene of ``model``.
+
+        Raises InputError if the file is no map, ConfigurationError if it is that of another arm.
+        """
+        stored = load_map(self._path)
         if stored.robot != model.name:
             raise ConfigurationError(
                 f"The map given with --workspace is of the arm {stored.robot!r}; this one is "
                 f"{model.name!r}. Make one with: katana450 workspace --urdf ... --out map.npz"
             )
+        self._cloud = ReachabilityCloud(server, stored, float(model.T_base_shoulder[1, 3]))
+
+    def add_controls(self, gui: viser.GuiApi) -> None:
+        """Add the choice of a cut, and the legend that is shown with it."""
+        cuts = gui.add_dropdown(
+            "Reachability",
+            tuple(cut.value for cut in Cut),
+            initial_value=Cut.HIDDEN.value,
+            hint="Where the tool can be: the map given with --workspace",
+        )
+        legend = gui.add_html(self._cloud.legend, visible=False)
+
+        @cuts.on_update
+        def _(_: viser.GuiEvent[Any]) -> None:
+            cut = Cut(cuts.value)
+            legend.visible = cut is not Cut.HIDDEN
+            self._cloud.show(cut)
+
+
+class ReachabilityCloud:
+    """The voxels of a map as points in the scene."""
+
+    def __init__(self, server: viser.ViserServer, stored: StoredMap, middle: float) -> None:
+        """``middle``: y of axis 1 in the base frame [m], where the map is cut."""
         self._server = server
         self._stored = stored
-        self._middle = float(model.T_base_shoulder[1, 3])
+        self._middle = middle
         self._node: viser.PointCloudHandle | None = None
         self._colors = share_colors(stored.share)
 
@@ -62,7 +99,7 @@ class ReachabilityCloud:
         )
 
     def show(self, cut: Cut) -> None:
-        """Draw the map as ``cut`` has it."""
+        """Draw the part ``cut`` of the map."""
         if self._node is not None:
             self._node.remove()
             self._node = None

@@ -1,9 +1,16 @@
-"""The options of ``katana450 workspace``, apart from its work: reading them must load nothing."""
+"""The extension ``reachability``: where the tool can be, as a command and in the scene."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.cli.arm_options import add_arm_options
+from katana450.extension import CliCommand, Extension, ServeExtension
+
+if TYPE_CHECKING:
+    from katana450.server.view.layer import ViewLayer
 
 
 def add_workspace_options(parser: argparse.ArgumentParser) -> None:
@@ -56,3 +63,42 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
         help="spread the work over the Dask cluster of this scheduler, such as "
         "tcp://10.0.0.1:8786; needs the extra `dask`",
     )
+    add_arm_options(parser)
+
+
+def _workspace(options: argparse.Namespace) -> int:
+    from katana450.extensions.reachability.workspace import workspace
+
+    return workspace(options)
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """Add to `katana450 serve` the option that shows a map."""
+    parser.add_argument(
+        "--workspace",
+        type=Path,
+        metavar="FILE.npz",
+        help="a map written by `katana450 workspace --out`, to be shown in the scene",
+    )
+
+
+def _view_layer(options: argparse.Namespace) -> ViewLayer | None:
+    if options.workspace is None:
+        return None
+    from katana450.extensions.reachability.view import ReachabilityLayer
+
+    return ReachabilityLayer(options.workspace)
+
+
+EXTENSION = Extension(
+    "reachability",
+    (
+        CliCommand(
+            "workspace",
+            "map where the tool can be, and how freely it can be turned there",
+            add_workspace_options,
+            _workspace,
+        ),
+    ),
+    ServeExtension(add_serve_options, view_layer=_view_layer),
+)

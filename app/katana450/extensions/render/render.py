@@ -22,15 +22,15 @@ from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import described
 from katana450.atomic import check_writable, write_files, writer_of
-from katana450.cli.clocked_run import Performance, chosen
-from katana450.cli.progress import progress
 from katana450.errors import InputError
+from katana450.extensions.export.playback import Playback, chosen
+from katana450.extensions.progress import progress
 from katana450.extensions.render.camera import Camera
 from katana450.extensions.render.film import check_filmable, write_film
 from katana450.extensions.render.picture import MOVING, STILL, picture
-from katana450.extensions.render.png import png
 from katana450.extensions.render.stage import Stage
 from katana450.extensions.render.tracer import check_traceable
+from katana450.png import png
 from katana450.server.view.cameras import FOV, Preset, look_from
 from katana450.server.view.room import THEMES, Theme
 from katana450.settings import Settings
@@ -82,7 +82,7 @@ class _Shot(NamedTuple):
         return picture(stage.items(state), stage.water(state), camera, theme, rays).pixels
 
 
-def _film(path: Path, shown: Performance, shot: _Shot, fps: float, urdf: Path) -> None:
+def _film(path: Path, shown: Playback, shot: _Shot, fps: float, urdf: Path) -> None:
     count = int(shown.duration * fps) + 1
     states = [_bare(shown.at(number / fps)) for number in range(count)]
     # Each picture takes one core, and knows nothing of the others.

@@ -12,8 +12,9 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from katana450.errors import InputError, LeaseError
-from katana450.extensions.importers.meshes import read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import LARGEST_ZIP, read_scene_zip
+from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
 from katana450.extensions.importers.shape_file import LONGEST_NAME, MOST_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
@@ -78,8 +79,7 @@ class Uploads:
                 raise InputError("The name of the file is too long.")
             data = await body_of(request, MOST_BYTES, PATIENCE)
             mesh = await self._off(lambda: read_mesh(data, name, unit or None))
-            arm = self._hub.arm
-            return self._hub.scenes.keep_mesh(mesh, None if arm is None else arm.state)
+            return keep_mesh(self._hub, mesh)
 
         return await self._answered(request, keep)
 
@@ -90,7 +90,7 @@ class Uploads:
             hand = arm.surroundings.hand
             T_palm_tool = None if hand is None else hand.T_palm_tool
             stored = await self._off(lambda: read_scene_zip(data, T_palm_tool))
-            return self._hub.scenes.keep(data, stored, arm)
+            return keep_scene(self._hub, data, stored, arm)
 
         return await self._answered(request, keep)
 
@@ -98,7 +98,7 @@ class Uploads:
         self._visitor(request)
         try:
             arm = self._hub.present()
-            content = await asyncio.to_thread(self._hub.scenes.zipped, arm)
+            content = await asyncio.to_thread(zipped, self._hub, arm)
         except (InputError, LeaseError) as error:
             return as_json(answers.Refused(why=str(error)), NOT_NOW)
         headers = {"Content-Disposition": 'attachment; filename="scene.zip"'}

@@ -1,11 +1,12 @@
-"""The options of ``katana450 render``, apart from its work: reading them must load nothing."""
+"""The extension ``render``: pictures and films of the arm, and the command that takes them."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from katana450.cli.export_options import joint_values
+from katana450.extension import CliCommand, Extension
+from katana450.extensions.export.extension import joint_values
 from katana450.resources import URDF_PATH
 
 CAMERAS = ("free", "front", "side", "top", "tool")
@@ -81,3 +82,22 @@ def _size(text: str) -> tuple[int, int]:
     if not (16 <= width <= 4096 and 16 <= height <= 4096):
         raise argparse.ArgumentTypeError(f"two numbers from 16 to 4096, as 1280x720, not {text!r}")
     return width, height
+
+
+def _render(options: argparse.Namespace) -> int:
+    from katana450.extensions.render.render import render
+
+    return render(options)
+
+
+EXTENSION = Extension(
+    "render",
+    (
+        CliCommand(
+            "render",
+            "a picture or a film of the arm, without a browser",
+            add_render_options,
+            _render,
+        ),
+    ),
+)

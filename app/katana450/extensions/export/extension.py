@@ -1,10 +1,14 @@
-"""The options of ``katana450 export``, apart from its work: reading them must load nothing."""
+"""The extension ``export``: files for other programs, and the command that writes them."""
 
 from __future__ import annotations
 
 import argparse
 import re
 from pathlib import Path
+
+from katana450.errors import InputError
+from katana450.extension import CliCommand, Extension
+from katana450.resources import URDF_PATH
 
 FORMATS = {
     "vrml": "a VRML97 world and a file a part, as LabVIEW, Simulink and X3D browsers read them",
@@ -58,6 +62,28 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         metavar="SCRIPT",
         help="html: circle, pour or the file of a script, whose run the page plays",
     )
+    parser.add_argument(
+        "--urdf",
+        type=Path,
+        default=URDF_PATH,
+        metavar="FILE",
+        help="another mechanism: any tree of turning, sliding and mimicking joints "
+        "(default: the Katana450)",
+    )
+
+
+def _export(options: argparse.Namespace) -> int:
+    if options.format != "urdf" and (options.license or options.maintainer):
+        raise InputError(
+            f"A file of {options.format} states no licence and no maintainer; urdf does."
+        )
+    if options.format == "html":
+        from katana450.extensions.export.page import write_page
+
+        return write_page(options)
+    from katana450.extensions.export.export import export
+
+    return export(options)
 
 
 def _listed() -> str:
@@ -78,3 +104,13 @@ def joint_values(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"numbers with commas between, not {text!r}") from None
+
+
+EXTENSION = Extension(
+    "export",
+    (
+        CliCommand(
+            "export", "write the arm as files for other programs", add_export_options, _export
+        ),
+    ),
+)

@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from katana450.extensions.importers.surface import Colours
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+Colours = npt.NDArray[np.uint8]
+"""(m, 4) sRGB and opacity."""
 
 CREASE = math.radians(40.0)
 """Faces that meet at a larger angle are shaded apart."""

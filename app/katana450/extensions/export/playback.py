@@ -1,10 +1,9 @@
-"""A run on a clock of its own: a script's, or that of a table of joint values."""
+"""States of an arm over time, to be shown: of a script, a table of joint values, or a pose."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,39 +11,16 @@ import numpy as np
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.mechanism import Mechanism
 from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.assembly.robot_session import described
-from katana450.cli.progress import progress
-from katana450.errors import InputError, KatanaError
+from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
-from katana450.extensions.programs.bench import PlanContext
-from katana450.extensions.programs.circle import CircleDemo
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.script import Script, parse
-from katana450.extensions.programs.script_files import text_of
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.report.trace import Simulation
 from katana450.settings import Settings
 
-DEMOS = {"circle": CircleDemo, "pour": PourDemo}
-"""Scripts that go by a name."""
 
-
-class Planned(NamedTuple):
-    """A script with everything planned, and the arm it is for."""
-
-    script: Script
-    program: Program
-    model: RobotModel
-    session: Session
-
-
-class Performance(NamedTuple):
+class Playback(NamedTuple):
     """An arm, and its states so many times a second; one where it only stands."""
 
     model: RobotModel
@@ -63,36 +39,7 @@ class Performance(NamedTuple):
         return (len(self.states) - 1) / self.rate
 
 
-def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
-    """``seed``: of the ways round what is in between. ``speed``: share of the script's own."""
-    settings = replace(Settings(), bare=script.bare)
-    model, session, _ = described(settings, urdf, None)
-    rig = PlanContext(session, model.T_base_shoulder, seed)
-    program = compiled(script, rig, _at_rest(session), speed)
-    return Planned(script, program, model, session)
-
-
-def played(plan: Planned) -> Simulation:
-    """Run to its end, with a bar. Raises KatanaError where it does not get there."""
-    session = plan.session
-    driver = SimulatedDriver(plan.model.arm, session.ready, gripper=0.0)
-    rehearsal = Simulation(plan.program, session, driver, Settings().rate)
-    done, total = 0, 1000
-    ticks = progress(range(total), total, plan.script.name)
-    for share in rehearsal.ticks():
-        while done < int(share * total):
-            done += 1
-            next(ticks, None)
-    for _ in ticks:
-        pass
-    if rehearsal.run.phase is not Phase.DONE:
-        raise KatanaError(rehearsal.run.why)
-    return rehearsal
-
-
-def chosen(
-    run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path
-) -> Performance:
+def chosen(run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path) -> Playback:
     """What a person chose: a script or a demo by its name, a table, or else a pose."""
     if run is not None:
         return of_script(run, urdf)
@@ -101,28 +48,40 @@ def chosen(
     return of_pose(pose, urdf)
 
 
-def of_script(name: str, urdf: Path) -> Performance:
-    """Of a demo or of a script in a file, with a bar. Raises InputError with what is wrong."""
-    text = DEMOS[name]().text if name in DEMOS else text_of(Path(name))
+def of_script(name: str, urdf: Path) -> Playback:
+    """Return the run of a demo or of a script in a file; it is simulated with a progress bar.
+
+    Raises InputError with the line of the script that is wrong.
+    """
+    # A pose or a table can be shown without the extension ``programs``.
+    from katana450.extensions.programs.circle import CircleDemo
+    from katana450.extensions.programs.clocked_run import planned, played
+    from katana450.extensions.programs.pour import PourDemo
+    from katana450.extensions.programs.script import parse
+    from katana450.extensions.programs.script_files import text_of
+    from katana450.extensions.programs.source import ScriptError
+
+    demos = {"circle": CircleDemo, "pour": PourDemo}
+    text = demos[name]().text if name in demos else text_of(Path(name))
     try:
         plan = planned(parse(text), urdf)
     except ScriptError as error:
         found = error.problems[0]
         raise InputError(f"{name}:{found.line}:{found.column}: {found.said}") from error
     states = played(plan).states
-    return Performance(plan.model, plan.session, states, Settings().rate, plan.script.bare)
+    return Playback(plan.model, plan.session, states, Settings().rate, plan.script.bare)
 
 
-def of_pose(pose: Sequence[float], urdf: Path) -> Performance:
+def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
     """Standing at ``pose``: values of the driven joints [rad]; at home where there are none."""
     model, session, _ = _described(urdf)
     if not pose:
-        return Performance(model, session, [_at_rest(session)], 1.0)
+        return Playback(model, session, [_at_rest(session)], 1.0)
     mechanism = load_mechanism(urdf)[0]
-    return Performance(model, session, [_standing(model, session, mechanism.values(pose))], 1.0)
+    return Playback(model, session, [_standing(model, session, mechanism.values(pose))], 1.0)
 
 
-def of_trajectory(path: Path, urdf: Path) -> Performance:
+def of_trajectory(path: Path, urdf: Path) -> Playback:
     """As a table of joint values has it. Raises InputError for a file that is none."""
     model, session, _ = _described(urdf)
     mechanism: Mechanism = load_mechanism(urdf)[0]
@@ -133,7 +92,7 @@ def of_trajectory(path: Path, urdf: Path) -> Performance:
         _standing(model, session, {name: float(row[k]) for name, row in rows.items()}, time)
         for k, time in enumerate(t.tolist())
     ]
-    return Performance(model, session, states, rate)
+    return Playback(model, session, states, rate)
 
 
 def _described(urdf: Path) -> tuple[RobotModel, Session, tuple[str, ...]]:

@@ -41,12 +41,12 @@ def _run(text: str, source: str, options: Namespace) -> int:
     try:
         script = parse(text)
         if options.headless or options.dry_run or options.report is not None:
-            from katana450.cli.simulate import rehearse
+            from katana450.extensions.experiments.simulate import simulate
 
-            status = rehearse(script, options)
+            status = simulate(script, options)
             if status or options.headless or options.dry_run:
                 return status
-        from katana450.cli.live import run_live
+        from katana450.extensions.experiments.live import run_live
 
         return run_live(text, script, options)
     except ScriptError as error:

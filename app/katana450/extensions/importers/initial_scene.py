@@ -1,4 +1,4 @@
-"""What stands around when the server starts: a scene, and files of objects."""
+"""The scene and the objects that ``katana450 serve`` is given as files."""
 
 from __future__ import annotations
 
@@ -12,29 +12,37 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import CUP
+from katana450.arm.control.session import Session
 from katana450.arm.control.things import Form, Thing
-from katana450.assembly.robot_session import Described
+from katana450.arm.robot.initial_scene import InitialScene
+from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.importers.meshes import Mesh, read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
 from katana450.extensions.importers.shape_file import MOST_BYTES
 from katana450.extensions.scene.scene import Scene
 from katana450.maths.geometry import se3
-from katana450.server.service.scene_transfer import free_name
+from katana450.server.service.scenes import free_name
 
 PLACED = re.compile(r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?")
 """FILE, or FILE@x,y,z."""
 
 
+def initial_scene(session: Session, scene: Path | None, objects: Sequence[str]) -> InitialScene:
+    """Return the scene to start with. Raises InputError; see ``furnished``."""
+    stored, notes = furnished(session, scene, objects)
+    command = cmd.Furnish(stored.scene.things, stored.scene.water)
+    return InitialScene(command, stored.scene.joints, stored.meshes, notes)
+
+
 def furnished(
-    robot: Described, scene: Path | None, objects: Sequence[str]
+    session: Session, scene: Path | None, objects: Sequence[str]
 ) -> tuple[StoredScene, tuple[str, ...]]:
     """The scene of the file ``scene`` and the ``objects`` besides, FILE[@x,y,z] each, in mm.
 
     Without a scene what there is of the robot's own; and sentences on what was read. Raises
     InputError for what cannot be read, or cannot stand there.
     """
-    session = robot.session
     hand = session.surroundings.hand
     stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).things))
     if scene is not None:

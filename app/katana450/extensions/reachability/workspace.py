@@ -12,13 +12,13 @@ import numpy as np
 
 from katana450.arm.robot.model import load
 from katana450.atomic import Writer, check_writable, write_files
-from katana450.cli.cluster import connected
-from katana450.cli.progress import progress
 from katana450.errors import InputError
-from katana450.extensions.export.reachability_file import write_npz, write_ply
+from katana450.extensions.progress import progress
+from katana450.extensions.reachability.cluster import connected
 from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
+from katana450.extensions.reachability.reachability_file import write_npz, write_ply
 
 
 def workspace(options: argparse.Namespace) -> int:

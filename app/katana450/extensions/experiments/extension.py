@@ -1,4 +1,4 @@
-"""What ``katana450 run`` and ``katana450 demo`` understand."""
+"""The extension ``experiments``: the commands that run a script, or an experiment of the paper."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from katana450.arm.control.commands import LEAST_SPEED
+from katana450.extension import CliCommand, Extension
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.resources import URDF_PATH
@@ -15,13 +15,13 @@ URL = "http://127.0.0.1:8080"
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """Of ``run``."""
+    """Add the options of ``run`` to ``parser``."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a script; see docs/programs.md")
     _add_common(parser)
 
 
 def add_demo_options(parser: argparse.ArgumentParser) -> None:
-    """Of ``demo``."""
+    """Add the demos and their options to ``parser``."""
     demos = parser.add_subparsers(dest="demo", required=True, metavar="DEMO")
     circle = demos.add_parser("circle", help="the paper's circle, or any other")
     default = CircleDemo()
@@ -106,6 +106,9 @@ def _spot(text: str) -> tuple[float, float]:
 
 
 def _share(text: str) -> float:
+    # Loads numpy, so only where a speed is given.
+    from katana450.arm.control.commands import LEAST_SPEED
+
     value = _number(text)
     if not LEAST_SPEED <= value <= 1.0:
         raise argparse.ArgumentTypeError(f"a share from {LEAST_SPEED} to 1, not {text!r}")
@@ -139,3 +142,24 @@ def _direction(text: str) -> str:
 
 def _pitch(text: str) -> str:
     return text if text in ("keep", "roomiest") else f"{_number(text):g}"
+
+
+def _run(options: argparse.Namespace) -> int:
+    from katana450.extensions.experiments.run import run
+
+    return run(options)
+
+
+def _demo(options: argparse.Namespace) -> int:
+    from katana450.extensions.experiments.run import demo
+
+    return demo(options)
+
+
+EXTENSION = Extension(
+    "experiments",
+    (
+        CliCommand("run", "run a script of your own", add_run_options, _run),
+        CliCommand("demo", "run an experiment of the paper", add_demo_options, _demo),
+    ),
+)

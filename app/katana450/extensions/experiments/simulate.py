@@ -7,20 +7,19 @@ from argparse import Namespace
 from datetime import datetime
 
 from katana450.arm.robot.props import load_props
-from katana450.cli.clocked_run import planned, played
 from katana450.cli.version import version
+from katana450.extensions.programs.clocked_run import planned, played
 from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.extensions.report.report import Report
-from katana450.extensions.report.stages import stage_pictures
 from katana450.server.view.texts import part
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
 
 
-def rehearse(script: Script, options: Namespace) -> int:
+def simulate(script: Script, options: Namespace) -> int:
     """Plan it, and unless that is all run it on a clock of its own and report."""
     plan = planned(script, options.urdf, options.seed, options.speed)
     program, model = plan.program, plan.model
@@ -43,6 +42,9 @@ def rehearse(script: Script, options: Namespace) -> int:
     print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:
+        # The pictures of a report are all that needs the renderer.
+        from katana450.extensions.report.stages import stage_pictures
+
         pictures = stage_pictures(
             program, model, plan.session, load_props(), rehearsal.states, report.trace
         )

@@ -1,0 +1,23 @@
+"""What extensions show in the scene of an arm."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import viser
+
+from katana450.arm.robot.model import RobotModel
+
+
+class ViewLayer(Protocol):
+    """Nodes of the scene with controls in the folder "Show" of the panel."""
+
+    @property
+    def what(self) -> str:
+        """A sentence that says what needs an arm, for a mechanism that is not one."""
+
+    def attach(self, server: viser.ViserServer, model: RobotModel) -> None:
+        """Prepare for the arm ``model`` on ``server``. Raises ConfigurationError."""
+
+    def add_controls(self, gui: viser.GuiApi) -> None:
+        """Add the controls to the open folder of ``gui``. Called once, after ``attach``."""
