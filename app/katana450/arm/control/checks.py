@@ -1,4 +1,4 @@
-"""What an arm cannot even be asked."""
+"""Checks of commands against the robot, before they are taken: what it cannot even be asked."""
 
 from __future__ import annotations
 
@@ -6,12 +6,48 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import Arm
+from katana450.arm.control.joints import Joints
 from katana450.arm.control.pouring import CUP, Pouring
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Mount, Thing
 from katana450.errors import InputError
 
 NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
+
+FOR_JOINTS = (
+    cmd.SetJoint,
+    cmd.SetAxes,
+    cmd.SetJoints,
+    cmd.Servo,
+    cmd.Home,
+    cmd.Stretch,
+    cmd.Settle,
+    cmd.Stop,
+    cmd.Release,
+    cmd.Pause,
+    cmd.Resume,
+    cmd.Reset,
+    cmd.SpeedScale,
+    cmd.Dress,
+)
+"""The commands that need no arm, but only joints."""
+
+
+def check_joints(joints: Joints, command: cmd.Command) -> None:
+    """Raise InputError if a robot with ``joints`` and no arm cannot be asked for ``command``."""
+    match command:
+        case cmd.Together(commands=commands):
+            for each in commands:
+                check_joints(joints, each)
+        case _ if not isinstance(command, FOR_JOINTS):
+            raise InputError(joints.refusal)
+        case cmd.SetJoint(axis=axis) if axis >= joints.n:
+            raise InputError(f"There is no axis {axis + 1}: this mechanism has {joints.n}.")
+        case cmd.SetAxes(values=values):
+            for axis, value in values:
+                check_joints(joints, cmd.SetJoint(axis, value))
+        case cmd.SetJoints(q=q) | cmd.Servo(q=q):
+            joints.check(q)
 
 
 def check(
