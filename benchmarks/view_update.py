@@ -91,7 +91,7 @@ def dragged(tick: int, session: Session, state: State) -> Command | None:
     """Round a circle of 6 cm every two seconds, told twenty times a second as by the gizmo."""
     if tick % 5:
         return None
-    centre = forward(session.arm.chain_to(state.tool), session.ready)[:3, 3]
+    centre = forward(session.require_arm().chain_to(state.tool), session.ready)[:3, 3]
     turn = math.tau * tick / 200.0
     return cmd.MoveTool(centre + 0.06 * np.array([0.0, math.sin(turn), math.cos(turn) - 1.0]))
 

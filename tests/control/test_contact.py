@@ -22,7 +22,7 @@ LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 
 @pytest.fixture
 def guarded(session: Session, world: World) -> Session:
-    return Session(session.arm, session.ready, world)
+    return Session(session.require_arm(), session.ready, world)
 
 
 def clearance(world: World, state: State) -> float:
@@ -98,7 +98,9 @@ def test_it_goes_away_at_full_speed(guarded: Session, what: str) -> None:
     state, near = run(guarded, blocked, [back])
     assert (state.setpoint == start).all()
     assert state.findings == ()
-    free, _ = run(Session(guarded.arm, guarded.ready), standing(guarded, blocked.setpoint), [back])
+    free, _ = run(
+        Session(guarded.require_arm(), guarded.ready), standing(guarded, blocked.setpoint), [back]
+    )
     assert state.t - blocked.t <= free.t + 2.0 * TICK
     assert min(near) >= STOP - SLIGHTLY
 
@@ -119,7 +121,7 @@ def test_an_arm_that_waits_goes_on_once_the_way_is_free(guarded: Session, world:
     cup = len(world.parts) - 1
     pairs = [pair for pair in world.pairs if cup not in pair]
     without_cup = World(world.linkage, world.parts[:-1], pairs)
-    freed = Session(guarded.arm, guarded.ready, without_cup)
+    freed = Session(guarded.require_arm(), guarded.ready, without_cup)
     state, _ = run(freed, blocked, [])
     assert (state.setpoint == state.goal).all()
     assert state.status is Status.OK

@@ -91,12 +91,12 @@ def run(
 
 def check_limits(session: Session, states: list[State]) -> None:
     """Finite differences over a tick are means of the derivative, so they keep its limits."""
-    limits, rounding = session.arm.limits, 1e-12
+    limits, rounding = session.require_arm().limits, 1e-12
     q = np.array([state.setpoint for state in states])
     for order, limit in enumerate((limits.speed, limits.acceleration, limits.jerk), 1):
         difference = np.abs(np.diff(q, order, axis=0)) / TICK**order
         assert (difference <= limit + rounding / TICK**order).all(), order
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     points = np.array([forward(chain, each)[:3, 3] for each in q])
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= TOOL_SPEED * TICK + 1e-12
     for before, after in pairwise(states):
@@ -120,14 +120,14 @@ def off_path(states: list[State], plan: Plan) -> float:
 
 def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, state: State) -> None:
     goal = np.array([1.0, -0.8, 0.9, 0.5, 1.2])
-    plan = plan_to(session.arm, None, state, goal)
+    plan = plan_to(session.require_arm(), None, state, goal)
     states = run(session, state, [cmd.Follow(plan)])
     last = states[-1]
     assert (last.setpoint == goal).all()
     assert (last.goal == goal).all()
     assert isinstance(last.target, JointTarget)
     assert last.status is Status.OK
-    assert last.branch == branch_of(session.arm.chain, goal)
+    assert last.branch == branch_of(session.require_arm().chain, goal)
     assert last.following is not None
     assert last.following.share == 1.0
     assert len(states) * TICK == pytest.approx(plan.duration, abs=2 * TICK)
@@ -246,7 +246,7 @@ def test_any_other_motion_ends_it_inside_the_limits(
     after = run(session, under_way[-1], [order])
     assert after[-1].following is None
     assert not after[-1].moving
-    limits, slack = session.arm.limits, 1.0 + 1e-6
+    limits, slack = session.require_arm().limits, 1.0 + 1e-6
     for a, b in pairwise([under_way[-1], *after]):
         assert (np.abs(b.motion.qd) <= limits.speed * slack).all()
         change = np.abs(b.motion.qd - a.motion.qd)
@@ -270,7 +270,10 @@ def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) 
     assert finding.reason is Reason.STOPPED
     assert len(stopped) * TICK == pytest.approx(finding.time, abs=2 * TICK)
     way = math.dist(
-        *(forward(session.arm.chain, each.setpoint)[:3, 3] for each in (under_way, stopped[-1]))
+        *(
+            forward(session.require_arm().chain, each.setpoint)[:3, 3]
+            for each in (under_way, stopped[-1])
+        )
     )
     assert finding.amount == pytest.approx(way, abs=1e-4)
     assert stopped[0].following is None

@@ -63,7 +63,7 @@ def arriving(
 
     Each is stamped with its arrival, as on a server; limits are checked in every tick.
     """
-    rng, limits = np.random.default_rng(3), session.arm.limits
+    rng, limits = np.random.default_rng(3), session.require_arm().limits
     sent = np.arange(0.0, seconds, 1.0 / hz)
     arrived = np.maximum.accumulate(sent + 0.004 + rng.exponential(jitter, len(sent)))
     stream, due = on_axis_1(session, signal), 0

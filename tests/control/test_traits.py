@@ -26,7 +26,7 @@ BALL = Thing("ball", Form.SPHERE, (0.02,), np.eye(4))
 
 def examples(session: Session, state: State) -> list[cmd.Command]:
     """One command of each class."""
-    q = np.zeros(session.arm.chain.n)
+    q = np.zeros(session.require_arm().chain.n)
     return [
         *(cmd.SetJoint(0, 0.1), cmd.SetAxes(((0, 0.1),)), cmd.SetJoints(q), cmd.Servo(q)),
         *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.TurnTool(0.1, 0.1), cmd.SetPose(np.eye(4))),
@@ -34,7 +34,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
         *(cmd.TakeBranch(BRANCHES[0]), cmd.EndDrag(), cmd.Home(), cmd.GoToZero(), cmd.Hold()),
         *(cmd.Stop(), cmd.ClearStop(), cmd.Pause(), cmd.Resume(), cmd.GoAlong(0.5)),
         *(
-            cmd.Follow(plan_to(session.arm, None, state, q)),
+            cmd.Follow(plan_to(session.require_arm(), None, state, q)),
             cmd.SpeedScale(0.5),
             cmd.Jog(np.ones(5)),
         ),
@@ -68,7 +68,7 @@ def test_only_stop_is_for_everybody() -> None:
 
 def test_a_stopped_arm_heeds_exactly_what_is_declared(session: Session, state: State) -> None:
     stopped = session.step(state, [cmd.Stop()], state.t)
-    given = examples(session, state)
+    given: list[cmd.Command] = examples(session, state)
     assert {type(each) for each in given} == set(KINDS)
     for each in given:
         if each.traits.while_stopped:

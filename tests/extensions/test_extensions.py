@@ -162,7 +162,7 @@ def test_server_runs_without_the_extensions_it_does_not_need(
     with AppServer() as server:
         assert server.running
         with connect(server.url, "Test") as arm:
-            assert arm.look(answers.Things).things
+            assert arm.query(answers.Things).things
             arm.ask(requests.Home())
         upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
         with pytest.raises(urllib.error.HTTPError) as refused:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.looks import Looks, Trait
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.machine import Machine, load_machine
 from katana450.maths.geometry import se3, so3
@@ -33,7 +33,7 @@ def machine(tmp_path: Path) -> Machine:
 
 
 def standing(machine: Machine) -> State:
-    session = JointSession(machine.joints, machine.way)
+    session = Session(machine.joints, machine.joints.ready, travel=machine.way)
     return session.begin(session.ready, 0.0, 0.0)
 
 

@@ -10,7 +10,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.session import Session
 from katana450.arm.control.things import Hand, Thing
 from katana450.arm.drivers.simulated import SimulatedDriver
@@ -73,7 +72,7 @@ class Jointed(NamedTuple):
     """Likewise of a mechanism that is driven joint by joint."""
 
     machine: Machine
-    session: JointSession
+    session: Session
     notes: tuple[str, ...]
 
 
@@ -89,7 +88,12 @@ def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described | 
             raise
         machine = load_machine(urdf, str(error))
         notes = (*machine.notes, f"Joints only. {error}")
-        return Jointed(machine, JointSession(machine.joints, machine.way), notes)
+        return Jointed(machine, joint_session(machine), notes)
+
+
+def joint_session(machine: Machine) -> Session:
+    """The rules of a machine that is driven joint by joint."""
+    return Session(machine.joints, machine.joints.ready, travel=machine.way)
 
 
 class RunningArm:

@@ -279,7 +279,7 @@ class Jog(BaseCommand):
     Sent again and again while a hand holds on; when it does not come the arm comes to rest.
     """
 
-    traits: ClassVar[Traits] = Traits()
+    traits: ClassVar[Traits] = Traits(while_paused=False)
 
     rates: FloatArray
     frame: JogFrame = JogFrame.BASE

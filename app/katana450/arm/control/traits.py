@@ -16,6 +16,7 @@ class Traits:
     Attributes:
         stream: several in a row are one motion, so a newer one replaces one that waits for a tick.
         while_stopped: takes effect while a stop holds the arm; all others are refused then.
+        while_paused: takes effect during a pause. A jog does not: it has no goal to keep for later.
         supersedes: ends the motion or the program that is under way or being planned.
         passive: leaves a path that is being planned as it is; all others end the planning.
         joints_only: possible for a mechanism that has joints and no tool.
@@ -26,6 +27,7 @@ class Traits:
 
     stream: bool = False
     while_stopped: bool = False
+    while_paused: bool = True
     supersedes: bool = True
     passive: bool = False
     joints_only: bool = False

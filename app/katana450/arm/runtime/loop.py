@@ -128,7 +128,7 @@ def _differs(a: State, b: State) -> bool:
         or a.setpoint is not b.setpoint
         or a.gripper_setpoint != b.gripper_setpoint
         or a.goal is not b.goal
-        or a.target is not b.target
+        or a.mode is not b.mode
         or a.findings != b.findings
         or a.things is not b.things
         or a.poured is not b.poured

@@ -11,6 +11,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.control.tool_targets import with_branch
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.errors import KatanaError
@@ -76,10 +77,11 @@ class PlanningWorker:
     def _find(self, command: cmd.TakeBranch, cancelled: threading.Event) -> None:
         try:
             state = self._at_rest(cancelled)
-            goal = self._session.taken(state, command.branch).goal
+            arm = self._session.require_arm()
+            goal = with_branch(arm, state, command.branch).goal
             if (goal != state.setpoint).any():
                 world = self._session.world_at(state)
-                plan = plan_to(self._session.arm, world, state, goal)
+                plan = plan_to(arm, world, state, goal)
                 self._unless(cancelled, cmd.Follow(plan))
         except KatanaError as error:
             self.tell(str(error))

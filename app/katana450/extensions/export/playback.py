@@ -104,7 +104,7 @@ def _described(urdf: Path) -> tuple[RobotModel, Session, tuple[str, ...]]:
 
 def _at_rest(session: Session) -> State:
     """Where an arm is that nobody has moved."""
-    return session.begin(session.ready, session.arm.gripper.clamp(0.0), 0.0)
+    return session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
 
 
 def _standing(

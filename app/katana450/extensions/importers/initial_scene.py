@@ -48,8 +48,8 @@ def furnished(
     if scene is not None:
         stored = read_scene_folder(scene, None if hand is None else hand.T_palm_tool)
     if stored.scene.joints is not None:
-        q = session.arm.chain.check_q(stored.scene.joints)
-        if not session.arm.chain.within_limits(q):
+        q = session.require_arm().chain.check_q(stored.scene.joints)
+        if not session.require_arm().chain.within_limits(q):
             raise InputError(f"{scene}: the joints lie outside the limits of this arm.")
     if stored.scene.water is not None and all(t.name != CUP for t in stored.scene.things):
         raise InputError(f"{scene}: there is water, and no cup for it.")

@@ -38,7 +38,7 @@ def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Pl
     settings = replace(Settings(), bare=script.bare)
     model, session, _ = described(settings, urdf, None)
     rig = PlanContext(session, model.T_base_shoulder, seed)
-    start = session.begin(session.ready, session.arm.gripper.clamp(0.0), 0.0)
+    start = session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
     program = compiled(script, rig, start, speed)
     return Planned(script, program, model, session)
 

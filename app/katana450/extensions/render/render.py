@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.control.modes import IDLE
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
@@ -101,7 +102,7 @@ def _film(path: Path, shown: Playback, shot: _Shot, fps: float, urdf: Path) -> N
 
 def _bare(state: State) -> State:
     """What of a state can be seen, so that little goes over to another process."""
-    return replace(state, following=None, findings=())
+    return replace(state, mode=IDLE, findings=())
 
 
 class _Studio(NamedTuple):

@@ -9,7 +9,6 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
@@ -39,7 +38,7 @@ class Motion:
     def __init__(
         self,
         model: RobotModel | Machine,
-        session: Session | JointSession,
+        session: Session,
         link: FrontEnd,
         navigator: PlanningWorker | None,
         nodes: Nodes,
@@ -83,15 +82,13 @@ class Motion:
     @property
     def rig(self) -> PlanContext:
         """What programs are planned for. Raises InputError where there are only joints."""
-        if isinstance(self._session, JointSession):
-            self._session.refuse()
         return PlanContext(self._session, self.robot.T_base_shoulder)
 
     @property
     def robot(self) -> RobotModel:
         """The arm. Raises InputError, and says why, where there are only joints."""
         if isinstance(self.model, Machine):
-            raise InputError(f"Only its joints can be driven. {self.model.joints.why}")
+            raise InputError(self.model.joints.refusal)
         return self.model
 
     @property
@@ -111,13 +108,11 @@ class Motion:
 
     def _posture(self) -> tuple[Margins, FloatArray | None]:
         """Worked out once for everybody who asks, and anew when something has changed."""
-        if isinstance(self._session, JointSession):
-            self._session.refuse()
-        state = self.state
+        arm, state = self._session.require_arm(), self.state
         world, x = self._session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
-            chain = self.robot.arm.chain_to(state.tool)
+            chain = arm.chain_to(state.tool)
             holding = holding_torques(chain, state.q, self._loads) if self._loads else None
             self._measured = (key, (margins(chain, world, x), holding))
         return self._measured[1]
@@ -176,8 +171,7 @@ class Motion:
 
     def jog(self, rates: Rates, frame: JogFrame) -> None:
         """Go with these rates for a moment. Raises InputError where there are only joints."""
-        if isinstance(self._session, JointSession):
-            self._session.refuse()
+        self._session.require_arm()
         self._put(cmd.Jog(np.array(rates), frame))
 
     def limit(self, share: float) -> None:

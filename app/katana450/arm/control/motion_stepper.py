@@ -12,10 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from katana450.arm.control.aims import with_place
 from katana450.arm.control.arm import Arm
 from katana450.arm.control.follower import Follower
 from katana450.arm.control.following import Following
-from katana450.arm.control.state import Finding, Jogging, Reason, State
+from katana450.arm.control.modes import Jogging, Leaving
+from katana450.arm.control.state import Finding, Reason, State
 from katana450.maths.collision.clearance import SETTLING, STOP, advance, surely_clear
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import LONGEST_WAY, World
@@ -49,8 +51,8 @@ COARSE, FINE = 0.02, 0.005
 """[s] Between them at least: for a step of many, and for leaving a plan, which is done once."""
 
 
-class Mover:
-    """Moves one arm. Its methods are pure."""
+class MotionStepper:
+    """Moves the setpoints of one arm, tick by tick. Its methods are pure."""
 
     def __init__(
         self, arm: Arm, world: World | None, tool_speed: float, touch: FloatArray | None = None
@@ -82,8 +84,8 @@ class Mover:
             return state
         if not state.under_way:
             return replace(state, blocked=False) if state.blocked else state
-        if state.following is not None and state.following.leaving and self._free_to_leave(state):
-            state = replace(state, following=None)
+        if isinstance(state.mode, Leaving) and self._free_to_leave(state):
+            state = replace(state, mode=state.mode.then)
         fingers = self._fingers(state, dt)
         if state.blocked and state.motion.at_rest and self._may_go_on(state):
             state = replace(state, blocked=False)
@@ -91,7 +93,7 @@ class Mover:
         braking = state.blocked and state.jogging is None
         ahead, along = self._brake(state, dt) if braking else self._ahead(state, dt)
         if self._world is None:
-            return replace(state, motion=ahead, following=along, gripper_setpoint=fingers)
+            return with_place(replace(state, motion=ahead, gripper_setpoint=fingers), along)
         contact = None if braking else self._met(state, ahead, along, state.gripper_setpoint)
         if contact is not None:
             ahead, along = self._brake(state, dt)
@@ -107,7 +109,7 @@ class Mover:
         after = replace(
             state,
             motion=state.motion if stands else ahead,
-            following=along,
+            mode=with_place(state, along).mode,
             gripper_setpoint=fingers,
             blocked=braking or contact is not None or pinched,
         )
@@ -160,7 +162,7 @@ class Mover:
         following = state.following
         if following is None:
             return self._beside(state, dt), None
-        if state.stopped is not None or state.paused or following.leaving:
+        if state.stopped is not None or state.paused or isinstance(state.mode, Leaving):
             return self._brake(state, dt)
         ahead = self._follower.ahead(following, dt, state.speed)
         return ahead.motion(), ahead
