@@ -74,16 +74,7 @@ def test_a_stopped_arm_heeds_exactly_what_is_declared(session: Session, state: S
         if each.traits.while_stopped:
             continue
         after = session.step(stopped, [each], stopped.t)
-        same = (
-            "goal",
-            "target",
-            "mode",
-            "following",
-            "findings",
-            "stopped",
-            "gripper_goal",
-            "tool",
-        )
+        same = ("goal", "mode", "findings", "stopped", "gripper_goal", "tool")
         for field in same:
             assert getattr(after, field) is getattr(stopped, field), (each, field)
 
