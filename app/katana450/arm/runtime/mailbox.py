@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command
 from katana450.errors import InputError
 
@@ -25,16 +26,29 @@ STREAMS = (
 """Commands of which the last one is enough when several of a kind follow each other."""
 
 
+class Submission(NamedTuple):
+    """A command and its giver; None where the process of the arm acts by itself."""
+
+    command: Command
+    actor: Actor | None
+
+
 class CommandSink(Protocol):
-    """Takes commands, here or at the end of a pipe."""
+    """Takes commands, here or at the end of a pipe.
+
+    In the process that people speak to, ``CommandGate.submit`` alone puts commands into one.
+    """
 
     @property
     def last_ticket(self) -> int:
         """The ticket of the newest command."""
         ...
 
-    def put(self, command: Command) -> int:
-        """Leave ``command`` for the next tick; returns its ticket. Raises InputError."""
+    def put(self, command: Command, actor: Actor | None) -> int:
+        """Leave ``command`` of ``actor`` for the next tick; returns its ticket.
+
+        Raises InputError.
+        """
         ...
 
 
@@ -49,26 +63,27 @@ class Mailbox:
         """``check`` raises an InputError for a command that must not enter."""
         self._check = check
         self._lock = threading.Lock()
-        self._waiting: list[Command] = []
+        self._waiting: list[Submission] = []
         self._tickets = 0
 
-    def put(self, command: Command) -> int:
+    def put(self, command: Command, actor: Actor | None = None) -> int:
         """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
         self._check(command)
+        submission = Submission(command, actor)
         with self._lock:
             if isinstance(command, cmd.Stop):
                 # Never refused, and what waits before it is dead the moment it comes.
-                self._waiting = [command]
-            elif self._waiting and _supersedes(command, self._waiting[-1]):
-                self._waiting[-1] = command
+                self._waiting = [submission]
+            elif self._waiting and _supersedes(command, self._waiting[-1].command):
+                self._waiting[-1] = submission
             elif len(self._waiting) >= CAPACITY:
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
             else:
-                self._waiting.append(command)
+                self._waiting.append(submission)
             self._tickets += 1
             return self._tickets
 
-    def drain(self) -> tuple[list[Command], int]:
+    def drain(self) -> tuple[list[Submission], int]:
         """Everything that waits, oldest first, and the last ticket given."""
         with self._lock:
             waiting, self._waiting = self._waiting, []
