@@ -92,7 +92,7 @@ class FakeArm:
     def choices(self) -> tuple[Choice, ...]:
         return ()
 
-    def put(self, command: cmd.Command, actor: Actor) -> int:
+    def deliver(self, command: cmd.Command, actor: Actor) -> int:
         self.actors.append(actor)
         match command:
             case cmd.Stop():

@@ -214,7 +214,7 @@ class FrontEnd:
         with self._sending:
             return self._number
 
-    def put(self, command: cmd.Command, actor: Actor | None = None) -> int:
+    def deliver(self, command: cmd.Command, actor: Actor | None = None) -> int:
         """Send ``command`` of ``actor`` to the arm; returns its ticket.
 
         Raises InputError for a command that the arm cannot be given.

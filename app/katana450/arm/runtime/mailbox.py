@@ -44,7 +44,7 @@ class CommandSink(Protocol):
         """The ticket of the newest command."""
         ...
 
-    def put(self, command: Command, actor: Actor | None) -> int:
+    def deliver(self, command: Command, actor: Actor | None) -> int:
         """Leave ``command`` of ``actor`` for the next tick; returns its ticket.
 
         Raises InputError.

@@ -53,7 +53,7 @@ class PlanningWorker:
         """Whether a way is under work, or found and not begun yet."""
         return self._work is not None or self._board.snapshot.ticket < self.last_ticket
 
-    def put(self, command: cmd.Command, actor: Actor | None) -> int:
+    def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
         """Implement ``CommandSink``; a command that follows a path found later has no ticket."""
         said = command.commands if isinstance(command, cmd.Together) else (command,)
         if not all(isinstance(each, PASSIVE) for each in said):
@@ -63,7 +63,7 @@ class PlanningWorker:
         if isinstance(command, cmd.TakeBranch):
             self._set_out(command, actor)
             return self.last_ticket
-        return self._arm.put(command, actor)
+        return self._arm.deliver(command, actor)
 
     def cancel(self) -> None:
         """Give up the way under work."""
@@ -117,4 +117,4 @@ class PlanningWorker:
     ) -> None:
         with self._lock:
             if not cancelled.is_set():
-                self._arm.put(command, actor)
+                self._arm.deliver(command, actor)

@@ -29,7 +29,7 @@ from katana450.server.service.vrml_nodes import Nodes
 
 
 class ArmHandle:
-    """One arm. Reads are for everybody; ``put`` is for ``CommandGate`` alone."""
+    """One arm. Reads are for everybody; ``deliver`` is for ``CommandGate`` alone."""
 
     def __init__(
         self,
@@ -119,12 +119,12 @@ class ArmHandle:
         """The branches there are to choose from. Raises InputError where there are none."""
         return self._session.choices(self.state)
 
-    def put(self, command: cmd.Command, actor: Actor) -> int:
+    def deliver(self, command: cmd.Command, actor: Actor) -> int:
         """Send ``command`` of ``actor``, which may give it; return its ticket.
 
         Raises InputError for a command that the arm cannot be given.
         """
-        return self._sink.put(command, actor)
+        return self._sink.deliver(command, actor)
 
     @property
     def state(self) -> State:

@@ -74,7 +74,7 @@ class CommandGate:
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
                 raise LeaseError("The server itself does not move the arm.")
             granted = self._granted(actor, pacing=isinstance(command, PACING))
-            ticket = 0 if self.arm is None else self.arm.put(command, granted)
+            ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
             if isinstance(command, cmd.Release):
                 self.stopped = None
             elif isinstance(command, cmd.Jog):
@@ -140,7 +140,7 @@ class CommandGate:
                     # The mailbox is full, or the arm's process does not answer.
                     with suppress(InputError):
                         grounds = Grounds.SERVER if by is SERVER else Grounds.LEASE
-                        self.arm.put(cmd.Reset(), replace(by, grounds=grounds))
+                        self.arm.deliver(cmd.Reset(), replace(by, grounds=grounds))
             self.lease = lease
 
     # Stop
@@ -187,7 +187,7 @@ class CommandGate:
     @staticmethod
     def _requested(stopped: Stopped, arm: Arm, actor: Actor) -> Stopped:
         grounds = Grounds.SERVER if actor is SERVER else Grounds.SAFETY
-        return stopped.requested(arm.put(cmd.Stop(), replace(actor, grounds=grounds)))
+        return stopped.requested(arm.deliver(cmd.Stop(), replace(actor, grounds=grounds)))
 
     def _revoke(self) -> None:
         """Void every gesture that was received before now."""
