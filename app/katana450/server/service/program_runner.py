@@ -299,15 +299,17 @@ class ProgramRunner:
             self._plan(window, planning.text, planning.speed, changed)
             self._then = order
             return
-        if hub.lease.holder == window.person:
-            hub.give_up(window)
         planning.refused, planning.note = None, ""
         program = planning.program
         visitor = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
         here = _Here(hub.clock)
         joined = hub.join(visitor, "program", lambda _notice: None, here, CommandChannel.PROGRAM)
         try:
-            hub.acquire(joined)
+            if hub.lease.holder == window.person:
+                # In one step: nobody takes the lease in between.
+                hub.hand_over(window, joined.number)
+            else:
+                hub.acquire(joined)
             # What was wanted before is over; a pause lasts until somebody resumes. This also finds
             # out whether the arm is stopped.
             hub.move(joined, cmd.Reset())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any, Protocol
 
 import numpy as np
@@ -78,15 +77,6 @@ def listener(gestures: GestureGate) -> Listen:
             handle.on_click(changed)
 
     return listen
-
-
-def submit_drag(gestures: GestureGate, command: cmd.Command, actor: Actor) -> None:
-    """Submit one of a drag's many commands; a refused one needs no notice.
-
-    A drag sends twenty a second: the next one says the same, or its refusal is shown.
-    """
-    with suppress(KatanaError):
-        gestures.submit(command, actor)
 
 
 def refuse(

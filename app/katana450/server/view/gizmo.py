@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +19,11 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command, MoveTool, Settle, TurnTool
 from katana450.arm.control.state import State, ToolTarget
 from katana450.arm.robot.model import RobotModel
+from katana450.errors import KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
-from katana450.server.view.controls import GestureGate, submit_drag
+from katana450.server.view.controls import GestureGate
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
 
@@ -142,9 +144,11 @@ class Gizmo:
         self._submit(event, actor, MoveTool(p @ self._model.T_base_shoulder[:3, :3]))
 
     def _submit(self, event: viser.TransformControlsEvent, actor: Actor, command: Command) -> None:
-        submit_drag(self._gestures, command, actor)
-        if event.phase == "end":
-            submit_drag(self._gestures, Settle(), actor)
+        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        with suppress(KatanaError):
+            self._gestures.submit(command, actor)
+            if event.phase == "end":
+                self._gestures.submit(Settle(), actor)
 
     def _holds(self, part: str) -> bool:
         actor = self._held.get(part)

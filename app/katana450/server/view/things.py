@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -17,12 +18,12 @@ from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Form, Thing
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.visual import Visual
-from katana450.errors import InputError
+from katana450.errors import InputError, KatanaError
 from katana450.extensions.importers.creases import Drawn, drawn, glb
 from katana450.extensions.importers.meshes import Meshes
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.controls import GestureGate, refuse, submit_drag
+from katana450.server.view.controls import GestureGate, refuse
 from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place, turn
@@ -165,7 +166,9 @@ class ThingNodes:
                 place(self._handles[name], (px, py, pz))
                 refuse(event, error)
             return
-        submit_drag(self._gestures, Place(moved), actor)
+        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        with suppress(KatanaError):
+            self._gestures.submit(Place(moved), actor)
 
     def _holds(self, name: str) -> bool:
         dragged = self._dragged
