@@ -197,6 +197,7 @@ def test_control_touched_first_takes_the_free_lease_and_the_event_log_says_so(
             line = next(each for each in log.lines[::-1] if each.finding.reason == "out of reach")
             assert (line.who, line.command) == (name, "MoveTool")
             assert line.grounds == "took the free lease"
+            assert f"{name} (scene, took the free lease), MoveTool: " in server.output
             await end(peer)
             await peer.set("Axis 1", value=12.5)
             await control.say("stop")

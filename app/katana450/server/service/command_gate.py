@@ -1,4 +1,4 @@
-"""The only way to the arm: here, and nowhere else, lease and stop are checked."""
+"""The only path of a command to the arm. Lease and stop are checked here and nowhere else."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class CommandGate:
             )
 
     def is_current(self, actor: Actor) -> bool:
-        """Whether there was neither a stop nor a loss of the lease since ``actor`` began."""
+        """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
         return actor.seen is None or actor.seen == self.revocations
 
     def present(self) -> Arm:
@@ -168,7 +168,7 @@ class CommandGate:
                 self.protect("The arm lost the server and stopped.")
 
     def moves(self) -> bool:
-        """Whether the arm moves, or is about to."""
+        """Return whether the arm moves, or is about to."""
         with self._lock:
             jogged = self._clock() - self._jogged < cmd.JOG_TIME
             return self.arm is not None and (self.arm.state.moving or jogged)

@@ -1,4 +1,4 @@
-"""Everybody who is here, and the watch over who drives.
+"""Participants, and the watch over the one who drives.
 
 Lives in the gateway's one thread; `CommandGate` decides which commands reach the arm.
 """
@@ -52,7 +52,7 @@ class Window:
 
 
 class Hub:
-    """Who is here, and whether the driver still is. Times are in seconds."""
+    """The participants and their heartbeats. Times are in seconds."""
 
     def __init__(
         self,

@@ -77,7 +77,7 @@ class ProgramRunner:
         return self._is_owner(window.person)
 
     def drives(self, window: Window) -> bool:
-        """Whether ``window`` holds the lease, or owns the program that does."""
+        """Return whether ``window`` holds the lease, or owns the program that does."""
         joined = self._self
         return self._hub.lease.holder == (
             joined.person if joined is not None and self.owns(window) else window.person

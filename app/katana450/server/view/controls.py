@@ -44,7 +44,7 @@ ORDERS: dict[str, cmd.Command] = {
 
 
 class GestureGate(Protocol):
-    """The way of a person's gestures to the arm; ``viser_bridge.gestures.Gestures`` is one."""
+    """Path of a person's gestures to the arm; ``viser_bridge.gestures.Gestures`` is one."""
 
     def actor(self, client_id: int | None, /) -> Actor:
         """Return the giver of the gesture that viser just told of. Raises LeaseError."""
@@ -55,7 +55,7 @@ class GestureGate(Protocol):
         ...
 
     def is_current(self, actor: Actor, /) -> bool:
-        """Whether there was neither a stop nor a loss of the lease since ``actor`` began."""
+        """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
         ...
 
 

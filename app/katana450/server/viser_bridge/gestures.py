@@ -1,9 +1,9 @@
-"""Gestures at viser's handles, panels and ghosts: who makes each, and whether it may go on.
+"""Gestures at viser's handles, panels and ghosts: mapped to actors, and admitted or refused.
 
-viser takes over the value of a control, and sends it to the other browsers, before it calls
-anybody. So a gesture that `CommandGate` refuses is turned back before viser sees it, and the window
-that it came from springs back. The commands that follow from a gesture go through
-`CommandGate.submit`, which has the last word.
+viser stores the new value of a control and sends it to the other browsers before it calls any
+callback. So `CommandGate` is asked first: a refused gesture never reaches viser, and the window it
+came from springs back. The callback's command then goes through `CommandGate.submit`, which
+decides.
 """
 
 from __future__ import annotations
