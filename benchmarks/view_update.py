@@ -34,6 +34,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import View
 from katana450.settings import Settings
+from tests.view.gestures import RecordedGestures
 
 TICKS = 600
 EVERY = 3
@@ -108,7 +109,15 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     settings, model = Settings(), load()
     loop, session, mailbox, clock = loop_of(model, settings)
     server, bare = quiet_server(), quiet_server()
-    view = View(server, model, loop.board, mailbox, session, settings.frame_rate)
+    view = View(
+        server,
+        model,
+        loop.board,
+        RecordedGestures(),
+        lambda: mailbox.last_ticket,
+        session,
+        settings.frame_rate,
+    )
     nodes = BareNodes(bare, model.arm.chain.n)
     ours: list[float] = []
     floor: list[float] = []

@@ -44,7 +44,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
     ]
 
 
-def subclasses(kind: type) -> set[type]:
+def subclasses(kind: type[BaseCommand]) -> set[type[BaseCommand]]:
     return {kind}.union(*(subclasses(each) for each in kind.__subclasses__()))
 
 
@@ -92,4 +92,4 @@ def test_a_stop_drops_what_waits_before_it(session: Session) -> None:
     mailbox = Mailbox(session.check)
     mailbox.put(cmd.Home())
     mailbox.put(cmd.Stop())
-    assert mailbox.drain()[0] == [cmd.Stop()]
+    assert [each.command for each in mailbox.drain()[0]] == [cmd.Stop()]

@@ -35,7 +35,7 @@ def test_branches_are_computed_once_per_snapshot_for_all_who_ask() -> None:
         return ()
 
     arm.choices = choices
-    hub.arm = cast(Arm, arm)
+    hub.gate.arm = cast(Arm, arm)
     budgets = Budgets(hub.clock)
     for number in range(3):
         visitor = Identity(f"session-{number}", "Viewer", Role.VIEWER)

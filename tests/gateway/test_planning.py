@@ -61,8 +61,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
 
 def ask(table: Staged, window: Window, then: Order | None = Order.RUN) -> None:
     """Run ``SCRIPT`` as the panel of the page asks for it."""
-    table.hub.performer.touch(window)
-    table.hub.performer.plan(SCRIPT, then)
+    table.hub.performer.plan(SCRIPT, then, window.actor)
     table.wait(0.1, window)
 
 
@@ -132,12 +131,12 @@ def test_other_commands_during_planning_keep_the_program_from_running(
 def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
-    table.hub.stop("Anybody")
+    table.stop("Anybody")
     performer = table.hub.performer
     with pytest.raises(LeaseError, match="clear the stop first"):
         performer.steer(window, Order.RUN)
     with pytest.raises(LeaseError, match="clear the stop first"):
-        performer.plan(SCRIPT, Order.RUN)
+        performer.plan(SCRIPT, Order.RUN, window.actor)
     finish(table, window, slow)
     q = table.arm.rest.setpoint + 0.01
     motion = replace(table.arm.rest.motion, q=q)
@@ -249,7 +248,7 @@ def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> No
     assert (shown["mood"], shown["headline"]) == ("moving", "Moving")
     assert shown["why"].startswith("Planning Wave. Step 1 of 2")
     table.arm.moves = False
-    table.hub.stop("Anybody")
+    table.stop("Anybody")
     assert bar(table, window)["mood"] == "stopped"
     table.hub.clear_stop(window)
     finish(table, window, slow)
@@ -261,20 +260,20 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     table.plan(owner)
     performer, hub = table.hub.performer, table.hub
     performer.steer(owner, Order.RUN)
-    hub.move(performer.actor(owner), cmd.Pause())
+    hub.move(owner, cmd.Pause())
     assert isinstance(table.arm.commands[-1], cmd.Pause)
-    hub.set_speed(performer.actor(owner), 0.5)
+    hub.set_speed(owner, 0.5)
     assert table.arm.share == 0.5
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        hub.move(performer.actor(other), cmd.Pause())
+        hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        hub.set_speed(performer.actor(other), 1.0)
+        hub.set_speed(other, 1.0)
     assert bar(table, owner)["orders"] == ["pause"]
     assert bar(table, other)["orders"] == []
     # The page of the owner is loaded anew.
     hub.leave(owner)
     again = table.join(PAGES[0])
-    hub.move(performer.actor(again), cmd.Resume())
+    hub.move(again, cmd.Resume())
 
 
 def test_a_persons_speed_holds_to_the_end_of_the_program(table: Staged) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
-from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
+from katana450.arm.runtime.mailbox import CAPACITY, Mailbox, Submission
 from katana450.errors import InputError
 
 
@@ -22,7 +22,8 @@ def test_commands_come_out_once_in_the_order_they_went_in(mailbox: Mailbox) -> N
     sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Hold()]
     tickets = [mailbox.put(command) for command in sent]
     assert tickets == [1, 2, 3]
-    assert mailbox.drain() == (sent, 3)
+    submissions, ticket = mailbox.drain()
+    assert ([each.command for each in submissions], ticket) == (sent, 3)
     assert mailbox.drain() == ([], 3)
 
 
@@ -31,7 +32,7 @@ def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) 
         mailbox.put(cmd.MoveTool(np.array([0.3, 0.0, 0.001 * i])))
     commands, ticket = mailbox.drain()
     assert ticket == 50 == mailbox.last_ticket
-    (last,) = commands
+    ((last, _),) = commands
     assert isinstance(last, cmd.MoveTool)
     assert last.position[2] == 0.049
 
@@ -39,7 +40,8 @@ def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) 
 def test_sliders_of_two_axes_do_not_swallow_each_other(mailbox: Mailbox) -> None:
     for command in (cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.0), cmd.SetJoint(1, -1.1)):
         mailbox.put(command)
-    assert mailbox.drain()[0] == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
+    left = [each.command for each in mailbox.drain()[0]]
+    assert left == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
 
 
 def test_a_button_pressed_twice_is_two_commands(mailbox: Mailbox) -> None:
@@ -64,7 +66,7 @@ def test_what_the_arm_cannot_be_asked_does_not_enter(mailbox: Mailbox) -> None:
 
 
 def test_threads_lose_nothing(mailbox: Mailbox) -> None:
-    taken: list[cmd.Command] = []
+    taken: list[Submission] = []
     writers = [
         threading.Thread(target=lambda: [mailbox.put(cmd.Home()) for _ in range(60)])
         for _ in range(4)

@@ -23,6 +23,7 @@ from katana450.server.view.paint import PaintNodes
 from katana450.server.view.programs import STEERING
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
+from tests.view.gestures import RecordedGestures
 
 
 @pytest.fixture
@@ -70,14 +71,8 @@ def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
 def test_the_panel_has_a_slider_a_joint_and_says_why(
     server: viser.ViserServer, machine: Machine
 ) -> None:
-    said: list[Any] = []
-
-    def put(command: Any) -> int:
-        said.append(command)
-        return len(said)
-
     state = standing(machine)
-    MachinePanel(server.gui, machine.joints, put, state)
+    MachinePanel(server.gui, machine.joints, RecordedGestures(), state)
     controls = {
         handle.label: handle for handle in server.gui._gui_input_handle_from_uuid.values()
         if isinstance(handle, viser.GuiSliderHandle)

@@ -14,7 +14,7 @@ from katana450.assembly.robot_session import Described, Jointed, recognised
 from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
 from katana450.extensions.programs.script_files import Scripts
-from katana450.server.service.arm_handle import Motion
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
 from katana450.server.view.follower import Follower
 from katana450.server.view.layer import ViewLayer
@@ -56,18 +56,34 @@ def _arm(
     model, session, _ = found
     navigator = PlanningWorker(session, link.board, link)
     frame_rate = outfit.settings.frame_rate
-    view = View(gateway.viser, model, link.board, navigator, session, frame_rate, besides)
+    view = View(
+        gateway.viser,
+        model,
+        link.board,
+        gateway.gestures,
+        lambda: link.last_ticket,
+        session,
+        frame_rate,
+        besides,
+    )
     navigator.tell = gateway.announce
     navigator.redirected = gateway.steering.redirected
     mechanism, _ = load_mechanism(outfit.urdf)
     nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
-    gateway.attach(Motion(model, session, link, navigator, nodes, view.let_go))
+    gateway.attach(ArmHandle(model, session, link, navigator, nodes))
     return view
 
 
 def _machine(gateway: Gateway, settings: Settings, found: Jointed, link: FrontEnd) -> MachineView:
     machine, session, _ = found
-    view = MachineView(gateway.viser, machine, link.board, link, settings.frame_rate)
+    view = MachineView(
+        gateway.viser,
+        machine,
+        link.board,
+        gateway.gestures,
+        lambda: link.last_ticket,
+        settings.frame_rate,
+    )
     nodes = Nodes(machine.mechanism, machine_of(machine), session.surroundings)
-    gateway.attach(Motion(machine, session, link, None, nodes, view.let_go))
+    gateway.attach(ArmHandle(machine, session, link, None, nodes))
     return view

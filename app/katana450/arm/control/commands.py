@@ -219,14 +219,14 @@ class ClearStop(BaseCommand):
 class Pause(BaseCommand):
     """Come to rest on the way, and keep the goal."""
 
-    traits: ClassVar[Traits] = Traits(supersedes=False, joints_only=True)
+    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True)
 class Resume(BaseCommand):
     """Go on to the goal there is."""
 
-    traits: ClassVar[Traits] = Traits(supersedes=False, joints_only=True)
+    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +261,7 @@ class SpeedScale(BaseCommand):
     """From now on no joint and no tool is faster than ``value`` of its most, above 0 up to 1."""
 
     traits: ClassVar[Traits] = Traits(
-        while_stopped=True, supersedes=False, passive=True, joints_only=True
+        pacing=True, while_stopped=True, supersedes=False, passive=True, joints_only=True
     )
 
     value: float

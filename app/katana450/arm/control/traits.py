@@ -19,6 +19,7 @@ class Traits:
         while_paused: takes effect during a pause. A jog does not: it has no goal to keep for later.
         supersedes: ends the motion or the program that is under way or being planned.
         passive: leaves a path that is being planned as it is; all others end the planning.
+        pacing: may be given by the owner of the running program too, which holds the lease itself.
         joints_only: possible for a mechanism that has joints and no tool.
         planned: a path is planned first, so the command takes effect later than its ticket.
         safety: may be given by everybody, at any time, whoever holds the arm. It is never refused,
@@ -30,6 +31,7 @@ class Traits:
     while_paused: bool = True
     supersedes: bool = True
     passive: bool = False
+    pacing: bool = False
     joints_only: bool = False
     planned: bool = False
     safety: bool = False

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.things import same
 from katana450.arm.runtime.clock import MonotonicClock
@@ -50,11 +51,12 @@ ENDING_SECONDS = 2.0
 
 
 @dataclass(frozen=True)
-class Told:
-    """A command, with the front's own number for it."""
+class CommandMessage:
+    """A command with its giver, and the front's own number for it."""
 
     number: int
     command: cmd.Command
+    actor: Actor | None
 
 
 @dataclass(frozen=True)
@@ -119,24 +121,24 @@ class ArmEnd:
             while True:
                 said = self._pipe.recv()
                 self._heard = time.monotonic()
-                if isinstance(said, Told):
+                if isinstance(said, CommandMessage):
                     self._put(said)
         except GONE:
             self.cut.set()
             # Nobody is left who could say where to go on to.
             self._mailbox.put(cmd.Stop())
 
-    def _put(self, told: Told) -> None:
-        if isinstance(told.command, cmd.Follow):
-            self._names.note(told.number, told.command.plan)
+    def _put(self, message: CommandMessage) -> None:
+        if isinstance(message.command, cmd.Follow):
+            self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:
-                ticket = self._mailbox.put(told.command)
+                ticket = self._mailbox.put(message.command, message.actor)
             except InputError as error:
                 # Checked over there, so only too many at once can be wrong with it.
                 log.warning("A command was dropped: %s", error)
                 ticket = self._mailbox.last_ticket
-            self._numbers.append((ticket, told.number))
+            self._numbers.append((ticket, message.number))
 
     def _show(self) -> None:
         board = self._loop.board
@@ -191,7 +193,7 @@ class FrontEnd:
         self._pipe = pipe
         self._check = check
         self._sending = threading.Lock()
-        self._unsent: deque[Told] = deque()
+        self._unsent: deque[CommandMessage] = deque()
         self._number = 0
         self._plans = Plans()
         first = _loaded(pipe.recv_bytes(), self._plans)
@@ -212,10 +214,12 @@ class FrontEnd:
         with self._sending:
             return self._number
 
-    def put(self, command: cmd.Command) -> int:
-        """Send ``command`` to the arm; returns its ticket. Raises InputError for what cannot be.
+    def deliver(self, command: cmd.Command, actor: Actor | None = None) -> int:
+        """Send ``command`` of ``actor`` to the arm; returns its ticket.
 
-        An arm's process that does not answer is given nothing but a stop.
+        Raises InputError for a command that the arm cannot be given.
+
+        Where the arm's process does not answer, only a stop is sent.
         """
         self._check(command)
         age = self.age
@@ -233,7 +237,7 @@ class FrontEnd:
             self._number += 1
             if isinstance(command, cmd.Follow):
                 self._plans.note(self._number, command.plan)
-            self._unsent.append(Told(self._number, command))
+            self._unsent.append(CommandMessage(self._number, command, actor))
             self._flush()
             return self._number
 
@@ -259,7 +263,7 @@ class FrontEnd:
             self._unsent.popleft()
         return not self._unsent
 
-    def _send(self, said: Told | Alive) -> bool:
+    def _send(self, said: CommandMessage | Alive) -> bool:
         try:
             if not writable(self._pipe.fileno()):
                 return False

@@ -9,12 +9,12 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from katana450.arm.control.commands import Command, Stop
-from katana450.arm.control.event_log import news
+from katana450.arm.control.event_log import Entry, news
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
-from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.mailbox import Mailbox, Submission
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -59,6 +59,7 @@ class ControlLoop:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
+        self._newest: Submission | None = None
         self.board = StatePublisher(Snapshot(self._state, 0), self.lateness)
         """Where it shows what it does."""
         self.ticks = 0
@@ -71,7 +72,10 @@ class ControlLoop:
 
     def tick(self) -> None:
         """One turn: take the commands, move on, tell the arm, publish what changed."""
-        commands, ticket = self._mailbox.drain()
+        submissions, ticket = self._mailbox.drain()
+        commands = [each.command for each in submissions]
+        if submissions:
+            self._newest = submissions[-1]
         before = self._state
         t = self._clock.now()
         try:
@@ -85,8 +89,15 @@ class ControlLoop:
         self._state = state
         # An arm at rest wakes nobody: time alone is no news.
         if commands or _differs(before, state):
-            self.board.pin(Snapshot(state, ticket), news(before, state))
+            self.board.pin(Snapshot(state, ticket), self._entries(before, state))
         self.ticks += 1
+
+    def _entries(self, before: State, after: State) -> tuple[Entry, ...]:
+        """Return what is new in the event log, attributed to the newest command."""
+        if self._newest is None:
+            return news(before, after)
+        command, actor = self._newest
+        return news(before, after, actor, type(command).__name__)
 
     @property
     def running(self) -> bool:

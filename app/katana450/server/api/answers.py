@@ -226,10 +226,12 @@ class Arm(Answer, frozen=True, kw_only=True):
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True):
-    """One line of the ledger: a reason that began or ended, and who drove then."""
+    """A reason that began or ended, with the newest command then: whose, which, on what grounds."""
 
     when: str
     who: str | None
+    command: str
+    grounds: str | None
     began: bool
     finding: Finding
 

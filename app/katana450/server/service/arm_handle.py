@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
-
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins, margins
@@ -27,13 +24,11 @@ from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
-from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.api.fields import Rates
 from katana450.server.service.vrml_nodes import Nodes
 
 
-class Motion:
-    """One arm."""
+class ArmHandle:
+    """One arm. Reads are for everybody; ``deliver`` is for ``CommandGate`` alone."""
 
     def __init__(
         self,
@@ -42,10 +37,9 @@ class Motion:
         link: FrontEnd,
         navigator: PlanningWorker | None,
         nodes: Nodes,
-        let_go: Callable[[], None],
     ) -> None:
         """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
-        has a name in its VRML world. ``let_go`` takes the handles of the view out of every hand."""
+        has a name in its VRML world."""
         self.model = model
         self.nodes = nodes
         self._session = session
@@ -53,7 +47,6 @@ class Motion:
         self._board = link.board
         self._navigator = navigator
         self._sink: CommandSink = link if navigator is None else navigator
-        self._let_go = let_go
         self._loads = () if isinstance(model, Machine) else loads_of(model)
         self._measured: (
             tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
@@ -121,9 +114,12 @@ class Motion:
         """The branches there are to choose from. Raises InputError where there are none."""
         return self._session.choices(self.state)
 
-    def put(self, command: cmd.Command) -> int:
-        """Any command; its ticket. Raises InputError for one that cannot be."""
-        return self._sink.put(command)
+    def deliver(self, command: cmd.Command, actor: Actor) -> int:
+        """Send ``command`` of ``actor``, which may give it; return its ticket.
+
+        Raises InputError for a command that the arm cannot be given.
+        """
+        return self._sink.deliver(command, actor)
 
     @property
     def state(self) -> State:
@@ -153,34 +149,3 @@ class Motion:
     def age(self) -> float:
         """Time since the arm's process last proved that its control loop runs [s]."""
         return self._link.age
-
-    def stop(self) -> int:
-        """Rest as fast as the arm can, and obey nothing until the stop is cleared; its ticket."""
-        ticket = self._sink.put(cmd.Stop())
-        self._let_go()
-        return ticket
-
-    def clear_stop(self) -> None:
-        """After a stop: obey again. Nothing moves by this. Raises InputError when it cannot be."""
-        self._sink.put(cmd.ClearStop())
-
-    def hold(self) -> None:
-        """Come to rest and forget every target; no hand holds a handle any more."""
-        self._let_go()
-        self._put(cmd.Hold())
-
-    def jog(self, rates: Rates, frame: JogFrame) -> None:
-        """Go with these rates for a moment. Raises InputError where there are only joints."""
-        self._session.require_arm()
-        self._put(cmd.Jog(np.array(rates), frame))
-
-    def limit(self, share: float) -> None:
-        """No motion is faster than this share of the most."""
-        self._put(cmd.SpeedScale(share))
-
-    def _put(self, command: cmd.Command) -> None:
-        try:
-            self._sink.put(command)
-        except InputError:
-            # The mailbox is full: what is asked again and again is, and a stop always has room.
-            return

@@ -32,8 +32,7 @@ BARE: dict[type[requests.AnyRequest], cmd.Command] = {
 
 def driver_key(hub: Hub, window: Window) -> str:
     """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
-    actor = hub.performer.actor(window)
-    return window.person.key if hub.lease.holder == actor.person else ""
+    return window.person.key if hub.performer.drives(window) else ""
 
 
 class Dispatcher:
@@ -67,8 +66,6 @@ class Dispatcher:
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
-        if request.traits.for_program:
-            window = hub.performer.actor(window)
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
@@ -80,7 +77,7 @@ class Dispatcher:
         hub = self._hub
         match request:
             case requests.Stop(press=press):
-                hub.stop(window.person.name, press)
+                hub.stop(window.actor, press)
             case requests.ClearStop():
                 hub.clear_stop(window)
             case requests.Acquire():

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins
@@ -18,13 +19,11 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.api.fields import Rates
 from katana450.server.service.vrml_nodes import Nodes
 
 
 class Arm(Protocol):
-    """What the gateway asks of the arm; ``Motion`` is one."""
+    """What the gateway asks of the arm; ``ArmHandle`` is one."""
 
     @property
     def model(self) -> RobotModel | Machine: ...
@@ -76,17 +75,7 @@ class Arm(Protocol):
 
     def beat(self) -> None: ...
 
-    def stop(self) -> int: ...
-
-    def clear_stop(self) -> None: ...
-
-    def hold(self) -> None: ...
-
-    def jog(self, rates: Rates, frame: JogFrame) -> None: ...
-
-    def limit(self, share: float) -> None: ...
-
-    def put(self, command: cmd.Command) -> int: ...
+    def deliver(self, command: cmd.Command, actor: Actor) -> int: ...
 
     def choices(self) -> tuple[Choice, ...]: ...
 

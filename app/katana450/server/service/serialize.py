@@ -197,9 +197,13 @@ def ledger(lines: Sequence[Line]) -> answers.Ledger:
 
 def line(line: Line) -> answers.Line:
     """One of the journal's."""
+    actor = line.entry.actor
+    grounds = None if actor is None or actor.grounds is None else actor.grounds.value
     return answers.Line(
         when=line.when.isoformat(timespec="milliseconds"),
         who=line.who,
+        command=line.entry.command,
+        grounds=grounds,
         began=line.entry.began,
         finding=finding(line.entry.finding),
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from html import escape
 
 import numpy as np
@@ -19,7 +18,14 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.reading import Reading
 from katana450.server.view import readout
 from katana450.server.view.branches import BranchList, Find
-from katana450.server.view.controls import add_motion, ends, listener, set_slider, set_value
+from katana450.server.view.controls import (
+    GestureGate,
+    add_motion,
+    ends,
+    listener,
+    set_slider,
+    set_value,
+)
 from katana450.server.view.follower import READOUT_INTERVAL
 from katana450.server.view.ledger import LedgerList
 from katana450.server.view.looks import Shows, add_shows, add_views
@@ -50,14 +56,14 @@ class Panel:
         self,
         server: viser.ViserServer,
         model: RobotModel,
-        put: Callable[[cmd.Command], int],
+        gestures: GestureGate,
         find: Find,
         shows: Shows,
         state: State,
     ) -> None:
-        """``put`` takes a command; ``state`` is what the panel shows first."""
+        """``state``: what the panel shows first."""
         self._model = model
-        self._on_person = listener(put)
+        self._on_person = listener(gestures)
         self._gui = server.gui
         self._told_at = -math.inf
         self._told = ""

@@ -15,13 +15,14 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import LOST_AFTER
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests, schema
 from katana450.server.api.fields import ROOT, Id
 from katana450.server.service.budget import FIXED_HTTP, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub, Window, visiting
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
 from katana450.server.web.authenticator import Authenticator, Identity
@@ -121,7 +122,7 @@ class Api:
         return read
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.stop(self._visitor(request).name or "Somebody")
+        self._hub.stop(visiting(self._visitor(request), CommandChannel.API))
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
@@ -166,7 +167,7 @@ class Api:
         if known is None:
             session, _, page = key.partition("/")
             visitor = Identity(session, visitor.name, visitor.role)
-            window = self._hub.join(visitor, page, lambda _notice: None)
+            window = self._hub.join(visitor, page, lambda _notice: None, channel=CommandChannel.API)
             assert window.person.key == key
         else:
             window, timer = known

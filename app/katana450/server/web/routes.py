@@ -15,10 +15,11 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.server.api.fields import LONGEST_PRESS
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
-from katana450.server.service.hub import Hub
+from katana450.server.service.hub import Hub, visiting
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web import control_socket, security, static_files
@@ -95,7 +96,7 @@ def application(
         """The same as the button, for a page whose socket is gone."""
         visitor = _known(door, request)
         press = request.query_params.get("press", "")[:LONGEST_PRESS]
-        hub.stop(visitor.name or "Somebody", press or None)
+        hub.stop(visiting(visitor, CommandChannel.PAGE), press or None)
         return Response(status_code=204)
 
     async def health(_request: Request) -> Response:

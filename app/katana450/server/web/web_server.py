@@ -22,11 +22,12 @@ from websockets.http11 import Request
 
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import ConfigurationError
-from katana450.server.service.arm_handle import Motion
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival, keep_alive
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.steering import Steering
+from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import LARGEST
 from katana450.server.viser_bridge.proxy import Proxy
@@ -93,7 +94,9 @@ class Gateway:
             )
             self.steering = Steering(self._hub.performer, lambda: self._loop)
             door = Authenticator(access, self.port, self.address)
-            proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
+            guard = Guard(self.viser)
+            self.gestures = Gestures(self.viser, guard, self._hub)
+            proxy = Proxy(self._hub, door, guard, self.viser.get_port(), key)
             acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
             app = application(self._hub, door, budgets, proxy, self.address, acceptor, routes)
             self._lines = Lines(self._hub, door, budgets)
@@ -127,9 +130,9 @@ class Gateway:
         if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
-    def attach(self, arm: Motion) -> None:
+    def attach(self, arm: ArmHandle) -> None:
         """From now on the arm can be driven."""
-        self._hub.arm = arm
+        self._hub.gate.arm = arm
 
     def announce(self, why: str) -> None:
         """Tell everybody why something that was asked is not done. For any thread."""
