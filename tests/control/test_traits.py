@@ -45,7 +45,8 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
 
 
 def subclasses(kind: type) -> set[type]:
-    return {kind}.union(*(subclasses(each) for each in kind.__subclasses__()))
+    below: list[type] = kind.__subclasses__()
+    return {kind}.union(*(subclasses(each) for each in below))
 
 
 def test_every_command_class_is_a_command_and_declares_its_traits() -> None:
@@ -93,7 +94,7 @@ def test_of_a_stream_the_mailbox_keeps_the_newest(session: Session, state: State
         mailbox = Mailbox(lambda _: None)
         mailbox.put(each)
         mailbox.put(each)
-        kept = len(mailbox.drain()[0])
+        kept = len(mailbox.drain().commands)
         assert kept == (1 if each.traits.stream or each.traits.safety else 2), each
 
 
@@ -101,4 +102,4 @@ def test_a_stop_drops_what_waits_before_it(session: Session) -> None:
     mailbox = Mailbox(session.check)
     mailbox.put(cmd.Home())
     mailbox.put(cmd.Stop())
-    assert mailbox.drain()[0] == [cmd.Stop()]
+    assert mailbox.drain().commands == [cmd.Stop()]

@@ -14,11 +14,12 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import Arm
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import Verdict
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd, FrontEnd
 from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.errors import InputError
 
 SILENCE = 0.3
@@ -142,3 +143,35 @@ def test_an_arm_that_hangs_up_is_heard_by_its_front(ends: Ends) -> None:
 def test_how_late_the_ticks_are_is_told_now_and_then(ends: Ends) -> None:
     until(lambda: ends.front.board.lateness.count > 50)
     assert ends.front.board.lateness.period == 0.01
+
+
+def test_outcomes_come_back_by_the_tickets_of_the_front(ends: Ends) -> None:
+    front, wait = ends.front, 5.0
+    outcomes = front.board.outcomes
+    fine, far = front.put(cmd.SetJoint(0, 0.1)), front.put(cmd.SetJoint(1, 99.0))
+    assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
+    limited = outcomes.of(far).result(wait)
+    assert limited.verdict is Verdict.LIMITED
+    assert [found.axis for found in limited.findings] == [1]
+    # A stop that the front has not seen yet, as of an arm that lost it.
+    ends.mailbox.put(cmd.Stop())
+    late = outcomes.of(front.put(cmd.SetJoint(0, 0.2))).result(wait)
+    assert late.verdict is Verdict.REFUSED
+    assert "clear the stop first" in late.why
+    # A ticket that was recorded before it is asked for.
+    assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
+    both = front.put(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
+    assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
+    assert outcomes.of(front.put(cmd.ClearStop())).result(wait).verdict is Verdict.ACCEPTED
+
+
+def test_a_command_for_a_full_mailbox_is_refused_and_not_only_dropped(ends: Ends) -> None:
+    ends.loop.stop()
+    for _ in range(CAPACITY):
+        ends.mailbox.put(cmd.Home())
+    ticket = ends.front.put(cmd.Home())
+    time.sleep(0.2)
+    ends.loop.tick()
+    outcome = ends.front.board.outcomes.of(ticket).result(5.0)
+    assert outcome.verdict is Verdict.REFUSED
+    assert "slower" in outcome.why

@@ -19,9 +19,17 @@ from katana450.arm.control.aims import gone, paused, resumed, stamped, streamed,
 from katana450.arm.control.arrangement import dressed
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.joints import Joints
+from katana450.arm.control.outcome import take_all
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import LONGEST_STEP
-from katana450.arm.control.state import Finding, JointTarget, Reason, State, StoppingDistance
+from katana450.arm.control.state import (
+    Finding,
+    JointTarget,
+    Outcome,
+    Reason,
+    State,
+    StoppingDistance,
+)
 from katana450.arm.control.things import Environment
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -76,9 +84,13 @@ class JointSession:
 
         t: now [s], on the clock of ``state.t``.
         """
+        outcomes: list[Outcome] = []
         for command in commands:
             self.check(command)
-            state = self._take(state, stamped(command, t))
+            state, found = take_all(self._take, state, stamped(command, t))
+            outcomes.append(found)
+        if outcomes or state.outcomes:
+            state = replace(state, outcomes=tuple(outcomes))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = self._aim(state, self._limiter.halt(state.motion))
         dt = min(t - state.t, LONGEST_STEP)

@@ -28,12 +28,15 @@ from katana450.arm.control.choices import Choice, choice, choices, wish, wish_on
 from katana450.arm.control.findings import of_jog, of_joints, of_projection, of_tracked
 from katana450.arm.control.grip import gripped
 from katana450.arm.control.mover import Mover, wished_twist
+from katana450.arm.control.outcome import outcome, take_all
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.state import (
+    ACCEPTED,
     Dragging,
     Finding,
     Jogging,
     JointTarget,
+    Outcome,
     PoseTarget,
     Reason,
     State,
@@ -131,11 +134,18 @@ class Session:
             commands: each one passed by ``check``; an InputError leaves ``state`` as it was.
             t: now [s], on the clock of ``state.t``.
         """
+        outcomes: list[Outcome] = []
         for command in commands:
             self.check(command)
-            state = self._take(state, stamped(command, t))
+            before = state
+            state, found = take_all(self._take, state, stamped(command, t))
+            outcomes.append(found)
         if isinstance(state.target, ToolTarget) and isinstance(state.mode, Dragging):
             state = self._follow(state, state.target, state.mode)
+            if outcomes and outcomes[-1] is ACCEPTED:
+                outcomes[-1] = outcome(before, state)
+        if outcomes or state.outcomes:
+            state = replace(state, outcomes=tuple(outcomes))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = self._aim(state, JointTarget(self._mover(state).halt(state)[0]))
         dt = min(t - state.t, LONGEST_STEP)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
@@ -129,6 +130,10 @@ class Motion:
     def put(self, command: cmd.Command) -> int:
         """Any command; its ticket. Raises InputError for one that cannot be."""
         return self._sink.put(command)
+
+    def outcome(self, ticket: int) -> Future[Outcome]:
+        """Return what became of the command of ``ticket``, once the arm's process has told."""
+        return self._board.outcomes.of(ticket)
 
     @property
     def state(self) -> State:

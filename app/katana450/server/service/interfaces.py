@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 from typing import Protocol
 
 from katana450.arm.control import commands as cmd
@@ -10,7 +11,7 @@ from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
@@ -87,6 +88,8 @@ class Arm(Protocol):
     def limit(self, share: float) -> None: ...
 
     def put(self, command: cmd.Command) -> int: ...
+
+    def outcome(self, ticket: int) -> Future[Outcome]: ...
 
     def choices(self) -> tuple[Choice, ...]: ...
 
