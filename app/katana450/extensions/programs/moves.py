@@ -13,7 +13,7 @@ from katana450.extensions.programs.bench import Bench, Place
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
-from katana450.extensions.programs.step import nothing
+from katana450.extensions.programs.step import Step, nothing
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 
@@ -91,3 +91,7 @@ def through(fields: Fields, setting: Setting) -> tuple[tuple[Place, ...], float]
     each = read.listed(lambda item: places.place(item, setting), 2, MOST_VIAS)
     found: tuple[Place, ...] = fields.need("through", each, ())
     return found, fields.take("blend", read.number(0.01, 1.0), 0.5)
+
+
+STEPS: dict[str, type[Step]] = {"move": Move, "joints": Joints, "home": Home, "via": Via}
+"""Steps of this module, by their names in a script."""
