@@ -28,7 +28,13 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
     """One command of each class."""
     q = np.zeros(session.arm.chain.n)
     return [
-        *(cmd.SetJoint(0, 0.1), cmd.SetAxes(((0, 0.1),)), cmd.SetJoints(q), cmd.Servo(q)),
+        *(
+            cmd.SetJoint(0, 0.1),
+            cmd.SetAxes(((0, 0.1),)),
+            cmd.Nudge(0, 0.1),
+            cmd.SetJoints(q),
+            cmd.Servo(q),
+        ),
         *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.TurnTool(0.1, 0.1), cmd.SetPose(np.eye(4))),
         *(cmd.SetGripper(0.1), cmd.SetTool("flange"), cmd.SetReading(Reading.PITCH)),
         *(cmd.TakeBranch(BRANCHES[0]), cmd.EndDrag(), cmd.Home(), cmd.GoToZero(), cmd.Hold()),

@@ -151,6 +151,8 @@ class Dispatcher:
                 return cmd.SetJoint(axis - 1, value)
             case requests.Joints(q=q):
                 return cmd.SetJoints(np.array(q))
+            case requests.Nudge(axis=axis, by=by):
+                return cmd.Nudge(axis - 1, by)
             case requests.Servo(q=q, qd=qd):
                 return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
             case requests.Pose(T=T, frame=frame):
