@@ -46,6 +46,12 @@ whoever holds it falls silent or hangs up; after a stop nothing moves before a `
 command. A script that a program has the server run ends at rest once nothing is received from that
 program for 1 s (`--owner-silence`).
 
+The answer to a command comes once the arm's process has taken it, a tick or two later, and can be
+overtaken by the answer to a later question. It says what became of the command: `done` with the
+`outcome` `accepted`, or `limited` with the findings that say by what; or `refused` with the reason.
+Samples of a stream (`servo`, `jog`) are answered at once, as `accepted`; so is `branch`, whose path is
+planned first. `stop` waits for nothing.
+
 In a state `stop` is `requested` until the arm itself has shown, newer than the request, that it is
 stopped, and `confirmed` then. `age` is the time since the arm's process last answered: from 0.3 s on
 what else the state says is old, and `GET /health` answers with status 503.
@@ -61,6 +67,8 @@ with connect("http://127.0.0.1:8080", name="My script") as arm:
     there = arm.joints([0.3, -1.0, 1.4, 0.3, 0.0])  # waits until it is there
     there = arm.go(requests.Position(p=(0.45, 0.1, 0.0)))  # the tool point, pitch and roll kept
     print(there.why or "all as wished")
+    done = arm.ask(requests.Joint(axis=5, value=4.0))
+    print(done.outcome, [found.said for found in done.findings])  # limited, axis 5 at its limit
 ```
 
 `arm.upload(Path("bracket.stl"))` brings a mesh, `arm.ask(requests.Place(name="bracket",

@@ -41,7 +41,8 @@ def test_every_request_class_is_a_request_and_declares_its_traits() -> None:
 
 
 def test_who_holds_the_arm_and_heartbeats_cost_nothing() -> None:
-    kinds = [kind for kind in get_args(requests.AnyRequest) if kind.traits.free]
+    every: tuple[type[Request], ...] = get_args(requests.AnyRequest)
+    kinds = [kind for kind in every if kind.traits.free]
     assert {kind.__name__ for kind in kinds} == {
         *("Stop", "ClearStop", "Heartbeat"),
         *("Acquire", "Take", "Ask", "Withdraw", "Give", "ReleaseLease"),

@@ -48,6 +48,7 @@ class FakeArm:
     surroundings: Environment
     pouring: Pouring | None
     rig: PlanContext
+    outcome: Any
     margins: Margins
     holding: FloatArray | None
 

@@ -16,12 +16,12 @@ from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import Arm
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason
+from katana450.arm.control.state import Reason, Verdict
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd, FrontEnd
 from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.errors import InputError
 
 SILENCE = 0.3
@@ -160,3 +160,35 @@ def test_actor_goes_over_and_is_named_in_the_event_log(ends: Ends) -> None:
         None,
         "Stop",
     )
+
+
+def test_outcomes_come_back_by_the_tickets_of_the_front(ends: Ends) -> None:
+    front, wait = ends.front, 5.0
+    outcomes = front.board.outcomes
+    fine, far = front.deliver(cmd.SetJoint(0, 0.1)), front.deliver(cmd.SetJoint(1, 99.0))
+    assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
+    limited = outcomes.of(far).result(wait)
+    assert limited.verdict is Verdict.LIMITED
+    assert [found.axis for found in limited.findings] == [1]
+    # A stop that the front has not seen yet, as of an arm that lost it.
+    ends.mailbox.put(cmd.Stop())
+    late = outcomes.of(front.deliver(cmd.SetJoint(0, 0.2))).result(wait)
+    assert late.verdict is Verdict.REFUSED
+    assert "clear the stop first" in late.why
+    # A ticket that was recorded before it is asked for.
+    assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
+    both = front.deliver(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
+    assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
+    assert outcomes.of(front.deliver(cmd.ClearStop())).result(wait).verdict is Verdict.ACCEPTED
+
+
+def test_a_command_for_a_full_mailbox_is_refused_and_not_only_dropped(ends: Ends) -> None:
+    ends.loop.stop()
+    for _ in range(CAPACITY):
+        ends.mailbox.put(cmd.Home())
+    ticket = ends.front.deliver(cmd.Home())
+    time.sleep(0.2)
+    ends.loop.tick()
+    outcome = ends.front.board.outcomes.of(ticket).result(5.0)
+    assert outcome.verdict is Verdict.REFUSED
+    assert "slower" in outcome.why

@@ -120,6 +120,13 @@ class AsyncClient:
         """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
         return await self.go(requests.Joints(q=np.asarray(q, dtype=float).tolist()))
 
+    async def nudge(self, axis: int, by: float) -> answers.State:
+        """Drive the joint ``axis``, from 1, on by the angle ``by`` [rad]; see ``go``.
+
+        ``why`` of the state says so where the joint's range limits it.
+        """
+        return await self.go(requests.Nudge(axis=axis, by=by))
+
     async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """Bring the mesh in ``file`` to the server, to be placed by its key.
 

@@ -50,6 +50,10 @@ class Client:
         """See ``AsyncClient.joints``."""
         return self._wait(self._client.joints(q))
 
+    def nudge(self, axis: int, by: float) -> answers.State:
+        """See ``AsyncClient.nudge``."""
+        return self._wait(self._client.nudge(axis, by))
+
     def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """See ``AsyncClient.upload``."""
         return self._wait(self._client.upload(file, unit))

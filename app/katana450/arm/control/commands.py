@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from katana450.arm.control.checked import check_finite, vector
 from katana450.arm.control.joint_commands import (
     JOG_TIME,
@@ -17,6 +19,7 @@ from katana450.arm.control.joint_commands import (
     SetAxes,
     SetJoint,
     SetJoints,
+    with_axes,
 )
 from katana450.arm.control.thing_commands import (
     Attach,
@@ -59,6 +62,7 @@ __all__ = [
     "Home",
     "Jog",
     "MoveTool",
+    "Nudge",
     "Pause",
     "Place",
     "Remove",
@@ -122,6 +126,26 @@ class SetPose(BaseCommand):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T", frozen(se3.validated(self.T)))
+
+
+@dataclass(frozen=True)
+class Nudge(AxisCommand):
+    """Drive one joint on by the relative angle ``by`` [rad]; ``axis`` counts from 0.
+
+    The angle counts from the joint's goal, so that several in a row add up. The limits of the joint
+    limit it.
+    """
+
+    traits: ClassVar[Traits] = Traits(joints_only=True)
+
+    axis: int
+    by: float
+
+    def __post_init__(self) -> None:
+        SetJoint(self.axis, self.by)
+
+    def targets(self, goal: FloatArray) -> FloatArray:
+        return frozen(goal + with_axes(np.zeros(goal.size), ((self.axis, self.by),)))
 
 
 @dataclass(frozen=True)
@@ -310,6 +334,7 @@ class Batch(BaseCommand):
 Command = (
     SetJoint
     | SetAxes
+    | Nudge
     | SetJoints
     | Servo
     | MoveTool

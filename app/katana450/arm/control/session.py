@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
@@ -41,8 +40,16 @@ from katana450.arm.control.modes import (
     Tracking,
 )
 from katana450.arm.control.motion_stepper import MotionStepper
+from katana450.arm.control.outcome import outcome, take_all
 from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.state import Finding, Reason, State, StoppingDistance
+from katana450.arm.control.state import (
+    ACCEPTED,
+    Finding,
+    Outcome,
+    Reason,
+    State,
+    StoppingDistance,
+)
 from katana450.arm.control.things import Environment, Hand, Thing
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
@@ -177,11 +184,18 @@ class Session:
             commands: each one passed by ``check``; an InputError leaves ``state`` as it was.
             t: now [s], on the clock of ``state.t``.
         """
+        outcomes: list[Outcome] = []
         for command in commands:
             self.check(command)
-            state = self._take(state, stamped(command, t))
+            before = state
+            state, found = take_all(self._take, state, stamped(command, t))
+            outcomes.append(found)
         if isinstance(state.intent, Tracking):
             state = tool_targets.tracked(self.require_arm(), state, state.intent)
+            if outcomes and outcomes[-1] is ACCEPTED:
+                outcomes[-1] = outcome(before, state)
+        if outcomes or state.outcomes:
+            state = replace(state, outcomes=tuple(outcomes))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = self._at_rest_soon(state)
         dt = min(t - state.t, LONGEST_STEP)
@@ -227,8 +241,6 @@ class Session:
     def _accepted(self, state: State, command: cmd.Command) -> State:
         """``state`` after a command that leaves the mode as it is."""
         match command:
-            case cmd.Batch(commands=commands):
-                return functools.reduce(self._take, commands, state)
             case cmd.Pause():
                 return paused(state)
             case cmd.Resume():

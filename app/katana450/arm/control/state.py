@@ -32,8 +32,10 @@ from katana450.maths.motion.limiter import Motion
 from katana450.maths.motion.stream import Stream
 
 __all__ = [
+    "ACCEPTED",
     "Finding",
     "JointTarget",
+    "Outcome",
     "PoseTarget",
     "Reason",
     "State",
@@ -41,6 +43,7 @@ __all__ = [
     "StoppingDistance",
     "Target",
     "ToolTarget",
+    "Verdict",
 ]
 
 
@@ -106,6 +109,35 @@ class Finding:
     time: float = 0.0
 
 
+class Verdict(Enum):
+    """How far a command takes effect."""
+
+    ACCEPTED = "accepted"
+    """As it was given."""
+    LIMITED = "limited"
+    """As far as the arm can; the findings say what is in the way."""
+    REFUSED = "refused"
+    """Not at all: nothing has changed."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one command.
+
+    Attributes:
+        verdict: how far it takes effect.
+        findings: what limits it.
+        why: the reason in words, where the verdict is not ACCEPTED and no finding says it.
+    """
+
+    verdict: Verdict = Verdict.ACCEPTED
+    findings: tuple[Finding, ...] = ()
+    why: str = ""
+
+
+ACCEPTED = Outcome()
+
+
 @dataclass(frozen=True)
 class StoppingDistance:
     """Distance that the tool, or else any link, travels until it is at rest [m], and the time that
@@ -139,6 +171,7 @@ class State:
         grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
         poured: the water of the cup; None where there is none.
         looks: how links and things are shown.
+        outcomes: what became of the commands of this tick, one for each.
     """
 
     t: float
@@ -161,6 +194,7 @@ class State:
     grip: float | None = None
     poured: Poured | None = None
     looks: Looks = ALL_AS_MADE
+    outcomes: tuple[Outcome, ...] = ()
 
     @staticmethod
     def standing(

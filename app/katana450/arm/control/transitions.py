@@ -56,10 +56,9 @@ def _row(begins: type[Mode] | None, *effects: Effect) -> Row:
     return Row(begins, dict(zip(MODES, effects, strict=True)))
 
 
-TABLE: Mapping[type[cmd.Command], Row] = {
+TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     # begins                         Idle Pos. Trac Jog. Serv Foll
-    cmd.SetJoint: _row(Positioning,     S,   S,   S,   S,   S,   S),
-    cmd.SetAxes: _row(Positioning,      S,   S,   S,   S,   S,   S),
+    cmd.AxisCommand: _row(Positioning,  S,   S,   S,   S,   S,   S),
     cmd.SetJoints: _row(Positioning,    S,   S,   S,   S,   S,   S),
     cmd.Home: _row(Positioning,         S,   S,   S,   S,   S,   S),
     cmd.GoToZero: _row(Positioning,     S,   S,   S,   S,   S,   S),
@@ -95,10 +94,15 @@ TABLE: Mapping[type[cmd.Command], Row] = {
 }  # fmt: skip
 
 
+def row_of(kind: type[cmd.BaseCommand]) -> Row:
+    """Return the row of a class of commands: its own, or that of its nearest base."""
+    return next(TABLE[each] for each in kind.__mro__ if each in TABLE)
+
+
 def effect_of(command: cmd.Command, state: State) -> Effect:
     """The effect that ``command`` has on ``state``."""
     if state.stopped is not None and not command.traits.while_stopped:
         return Effect.REFUSED
     if state.paused and not command.traits.while_paused:
         return Effect.REFUSED
-    return TABLE[type(command)].effects[type(state.intent)]
+    return row_of(type(command)).effects[type(state.intent)]

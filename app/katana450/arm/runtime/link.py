@@ -19,11 +19,13 @@ from multiprocessing.connection import Connection
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.event_log import Entry
+from katana450.arm.control.outcome import DROPPED, refused
 from katana450.arm.control.things import same
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.readiness import readable, writable
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.wire import Names, Plans
@@ -66,11 +68,15 @@ class Alive:
 
 @dataclass(frozen=True, eq=False)
 class News:
-    """A snapshot, whose ticket is the front's number; what is new in the ledger; how late it is."""
+    """A snapshot, whose ticket is the front's number; what is new in the ledger; how late it is.
+
+    outcomes: what became of commands since the last, by the front's numbers.
+    """
 
     snapshot: Snapshot
     ledger: tuple[Entry, ...]
     lateness: LoopTiming
+    outcomes: tuple[TicketOutcome, ...] = ()
 
 
 class ArmEnd:
@@ -85,6 +91,8 @@ class ArmEnd:
         self._mailbox = mailbox
         self._silence = silence
         self._numbers: deque[tuple[int, int]] = deque([(mailbox.last_ticket, 0)])
+        self._number_of: dict[int, int] = {}
+        self._refused: list[TicketOutcome] = []
         self._numbering = threading.Lock()
         self._heard = time.monotonic()
         self._names = Names()
@@ -138,6 +146,9 @@ class ArmEnd:
                 # Checked over there, so only too many at once can be wrong with it.
                 log.warning("A command was dropped: %s", error)
                 ticket = self._mailbox.last_ticket
+                self._refused.append((message.number, refused(str(error))))
+            else:
+                self._number_of[ticket] = message.number
             self._numbers.append((ticket, message.number))
 
     def _show(self) -> None:
@@ -161,7 +172,7 @@ class ArmEnd:
                     reported, board.lateness = now, self._loop.lateness
                 fresh = _newer(board.ledger, last)
                 last = fresh[-1] if fresh else last
-                self._send(News(self._named(snapshot), fresh, board.lateness))
+                self._send(News(self._named(snapshot), fresh, board.lateness, self._outcomes()))
                 seen = snapshot
         except GONE:
             self.cut.set()
@@ -175,6 +186,17 @@ class ArmEnd:
             while len(self._numbers) > 1 and self._numbers[1][0] <= snapshot.ticket:
                 self._numbers.popleft()
             return Snapshot(snapshot.state, self._numbers[0][1])
+
+    def _outcomes(self) -> tuple[TicketOutcome, ...]:
+        """Return what is new of the outcomes, by the front's numbers."""
+        told = self._loop.board.take_outcomes()
+        with self._numbering:
+            # Those of other ends, and the stops of this one, have no number here.
+            new = [(self._number_of.pop(ticket, None), outcome) for ticket, outcome in told]
+            named = [(number, outcome) for number, outcome in new if number is not None]
+            named += self._refused
+            self._refused.clear()
+        return tuple(named)
 
     def _watch(self) -> None:
         while not self.cut.wait(self._silence / 4):
@@ -229,6 +251,7 @@ class FrontEnd:
         with self._sending:
             if command.traits.safety:
                 # What has not gone yet is dead the moment it comes.
+                self.board.outcomes.note((each.number, DROPPED) for each in self._unsent)
                 self._unsent.clear()
             elif age > UNANSWERED:
                 raise InputError(
@@ -287,6 +310,8 @@ class FrontEnd:
                 seen = self.board.snapshot
                 if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
                     self.board.pin(_known(news.snapshot, seen), news.ledger)
+                # After the state: whoever is answered finds one that has the command in it.
+                self.board.outcomes.note(news.outcomes)
         except GONE:
             self.cut.set()
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Protocol
 
 from katana450.arm.control.commands import Command, Stop
 from katana450.arm.control.event_log import Entry, news
+from katana450.arm.control.outcome import DROPPED, FAILED
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
-from katana450.arm.runtime.mailbox import Mailbox, Submission
+from katana450.arm.runtime.mailbox import Drained, Mailbox, Submission
+from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -72,24 +75,24 @@ class ControlLoop:
 
     def tick(self) -> None:
         """One turn: take the commands, move on, tell the arm, publish what changed."""
-        submissions, ticket = self._mailbox.drain()
-        commands = [each.command for each in submissions]
-        if submissions:
-            self._newest = submissions[-1]
+        drained = self._mailbox.drain()
+        if drained.submissions:
+            self._newest = drained.submissions[-1]
         before = self._state
         t = self._clock.now()
         try:
-            state = self._session.step(before, commands, t)
+            state = self._session.step(before, drained.commands, t)
             sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
             state = self._session.observe(state, sent.q, sent.gripper)
         except Exception:
             # Whatever went wrong, the loop lives on and the arm holds: a person must see it.
             log.exception("The control loop met an error; the arm holds.")
-            state = self._session.fail(before)
+            state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
         self._state = state
         # An arm at rest wakes nobody: time alone is no news.
-        if commands or _differs(before, state):
-            self.board.pin(Snapshot(state, ticket), self._entries(before, state))
+        if drained.commands or _differs(before, state):
+            self.board.note(_outcomes(drained, state))
+            self.board.pin(Snapshot(state, drained.last), self._entries(before, state))
         self.ticks += 1
 
     def _entries(self, before: State, after: State) -> tuple[Entry, ...]:
@@ -130,6 +133,15 @@ class ControlLoop:
             self.tick()
             due += self._period
             self._clock.sleep_until(due)
+
+
+def _outcomes(drained: Drained, state: State) -> Iterator[TicketOutcome]:
+    """Yield what became of each ticket of ``drained`` in the tick that ended in ``state``."""
+    for ticket in drained.dropped:
+        yield ticket, DROPPED
+    for tickets, outcome in zip(drained.tickets, state.outcomes, strict=False):
+        for ticket in tickets:
+            yield ticket, outcome
 
 
 def _differs(a: State, b: State) -> bool:

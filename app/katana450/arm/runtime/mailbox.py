@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from katana450.arm.control.actor import Actor
@@ -40,11 +41,33 @@ class CommandSink(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Drained:
+    """Content of the mailbox when a tick empties it.
+
+    Attributes:
+        submissions: what waited, oldest first.
+        tickets: of each submission, with those of the commands of its stream that it replaced.
+        dropped: tickets of the commands that waited when a stop came.
+        last: the last ticket that was given.
+    """
+
+    submissions: list[Submission]
+    tickets: list[list[int]]
+    dropped: list[int]
+    last: int
+
+    @property
+    def commands(self) -> list[Command]:
+        """The commands of the submissions, oldest first."""
+        return [each.command for each in self.submissions]
+
+
 class Mailbox:
     """Commands in the order they came, each checked at the door.
 
-    A ticket is the number of commands put in so far; ``drain`` hands out the last one, so that a
-    sender can tell from the loop's next snapshot whether what it said has been taken.
+    A ticket is the number of commands put in so far; ``drain`` hands them out, so that the loop can
+    tell a sender what became of its command.
     """
 
     def __init__(self, check: Callable[[Command], None]) -> None:
@@ -52,30 +75,35 @@ class Mailbox:
         self._check = check
         self._lock = threading.Lock()
         self._waiting: list[Submission] = []
+        self._of_waiting: list[list[int]] = []
+        self._dropped: list[int] = []
         self._tickets = 0
 
     def put(self, command: Command, actor: Actor | None = None) -> int:
         """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
         self._check(command)
-        submission = Submission(command, actor)
         with self._lock:
+            replaced = []
             if command.traits.safety:
                 # Never refused, and what waits before it is dead the moment it comes.
-                self._waiting = [submission]
+                self._dropped += [ticket for each in self._of_waiting for ticket in each]
+                self._waiting, self._of_waiting = [], []
             elif self._waiting and command.replaces(self._waiting[-1].command):
-                self._waiting[-1] = submission
+                self._waiting.pop()
+                replaced = self._of_waiting.pop()
             elif len(self._waiting) >= CAPACITY:
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
-            else:
-                self._waiting.append(submission)
             self._tickets += 1
+            self._waiting.append(Submission(command, actor))
+            self._of_waiting.append([*replaced, self._tickets])
             return self._tickets
 
-    def drain(self) -> tuple[list[Submission], int]:
-        """Everything that waits, oldest first, and the last ticket given."""
+    def drain(self) -> Drained:
+        """Hand out everything that waits."""
         with self._lock:
-            waiting, self._waiting = self._waiting, []
-            return waiting, self._tickets
+            drained = Drained(self._waiting, self._of_waiting, self._dropped, self._tickets)
+            self._waiting, self._of_waiting, self._dropped = [], [], []
+            return drained
 
     @property
     def last_ticket(self) -> int:

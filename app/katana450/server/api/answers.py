@@ -38,17 +38,19 @@ class Welcome(Answer, frozen=True, kw_only=True):
 
 
 class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is accepted. ``ticket``: of one that moves the arm; it is heeded in
-    states whose ticket is no smaller. ``rotation_misfit``: of one with a pose, the largest entry of
-    R^T R - I of its rotation; the nearest rotation is used, and more than 1e-3 is refused."""
+    """The request of that id is done. A command of the arm has a ``ticket``: it is in every state
+    whose ticket is no smaller. Its ``outcome``: accepted, limited by the ``findings``, or unknown
+    if the arm's process has not told within 1 s. ``rotation_misfit``, of a pose: the largest entry
+    of R^T R - I; the nearest rotation is used, and more than 1e-3 is refused."""
 
     ticket: int | None = None
+    outcome: str | None = None
+    findings: tuple[Finding, ...] = ()
     rotation_misfit: float | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):
-    """Nothing has changed; ``why`` says the reason and what to do. ``retry``: too much was asked
-    at once, and after so many seconds there is time again."""
+    """Nothing has changed; ``why`` says why and what to do. ``retry`` [s]: ask again then."""
 
     why: str
     retry: float | None = None
@@ -351,8 +353,8 @@ class Links(Answer, frozen=True, kw_only=True):
 
 
 class Mesh(Answer, frozen=True, kw_only=True):
-    """A file that was uploaded and can now be placed. ``key``: for ``place``. ``name``: of the
-    file, and of no thing there is. ``said``: what was read. ``size``: along x, y, z [m]."""
+    """An uploaded file. ``key``: for ``place``. ``name``: its own, and of no thing there is.
+    ``said``: what was read. ``size``: along x, y, z [m]."""
 
     key: str
     name: str

@@ -19,6 +19,7 @@ from katana450.server.api.fields import (
     FASTEST,
     LARGEST,
     LEAST_SHARE,
+    MOST_JOINTS,
     MOST_STATES,
     SLOWEST,
     VERSION,
@@ -92,6 +93,7 @@ __all__ = [
     "Load",
     "Mount",
     "Named",
+    "Nudge",
     "Order",
     "Pause",
     "Place",
@@ -191,6 +193,18 @@ class Branch(Request, frozen=True, kw_only=True):
     elbow: Literal["up", "down"]
 
 
+class Nudge(Request, frozen=True, kw_only=True):
+    """Drive one joint on by a relative angle; ``axis`` counts from 1. What slides moves by m.
+
+    The angle counts from where the joint is going. Beyond the joint's range it is limited.
+    """
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    by: float
+
+
 class Hold(Request, frozen=True):
     """Come to rest and forget the target."""
 
@@ -280,6 +294,7 @@ AnyRequest = (
     | Speed
     | Joint
     | Joints
+    | Nudge
     | Servo
     | Pose
     | Position

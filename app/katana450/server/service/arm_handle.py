@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future
+
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.choices import Choice
@@ -9,7 +11,7 @@ from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
@@ -120,6 +122,10 @@ class ArmHandle:
         Raises InputError for a command that the arm cannot be given.
         """
         return self._sink.deliver(command, actor)
+
+    def outcome(self, ticket: int) -> Future[Outcome]:
+        """Return what became of the command of ``ticket``, once the arm's process has told."""
+        return self._board.outcomes.of(ticket)
 
     @property
     def state(self) -> State:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import nullcontext
 
 import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import Verdict
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
@@ -30,6 +32,13 @@ BARE: dict[type[requests.AnyRequest], cmd.Command] = {
 """What says all there is to say by its name."""
 
 
+ACCEPTED, UNKNOWN = Verdict.ACCEPTED.value, "unknown"
+"""Outcomes in answers that do not come from the arm's process."""
+
+OUTCOME_SECONDS = 1.0
+"""[s] Time in which the arm's process tells the outcome of a command; a tick takes 10 ms."""
+
+
 def driver_key(hub: Hub, window: Window) -> str:
     """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
     return window.person.key if hub.performer.drives(window) else ""
@@ -44,6 +53,8 @@ class Dispatcher:
 
     def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life.
+
+        The outcome of a command may be still to come, see ``is_pending``.
 
         What it costs is taken from ``budget``; raises BusyError when that is used up. A request
         that is ``free`` costs nothing, nor does what steers the arm for whoever holds it.
@@ -69,8 +80,35 @@ class Dispatcher:
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
-            return answers.Done()
-        return answers.Done(ticket=hub.move(window, command), rotation_misfit=_misfit(request))
+            return answers.Done(outcome=ACCEPTED if request.traits.stream else None)
+        # A stream is not held up by its answers, and what is planned first has no ticket yet.
+        at_once = request.traits.stream or command.traits.planned
+        return answers.Done(
+            ticket=hub.move(window, command),
+            outcome=ACCEPTED if at_once else None,
+            rotation_misfit=_misfit(request),
+        )
+
+    @staticmethod
+    def is_pending(answer: answers.Answer) -> bool:
+        """Return whether ``answer`` is that of a command whose outcome is still to come."""
+        if not isinstance(answer, answers.Done):
+            return False
+        return answer.ticket is not None and answer.outcome is None
+
+    async def concluded(self, pending: answers.Answer) -> answers.Answer:
+        """Return ``pending`` with what became of its command, once the arm's process has told.
+
+        A command that the session refuses becomes ``answers.Refused``.
+        """
+        assert isinstance(pending, answers.Done)
+        assert pending.ticket is not None
+        try:
+            async with asyncio.timeout(OUTCOME_SECONDS):
+                outcome = await asyncio.wrap_future(self._hub.present().outcome(pending.ticket))
+        except TimeoutError:
+            return msgspec.structs.replace(pending, outcome=UNKNOWN)
+        return serialize.concluded(pending, outcome)
 
     def _arrange(self, window: Window, request: requests.AnyRequest) -> None:
         """What is about who drives, and how."""
@@ -110,6 +148,8 @@ class Dispatcher:
                 return cmd.SetJoint(axis - 1, value)
             case requests.Joints(q=q):
                 return cmd.SetJoints(np.array(q))
+            case requests.Nudge(axis=axis, by=by):
+                return cmd.Nudge(axis - 1, by)
             case requests.Servo(q=q, qd=qd):
                 return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
             case requests.Pose(T=T, frame=frame):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 from typing import Protocol
 
 from katana450.arm.control import commands as cmd
@@ -11,7 +12,7 @@ from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.model import RobotModel
@@ -76,6 +77,8 @@ class Arm(Protocol):
     def beat(self) -> None: ...
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int: ...
+
+    def outcome(self, ticket: int) -> Future[Outcome]: ...
 
     def choices(self) -> tuple[Choice, ...]: ...
 

@@ -44,6 +44,15 @@ def finding(found: control.Finding) -> answers.Finding:
     )
 
 
+def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | answers.Refused:
+    """Return ``done`` with the outcome of its command, or the refusal that this is."""
+    if outcome.verdict is control.Verdict.REFUSED:
+        why = outcome.why or "; ".join(told(each) for each in outcome.findings) + "."
+        return answers.Refused(id=done.id, why=why)
+    findings = tuple(finding(each) for each in outcome.findings)
+    return msgspec.structs.replace(done, outcome=outcome.verdict.value, findings=findings)
+
+
 def state(hub: Hub) -> answers.State:
     """The newest. Raises LeaseError while there is no arm yet."""
     arm = hub.present()

@@ -139,7 +139,10 @@ class Api:
             if isinstance(asked, requests.Hello | requests.Watch):
                 raise InputError("That is for a connection that lasts: the socket or the TCP port.")
             window = self._window(request, visitor)
-            return as_json(self._desk.do(window, asked, self._budget(request)))
+            answer = self._desk.do(window, asked, self._budget(request))
+            if self._desk.is_pending(answer):
+                answer = await self._desk.concluded(answer)
+            return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
         except BusyError as error:
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
