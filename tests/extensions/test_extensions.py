@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.client import connect
+from katana450.client import RefusedError, connect
 from katana450.extension import BUILT_IN, extensions
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT as ROOT_PATH
@@ -150,7 +150,7 @@ def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
     assert "The extension report is needed and not installed." in said
 
 
-NOT_NEEDED = ("importers", "scene", "reachability", "experiments", "report", "render")
+NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "report", "render")
 """Extensions that a server runs without."""
 
 
@@ -163,6 +163,9 @@ def test_server_runs_without_the_extensions_it_does_not_need(
         assert server.running
         with connect(server.url, "Test") as arm:
             assert arm.look(answers.Things).things
+            assert arm.look(answers.Links).links
+            with pytest.raises(RefusedError, match="not installed"):
+                arm.ask(requests.Get(node="Clock", field="startTime"))
             arm.ask(requests.Home())
         upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
         with pytest.raises(urllib.error.HTTPError) as refused:

@@ -30,7 +30,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import Rates
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.nodes import Nodes
 
 
 class Motion:
