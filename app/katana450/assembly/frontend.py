@@ -37,7 +37,8 @@ def attached(
     link = FrontEnd(pipe, found.session.check)
     if isinstance(found, Jointed):
         for layer in layers:
-            raise ConfigurationError(f"{layer.what} {found.machine.joints.why}")
+            if layer.what:
+                raise ConfigurationError(f"{layer.what} {found.machine.joints.why}")
         return link, _machine(gateway, outfit, found, link)
     besides = ViewOptions(layers, (gateway.steering, Scripts(settings.programs)), meshes)
     return link, _arm(gateway, outfit, found, link, besides)
