@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
     from katana450.arm.control.session import Session
+    from katana450.arm.control.things import Environment
     from katana450.arm.robot.initial_scene import InitialScene
+    from katana450.arm.robot.mechanism import Mechanism
+    from katana450.server.service.nodes import Body, Nodes
     from katana450.server.view.layer import ViewLayer
     from katana450.server.web.http_api import RouteContext
 
@@ -67,12 +70,15 @@ class ServeExtension:
             the process of the view. Raises KatanaError.
         routes: Returns routes for the web server, below ``/api/v1``. Called in the process of the
             view.
+        nodes: Returns what of a mechanism and the objects around it can be read and set by name.
+            Called in the process of the view; the first extension that has it is asked.
     """
 
-    add_options: Callable[[ArgumentParser], None]
+    add_options: Callable[[ArgumentParser], None] | None = None
     initial_scene: Callable[[Namespace, Callable[[], Session]], InitialScene | None] | None = None
     view_layer: Callable[[Namespace], ViewLayer | None] | None = None
     routes: Callable[[RouteContext], list[BaseRoute]] | None = None
+    nodes: Callable[[Mechanism, Body, Environment], Nodes] | None = None
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from katana450.client import connect
+from katana450.client import RefusedError, connect
 from katana450.extension import BUILT_IN, extensions
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT as ROOT_PATH
-from tests.browser.server import AppServer
+from tests.browser.server import AppServer, free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
@@ -150,7 +150,7 @@ def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
     assert "The extension report is needed and not installed." in said
 
 
-NOT_NEEDED = ("importers", "scene", "reachability", "experiments", "report", "render")
+NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "report", "render")
 """Extensions that a server runs without."""
 
 
@@ -163,6 +163,9 @@ def test_server_runs_without_the_extensions_it_does_not_need(
         assert server.running
         with connect(server.url, "Test") as arm:
             assert arm.query(answers.Things).things
+            assert arm.query(answers.Links).links
+            with pytest.raises(RefusedError, match="not installed"):
+                arm.ask(requests.Get(node="Clock", field="startTime"))
             arm.ask(requests.Home())
         upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
         with pytest.raises(urllib.error.HTTPError) as refused:
@@ -176,6 +179,14 @@ def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
     said = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
     assert said.startswith("2 ")
     assert "unrecognized arguments: --scene" in said
+
+
+def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> None:
+    gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
+    options = ("--urdf", gantry, "--workspace", str(tmp_path / "map.npz"))
+    said = katana450("serve", "--port", str(free_port()), *options)
+    assert said.startswith("1 ")
+    assert "map.npz maps where a tool can be. " in said
 
 
 def test_another_distribution_adds_to_the_server(

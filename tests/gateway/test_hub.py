@@ -29,7 +29,7 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.service import serialize
 from katana450.server.service.heartbeats import Heartbeat
 from katana450.server.service.hub import TICK, Hub, Window, key_of, visiting
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.nodes import Nodes
 from katana450.server.web.authenticator import Identity
 from katana450.settings import Settings
 

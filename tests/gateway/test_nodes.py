@@ -27,10 +27,11 @@ from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
 from katana450.extensions.export.vrml import world_of
 from katana450.extensions.export.vrml_node import FIELDS
+from katana450.extensions.export.vrml_nodes import VrmlNodes
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
-from katana450.server.service.vrml_nodes import Body, Nodes, body_of
+from katana450.server.service.nodes import Body, body_of
 from katana450.settings import Settings
 from tests.browser.server import AppServer
 from tests.exchange.conftest import GANTRY
@@ -53,8 +54,8 @@ def rules(model: RobotModel) -> Session:
 
 
 @pytest.fixture(scope="module")
-def nodes(model: RobotModel, katana: Mechanism, rules: Session) -> Nodes:
-    return Nodes(katana, body_of(model, katana), rules.surroundings)
+def nodes(model: RobotModel, katana: Mechanism, rules: Session) -> VrmlNodes:
+    return VrmlNodes(katana, body_of(model, katana), rules.surroundings)
 
 
 @pytest.fixture(scope="module")
@@ -72,13 +73,13 @@ def rotation(joint: str, angle: float) -> list[float]:
     return [*AXES.get(joint, (0, 1, 0)), angle]
 
 
-def get(nodes: Nodes, state: State, node: str, field: str) -> Any:
+def get(nodes: VrmlNodes, state: State, node: str, field: str) -> Any:
     (value,) = nodes.read(state, [requests.Named(node=node, field=field)])
     return value.value
 
 
 def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
-    nodes: Nodes, state: State, katana: Mechanism, model: RobotModel
+    nodes: VrmlNodes, state: State, katana: Mechanism, model: RobotModel
 ) -> None:
     angles = model.joint_angles(state.q, state.gripper)
     file = world_of(katana, angles).named()
@@ -105,7 +106,7 @@ def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
 @settings(max_examples=50, deadline=None)
 @given(st.dictionaries(st.sampled_from(sorted(THERE)), st.floats(-2.0, 2.0), min_size=1))
 def test_joints_are_told_to_go_and_never_put(
-    nodes: Nodes, state: State, wanted: dict[str, float]
+    nodes: VrmlNodes, state: State, wanted: dict[str, float]
 ) -> None:
     said = nodes.command(
         state,
@@ -125,7 +126,7 @@ def test_joints_are_told_to_go_and_never_put(
     assert dict(again.values) == dict(said.values)
 
 
-def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
+def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None:
     said = nodes.command(
         state,
         [
@@ -181,7 +182,7 @@ def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
     ],
 )
 def test_what_cannot_be_set_is_refused_with_all_that_came_with_it(
-    nodes: Nodes, state: State, node: str, field: str, value: Any, said: str
+    nodes: VrmlNodes, state: State, node: str, field: str, value: Any, said: str
 ) -> None:
     fine = setting("axis_1", "rotation", [0, 0, 1, 0.1])
     with pytest.raises(InputError, match=said):
@@ -202,7 +203,7 @@ anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
 def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
-    nodes: Nodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
+    nodes: VrmlNodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
 ) -> None:
     try:
         command = nodes.command(state, [setting(*each) for each in said])
@@ -215,7 +216,7 @@ def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
             assert np.isfinite(np.array(each.value)).all()
 
 
-def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
+def test_what_is_held_is_not_moved_by_name(nodes: VrmlNodes, state: State) -> None:
     held = replace(state, things=(replace(state.things[0], held=True),))
     with pytest.raises(InputError, match="open the gripper first"):
         nodes.command(held, [setting("left_cube", "translation", [0, 0, 0])])
@@ -225,7 +226,7 @@ def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(
     model: RobotModel, katana: Mechanism
 ) -> None:
     session = described(Settings(), URDF_PATH, None).session
-    nodes = Nodes(katana, body_of(model, katana), session.surroundings)
+    nodes = VrmlNodes(katana, body_of(model, katana), session.surroundings)
     begun = session.begin(session.ready, 0.0, 0.0)
     nodes.command(begun, [setting("cup", "translation", [0.5, -0.5, 0.0])])
     with pytest.raises(InputError, match="nothing carries it there"):
@@ -235,7 +236,7 @@ def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(
 def test_a_bare_arm_has_no_names_for_the_gripper(model: RobotModel, katana: Mechanism) -> None:
     stripped = bare(model)
     session = Session(stripped.arm, stripped.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
-    nodes = Nodes(katana, body_of(stripped, katana), session.surroundings)
+    nodes = VrmlNodes(katana, body_of(stripped, katana), session.surroundings)
     told = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
     assert "axis_5" in told
     assert not {name for name in told if "finger" in name or "gripper" in name}
@@ -244,7 +245,7 @@ def test_a_bare_arm_has_no_names_for_the_gripper(model: RobotModel, katana: Mech
 def test_what_slides_has_a_translation_along_its_axis(session: Session) -> None:
     gantry = load_mechanism(GANTRY)[0]
     body = Body({"rail": 0}, None, lambda _: {"rail": 0.2}, frozenset(["cart", "mast"]))
-    nodes = Nodes(gantry, body, session.surroundings)
+    nodes = VrmlNodes(gantry, body, session.surroundings)
     state = session.begin(session.ready, 0.0, 0.0)
     along = np.array((math.cos(0.3), math.sin(0.3), 0.0))
     np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from argparse import Namespace
 from multiprocessing.connection import Connection
 
+from katana450.arm.control.things import Environment
+from katana450.arm.robot.mechanism import Mechanism
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.urdf_mechanism import load_mechanism
 from katana450.arm.runtime.link import FrontEnd
@@ -15,13 +17,12 @@ from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
 from katana450.extensions.programs.script_files import Scripts
 from katana450.server.service.arm_handle import ArmHandle
-from katana450.server.service.vrml_nodes import Nodes, body_of, machine_of
+from katana450.server.service.nodes import Body, Nodes, body_of, machine_of
 from katana450.server.view.follower import Follower
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.view import View, ViewOptions
 from katana450.server.web.web_server import Gateway
-from katana450.settings import Settings
 
 
 def attached(
@@ -36,8 +37,9 @@ def attached(
     link = FrontEnd(pipe, found.session.check)
     if isinstance(found, Jointed):
         for layer in layers:
-            raise ConfigurationError(f"{layer.what} {found.machine.joints.why}")
-        return link, _machine(gateway, settings, found, link)
+            if layer.what:
+                raise ConfigurationError(f"{layer.what} {found.machine.joints.why}")
+        return link, _machine(gateway, outfit, found, link)
     besides = ViewOptions(layers, (gateway.steering, Scripts(settings.programs)), meshes)
     return link, _arm(gateway, outfit, found, link, besides)
 
@@ -48,6 +50,16 @@ def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
         return ()
     found = [part.view_layer(options) for part in serve_extensions() if part.view_layer is not None]
     return tuple(layer for layer in found if layer is not None)
+
+
+def _nodes(
+    options: Namespace | None, mechanism: Mechanism, body: Body, environment: Environment
+) -> Nodes:
+    """Return the nodes of the first extension that names any, else the links alone."""
+    for part in () if options is None else serve_extensions():
+        if part.nodes is not None:
+            return part.nodes(mechanism, body, environment)
+    return Nodes(mechanism, body)
 
 
 def _arm(
@@ -69,12 +81,15 @@ def _arm(
     navigator.tell = gateway.announce
     navigator.redirected = gateway.steering.redirected
     mechanism, _ = load_mechanism(outfit.urdf)
-    nodes = Nodes(mechanism, body_of(model, mechanism), session.surroundings)
+    body = body_of(model, mechanism)
+    nodes = _nodes(outfit.options, mechanism, body, session.surroundings)
     gateway.attach(ArmHandle(model, session, link, navigator, nodes))
     return view
 
 
-def _machine(gateway: Gateway, settings: Settings, found: Jointed, link: FrontEnd) -> MachineView:
+def _machine(
+    gateway: Gateway, outfit: FrontendConfig, found: Jointed, link: FrontEnd
+) -> MachineView:
     machine, session, _ = found
     view = MachineView(
         gateway.viser,
@@ -82,8 +97,9 @@ def _machine(gateway: Gateway, settings: Settings, found: Jointed, link: FrontEn
         link.board,
         gateway.gestures,
         lambda: link.last_ticket,
-        settings.frame_rate,
+        outfit.settings.frame_rate,
     )
-    nodes = Nodes(machine.mechanism, machine_of(machine), session.surroundings)
+    body = machine_of(machine)
+    nodes = _nodes(outfit.options, machine.mechanism, body, session.surroundings)
     gateway.attach(ArmHandle(machine, session, link, None, nodes))
     return view

@@ -76,7 +76,8 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help="a TCP port of this machine for programs that speak a line of JSON at a time",
     )
     for part in serve_extensions():
-        part.add_options(parser)
+        if part.add_options is not None:
+            part.add_options(parser)
     add_arm_options(parser)
 
 

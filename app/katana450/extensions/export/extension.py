@@ -5,10 +5,16 @@ from __future__ import annotations
 import argparse
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from katana450.errors import InputError
-from katana450.extension import CliCommand, Extension
+from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.resources import URDF_PATH
+
+if TYPE_CHECKING:
+    from katana450.arm.control.things import Environment
+    from katana450.arm.robot.mechanism import Mechanism
+    from katana450.server.service.nodes import Body, Nodes
 
 FORMATS = {
     "vrml": "a VRML97 world and a file a part, as LabVIEW, Simulink and X3D browsers read them",
@@ -106,6 +112,12 @@ def joint_values(text: str) -> tuple[float, ...]:
         raise argparse.ArgumentTypeError(f"numbers with commas between, not {text!r}") from None
 
 
+def _nodes(mechanism: Mechanism, body: Body, environment: Environment) -> Nodes:
+    from katana450.extensions.export.vrml_nodes import VrmlNodes
+
+    return VrmlNodes(mechanism, body, environment)
+
+
 EXTENSION = Extension(
     "export",
     (
@@ -113,4 +125,5 @@ EXTENSION = Extension(
             "export", "write the arm as files for other programs", add_export_options, _export
         ),
     ),
+    ServeExtension(nodes=_nodes),
 )

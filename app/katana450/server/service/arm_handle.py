@@ -26,7 +26,7 @@ from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.nodes import Nodes
 
 
 class ArmHandle:

@@ -20,7 +20,7 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.nodes import Nodes
 
 
 class Arm(Protocol):

@@ -14,7 +14,7 @@ class ViewLayer(Protocol):
 
     @property
     def what(self) -> str:
-        """A sentence that says what needs an arm, for a mechanism that is not one."""
+        """A sentence on what was asked for and needs an arm; empty to be left out without one."""
 
     def attach(self, server: viser.ViserServer, model: RobotModel) -> None:
         """Prepare for the arm ``model`` on ``server``. Raises ConfigurationError."""

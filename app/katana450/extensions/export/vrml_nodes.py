@@ -19,61 +19,19 @@ from katana450.arm.control.looks import Colour, Trait
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Thing
-from katana450.arm.robot.machine import Machine
 from katana450.arm.robot.mechanism import PLAIN, Joint, Mechanism
-from katana450.arm.robot.model import RobotModel
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import Dressed, Names
 from katana450.extensions.export.vrml_node import WIDTHS, Type
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
+from katana450.server.service.nodes import Body, Nodes
 
 ASIDE = 1e-6
 """[rad] By which the axis of a rotation may be beside that of the joint."""
 
 FieldValue = float | list[float]
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """What moves, and by which commands.
-
-    Attributes:
-        axes: the joints that are axes of the arm, with their numbers from 0.
-        gripper: the driven finger joint, if there is one.
-        values: of every movable joint [rad, m].
-        links: those there are.
-        fingers: the finger joints, which move together.
-    """
-
-    axes: Mapping[str, int]
-    gripper: str | None
-    values: Callable[[State], Mapping[str, float]]
-    links: frozenset[str]
-    fingers: frozenset[str] = frozenset()
-
-
-def body_of(model: RobotModel, mechanism: Mechanism) -> Body:
-    """An arm of the family; ``mechanism`` is that of the same file."""
-    fingers = [name for name in model.fingers if mechanism.joints[name].leader == name]
-    return Body(
-        axes={name: axis for axis, name in enumerate(model.arm.chain.names)},
-        gripper=fingers[0] if fingers else None,
-        values=lambda state: model.joint_angles(state.q, state.gripper),
-        links=frozenset(body.name for body in model.bodies),
-        fingers=frozenset(model.fingers),
-    )
-
-
-def machine_of(machine: Machine) -> Body:
-    """A mechanism that is driven joint by joint."""
-    return Body(
-        axes={name: axis for axis, name in enumerate(machine.joints.names)},
-        gripper=None,
-        values=lambda state: machine.values(state.q),
-        links=frozenset(link.name for link in machine.mechanism.links),
-    )
 
 
 class _Orders:
@@ -105,12 +63,11 @@ class _Node:
     fields: Mapping[str, _Field]
 
 
-class Nodes:
-    """All there is to be named. Changes nothing by itself."""
+class VrmlNodes(Nodes):
+    """Everything that has a DEF name. Changes nothing by itself."""
 
     def __init__(self, mechanism: Mechanism, body: Body, surroundings: Environment) -> None:
-        self._mechanism = mechanism
-        self._body = body
+        super().__init__(mechanism, body)
         self._surroundings = surroundings
         self._names = Names(mechanism)
         self._fixed = self._of_the_robot()
@@ -137,14 +94,6 @@ class Nodes:
                 )
                 for name, node in self._nodes(state).items()
             ]
-        )
-
-    def links(self, state: State) -> answers.Links:
-        """Where every link is."""
-        frames = self._mechanism.frames(self._body.values(state))
-        there = self._body.links
-        return answers.Links(
-            links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items() if n in there]
         )
 
     def read(self, state: State, asked: Iterable[requests.Named]) -> tuple[answers.Value, ...]:
