@@ -28,7 +28,8 @@ if TYPE_CHECKING:
         RobotDescriptionError,
     )
     from katana450.extensions.reachability.map import ReachabilityMap
-    from katana450.library.arm import Arm, load
+    from katana450.library.arm import Arm
+    from katana450.library.loading import load
     from katana450.library.motion_plan import MotionPlan
     from katana450.library.nearest import NearestPose
     from katana450.library.solutions import IKSolutions
@@ -74,7 +75,7 @@ _MODULES = {
     "Trajectory": "library.trajectory",
     "Viewer": "library.viewer",
     "connect": "client",
-    "load": "library.arm",
+    "load": "library.loading",
 }
 
 

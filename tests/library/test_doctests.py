@@ -15,11 +15,12 @@ from katana450 import library
 
 MODULES = [f"katana450.library.{each.name}" for each in pkgutil.iter_modules(library.__path__)]
 
-MUST_HAVE = {
-    f"katana450.library.arm.{name}"
-    for name in ("load", *(f"Arm.{each}" for each in ("fk", "ik", "nearest", "jacobian", "plan")))
-} | {f"katana450.library.arm.Arm.{each}" for each in ("line", "circle", "reachability", "show")}
+METHODS = ("fk", "ik", "nearest", "jacobian", "plan", "line", "circle", "reachability", "show")
 
+MUST_HAVE = {f"katana450.library.arm.Arm.{name}" for name in METHODS} | {
+    f"katana450.library.{name}"
+    for name in ("loading.load", "motion_plan.MotionPlan.sample", "motion_plan.MotionPlan.plot")
+}
 
 FINDER = doctest.DocTestFinder(exclude_empty=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import html
 import io
@@ -72,6 +73,8 @@ class Viewer:
         self._stopped = threading.Event()
         self._closed = threading.Event()
         self._show(session.ready)
+        # Before viser's own: the player shows nothing on a server that has stopped.
+        atexit.register(self.close)
 
     def move(self, q: npt.ArrayLike) -> None:
         """Show the arm at the joint angles ``q`` (n,) [rad]; ends `play`.
@@ -113,14 +116,17 @@ class Viewer:
             self._player = None
 
     def wait(self) -> None:
-        """Return when Ctrl-C is pressed or the viewer is closed: for the end of a script."""
-        with contextlib.suppress(KeyboardInterrupt):
+        """Keep the scene until Ctrl-C is pressed or the viewer is closed: for scripts."""
+        with self, contextlib.suppress(KeyboardInterrupt):
             self._closed.wait()
 
     def close(self) -> None:
         """End the scene and free its port."""
         self.pause()
+        if self._closed.is_set():
+            return
         self._closed.set()
+        atexit.unregister(self.close)
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
 
