@@ -150,7 +150,7 @@ REFUSED: dict[str, tuple[Refused, str]] = {
     "no rotation": (lambda arm: arm.ik(np.diag([2.0, 1.0, 1.0, 1.0])), "rotation"),
     "one of many": (lambda arm: arm.ik(np.array([np.eye(4), 2.0 * np.eye(4)])), "ose 1"),
     "nearest to nothing": (lambda arm: arm.nearest(np.zeros((4, 4))), "last row"),
-    "unknown priority": (lambda arm: arm.nearest(np.eye(4), priority="yaw"), "'yaw'"),
+    "unknown priority": (lambda arm: arm.nearest(np.eye(4), priority="yaw"), "'yaw'"),  # type: ignore[arg-type]
     "unknown branch": (lambda arm: arm.nearest(np.eye(4), branch="left"), "front-up"),
     "short jacobian": (lambda arm: arm.jacobian([0.0]), "shape"),
     "huge voxel": (lambda arm: arm.reachability(10.0), "voxel"),

@@ -132,11 +132,11 @@ REFUSED: dict[str, tuple[Callable[[katana450.Arm], Any], str]] = {
     "line to nowhere": (lambda arm: arm.line((0.3, np.nan, 0.0)), "end of the line"),
     "line without motion": (lambda arm: arm.line(), "moves nothing"),
     "no radius": (lambda arm: arm.circle(CENTRE, 0.0), "above 0"),
-    "radius of several": (lambda arm: arm.circle(CENTRE, [0.1, 0.1]), "shape"),
+    "radius of several": (lambda arm: arm.circle(CENTRE, [0.1, 0.1]), "shape"),  # type: ignore[arg-type]
     "flat centre": (lambda arm: arm.circle((0.1, 0.2), 0.1), "centre"),
     "no normal": (lambda arm: arm.circle(CENTRE, 0.1, normal=(0.0, 0.0, 0.0)), "direction"),
     "no turns": (lambda arm: arm.circle(CENTRE, 0.1, turns=0.0), "turns"),
-    "words for a pitch": (lambda arm: arm.circle(CENTRE, 0.1, pitch="down"), "'down'"),
+    "words for a pitch": (lambda arm: arm.circle(CENTRE, 0.1, pitch="down"), "'down'"),  # type: ignore[arg-type]
     "huge circle": (lambda arm: arm.circle(CENTRE, 2.0), "pitch"),
 }
 

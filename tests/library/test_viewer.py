@@ -26,7 +26,7 @@ def test_viewer_shows_postures_and_plans(shoulder_arm: katana450.Arm) -> None:
         plan = shoulder_arm.plan(q, [-0.7, *q[1:]])
         viewer.play(plan, speed=4.0)
         assert viewer._path.visible
-        seen = set()
+        seen: set[float] = set()
         until = time.monotonic() + 30.0
         while len(seen) < 5 and time.monotonic() < until:
             seen.add(angle_shown(viewer))
