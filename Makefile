@@ -8,7 +8,8 @@ run_ok  := $(VENV)/.run-ready
 dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
-servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py tests/examples
+servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py tests/examples \
+           tests/library/test_run.py
 heavy   := tests/control tests/kinematics tests/robot_description
 lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 patient := nice -n 5 $(bin)/python -m pytest
