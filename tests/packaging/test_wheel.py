@@ -102,6 +102,16 @@ def test_package_is_imported_from_the_wheel(python: Path, folder: Path) -> None:
     assert imported.is_relative_to(python.parents[1])
 
 
+def test_library_is_used_beside_files_of_the_user(python: Path, folder: Path) -> None:
+    words = (
+        "import katana450; arm = katana450.load(); print(arm.fk([0, 0, 0, 0, 0])[0].tolist()); "
+        "print(arm.circle((0.15, 0.0, -0.11), 0.1).end.shape)"
+    )
+    first, second = run(folder, python, "-c", words).splitlines()
+    assert first.startswith("[1.0, 0.0, 0.0, 0.63")
+    assert second == "(5,)"
+
+
 def test_commands_run_beside_files_of_the_user(python: Path, folder: Path) -> None:
     for command in ([python.parent / "katana450"], [python, "-m", "katana450"]):
         assert '"T": [[1.0, ' in run(folder, *command, "fk", text=LINE)

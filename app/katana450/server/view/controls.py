@@ -12,7 +12,7 @@ import viser
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import State
-from katana450.errors import KatanaError
+from katana450.errors import KatanaError, LeaseError
 
 WORTH_SENDING = 2e-6
 """[deg, mm] Rounding on the way to radians and back is less."""
@@ -57,6 +57,19 @@ class GestureGate(Protocol):
     def is_current(self, actor: Actor, /) -> bool:
         """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
         ...
+
+
+class NoGestures:
+    """A `GestureGate` that refuses everything, for a scene that drives no arm."""
+
+    def actor(self, _client_id: int | None) -> Actor:
+        raise LeaseError("This scene shows an arm and drives none.")
+
+    def submit(self, _command: cmd.Command, _actor: Actor) -> int:
+        raise LeaseError("This scene shows an arm and drives none.")
+
+    def is_current(self, _actor: Actor) -> bool:
+        return False
 
 
 def listener(gestures: GestureGate) -> Listen:

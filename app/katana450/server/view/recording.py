@@ -6,14 +6,12 @@ import html
 import secrets
 from collections.abc import Iterable
 
-from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.model import RobotModel
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
-from katana450.errors import LeaseError
+from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.traces import Traces
 from katana450.server.viser_bridge.viser_server import close_server, open_server
@@ -51,7 +49,7 @@ def recorded(
     # Nobody is let in: the server is there for what it would send.
     server = open_server(secrets.token_hex())
     try:
-        scenery = Scenery(server, model, session, load_props(), _Nobody(), Meshes())
+        scenery = Scenery(server, model, session, load_props(), NoGestures(), Meshes())
         traces = Traces(server, model)
         recording = server.get_scene_serializer()
         for number, state in enumerate(states):
@@ -63,16 +61,3 @@ def recorded(
         return recording.as_html().replace(TITLE, head, 1)
     finally:
         close_server(server)
-
-
-class _Nobody:
-    """A `GestureGate` that lets nothing through: nobody drives a recording."""
-
-    def actor(self, _client_id: int | None) -> Actor:
-        raise LeaseError("Nobody drives a recording.")
-
-    def submit(self, _command: Command, _actor: Actor) -> int:
-        raise LeaseError("Nobody drives a recording.")
-
-    def is_current(self, _actor: Actor) -> bool:
-        return False
