@@ -8,14 +8,15 @@ run_ok  := $(VENV)/.run-ready
 dev_ok  := $(VENV)/.dev-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
-servers := tests/gateway tests/cli/test_serve.py tests/robot/test_other_arms.py
+servers := tests/gateway tests/extensions tests/cli/test_serve.py tests/robot/test_other_arms.py \
+           tests/examples tests/library/test_run.py
 heavy   := tests/control tests/kinematics tests/robot_description
 lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 .PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-crowd bench-drag \
-        bench-kinematics bench-load bench-start bench-streams bench-view pictures lock clean
+        bench-import bench-kinematics bench-load bench-start bench-streams bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -88,6 +89,9 @@ bench-streams: $(dev_ok)      ## how closely streams of joint angles are followe
 
 bench-collision: $(dev_ok)    ## distances and one control tick, beside raw meshes
 	$(bin)/python -m benchmarks.collision $(ARGS)
+
+bench-import: $(dev_ok)       ## `import katana450` and its first call, beside `import numpy`
+	$(bin)/python -m benchmarks.import_time $(ARGS)
 
 pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
 	$(bin)/python -m docs.pictures

@@ -62,7 +62,7 @@ PERIOD = 4.0
 
 async def swing(arm: AsyncClient) -> None:
     """Move the arm for ever; after a STOP, go on."""
-    ready = np.array((await arm.look(answers.Arm)).ready)
+    ready = np.array((await arm.query(answers.Arm)).ready)
     await arm.ask(requests.Take() if await _held(arm) else requests.Acquire())
     while True:
         with suppress(KeyError):
@@ -73,7 +73,7 @@ async def swing(arm: AsyncClient) -> None:
 
 
 async def _held(arm: AsyncClient) -> bool:
-    return (await arm.look(answers.State)).holder is not None
+    return (await arm.query(answers.State)).holder is not None
 
 
 async def watch(url: str, pictures: list[int]) -> None:
@@ -108,7 +108,7 @@ async def flood(url: str) -> None:
         with suppress(ConnectionClosed, OSError):
             async with websocket(url, "/api/v1/socket?name=Flood", max_queue=None) as socket:
                 while True:
-                    await socket.send('{"do":"look"}')
+                    await socket.send('{"do": "query"}')
                     # So that this process has time for the others it plays.
                     await asyncio.sleep(0.0)
 
@@ -163,7 +163,7 @@ async def inquire(url: str) -> None:
             async with websocket(url, "/api/v1/socket?name=Inquire", max_queue=None) as socket:
                 due = time.monotonic()
                 while True:
-                    await socket.send('{"do":"look","at":"branches"}')
+                    await socket.send('{"do": "query","at":"branches"}')
                     due += 1.0 / ASKED
                     await asyncio.sleep(max(due - time.monotonic(), 0.0))
 
@@ -173,15 +173,15 @@ async def stop_times(arm: AsyncClient, times: int) -> list[tuple[float, float]]:
     found: list[tuple[float, float]] = []
     states = arm.states(100.0)
     for _ in range(times):
-        await arm.ask(requests.Reset())
+        await arm.ask(requests.ClearStop())
         await asyncio.sleep(0.4)
         said = time.perf_counter()
         await arm.tell(requests.Stop())
         async for state in states:
-            if state.status == "halted":
+            if state.status == "stopped":
                 found.append((state.t - said, time.perf_counter() - said))
                 break
-    await arm.ask(requests.Reset())
+    await arm.ask(requests.ClearStop())
     return found
 
 
@@ -208,9 +208,9 @@ async def _turn(
         swinging = group.create_task(_alone(swing(arm)))
         await asyncio.sleep(2.0)
         took = await stop_times(arm, stops)
-        period = (await arm.look(answers.Loop)).period
+        period = (await arm.query(answers.Loop)).period
         await asyncio.sleep(LOOKED_AT * period)
-        loop = await arm.look(answers.Loop)
+        loop = await arm.query(answers.Loop)
         for task in (*tasks, swinging):
             task.cancel()
     p50, p99 = 1e3 * np.percentile(took, (50, 99), axis=0)
@@ -232,9 +232,10 @@ async def crowd(url: str, stops: int) -> None:
     pictures = [0]
     watchers = [lambda: watch(url, pictures)] * WATCHERS
     await turn(url, "nobody else", [], stops)
-    before = time.monotonic()
+    # A turn begins with a pause in which nobody watches.
+    begun = time.monotonic() + RECOVERY
     await turn(url, f"{WATCHERS} watchers", [*watchers], stops)
-    rate = pictures[0] / WATCHERS / (time.monotonic() - before)
+    rate = pictures[0] / WATCHERS / (time.monotonic() - begun)
     print(f"{'':20} {rate:.1f} pictures a second to each watcher")
     await turn(url, f"{FLOODS} who flood", [lambda: flood(url)] * FLOODS, stops)
     await turn(url, f"{SLOW} who read nothing", [lambda: crawl(url)] * SLOW, stops)

@@ -35,6 +35,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import View
 from katana450.settings import Settings
+from tests.view.gestures import RecordedGestures
 
 TICKS = 600
 EVERY = 3
@@ -93,7 +94,7 @@ def dragged(tick: int, session: Session, state: State) -> Command | None:
     """Round a circle of 6 cm every two seconds, told twenty times a second as by the gizmo."""
     if tick % 5:
         return None
-    centre = forward(session.arm.chain_to(state.tool), session.ready)[:3, 3]
+    centre = forward(session.require_arm().chain_to(state.tool), session.ready)[:3, 3]
     turn = math.tau * tick / 200.0
     return cmd.MoveTool(centre + 0.06 * np.array([0.0, math.sin(turn), math.cos(turn) - 1.0]))
 
@@ -110,8 +111,16 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     settings, robot = Settings(), load()
     loop, session, mailbox, clock = loop_of(robot, settings)
     server, bare = quiet_server(), quiet_server()
-    view = View(server, robot, loop.board, mailbox, session, settings.frame_rate)
-    nodes = BareNodes(bare, session.arm.chain.n)
+    view = View(
+        server,
+        robot,
+        loop.board,
+        RecordedGestures(),
+        lambda: mailbox.last_ticket,
+        session,
+        settings.frame_rate,
+    )
+    nodes = BareNodes(bare, robot.require_arm().chain.n)
     ours: list[float] = []
     floor: list[float] = []
     began = time.perf_counter()

@@ -13,13 +13,14 @@ from typing import Any
 import msgspec
 
 from katana450.server.api import answers, requests, schema
+from katana450.server.api.fields import tag_of
 
 PAGE = Path(__file__).with_name("api.md")
 
 PREFACE = """\
 # The API, version {version}
 
-<!-- Written by `python -m docs.api` from the shapes in api. -->
+<!-- Written by `python -m docs.api` from the shapes in app/katana450/server/api. -->
 
 What the page can ask of the arm a program can ask too, by the same rules: one holds the arm at a
 time, everybody may stop it, and whoever holds it gives ten signs of life a second. Each message is a
@@ -33,7 +34,7 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 | **websocket** `/api/v{version}/socket?name=NAME` | requests up, answers and states down |
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
 | **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` with a secret key of 16 to 64 letters and digits, chosen by the program, tells programs apart; `X-Name` is the name that others see |
-| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `look` tells |
+| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `query` tells |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .glb or .gltf file, to be placed by the key in the answer |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | what stands around as a .zip ([scenes](scenes.md)); one that is brought waits for a `load` |
 | **HTTP** `POST /api/v{version}/stop` | STOP |
@@ -41,9 +42,15 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 
 Every request is a sign of life. Where the server asks for a link ([access](access.md)) the token
 behind its `#` comes as `Authorization: Bearer TOKEN`, or in the `hello`. A moving arm is stopped when
-whoever holds it falls silent or hangs up; after a stop nothing moves before a `reset` and a new
+whoever holds it falls silent or hangs up; after a stop nothing moves before a `clear_stop` and a new
 command. A script that a program has the server run ends at rest once nothing is received from that
 program for 1 s (`--owner-silence`).
+
+The answer to a command comes once the arm's process has taken it, a tick or two later, and can be
+overtaken by the answer to a later question. It says what became of the command: `done` with the
+`outcome` `accepted`, or `limited` with the findings that say by what; or `refused` with the reason.
+Samples of a stream (`servo`, `jog`) are answered at once, as `accepted`; so is `branch`, whose path is
+planned first. `stop` waits for nothing.
 
 In a state `stop` is `requested` until the arm itself has shown, newer than the request, that it is
 stopped, and `confirmed` then. `age` is the time since the arm's process last answered: from 0.3 s on
@@ -52,15 +59,16 @@ what else the state says is old, and `GET /health` answers with status 503.
 ## From Python
 
 ```python
-from katana450.server.api import answers
-from katana450.server.api import requests
+from katana450.server.api import answers, requests
 from katana450.client import connect
 
 with connect("http://127.0.0.1:8080", name="My script") as arm:
-    print(arm.look(answers.State).q)
+    print(arm.query(answers.State).q)
     there = arm.joints([0.3, -1.0, 1.4, 0.3, 0.0])  # waits until it is there
     there = arm.go(requests.Position(p=(0.45, 0.1, 0.0)))  # the tool point, pitch and roll kept
     print(there.why or "all as wished")
+    done = arm.ask(requests.Joint(axis=5, value=4.0))
+    print(done.outcome, [found.said for found in done.findings])  # limited, axis 5 at its limit
 ```
 
 `arm.upload(Path("bracket.stl"))` brings a mesh, `arm.ask(requests.Place(name="bracket",
@@ -117,7 +125,7 @@ def page() -> str:
 
 
 def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
-    heading = kind.__name__ if tag is None else f'`"{tag}": "{kind.__name__.lower()}"`'
+    heading = kind.__name__ if tag is None else f'`"{tag}": "{tag_of(kind.__name__)}"`'
     lines = [f"### {heading}\n", _said(kind), ""]
     described = msgspec.json.schema_components([kind])[1][kind.__name__]
     for field in msgspec.structs.fields(kind):

@@ -124,7 +124,7 @@ def pouring(page: ViserPage) -> None:
             page.wait_drawn()
             pictures.append(tile(page))
             arm.ask(requests.Steer(order=requests.Order.RESUME))
-        arm.ask(requests.Steer(order=requests.Order.HALT))
+        arm.ask(requests.Steer(order=requests.Order.END))
     sheet = np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
     imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
 
@@ -159,7 +159,7 @@ def send(arm: Client, text: str) -> None:
 def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.Progress:
     """What is told of the program as soon as it is as wanted."""
     while True:
-        told = arm.look(answers.State).program
+        told = arm.query(answers.State).program
         if told is not None and wanted(told):
             return told
         if told is not None and told.status in ("refused", "stopped", "failed", "done"):

@@ -13,7 +13,7 @@ const Fields = (() => {
   let tell = () => {};
 
   const isBox = (target) => target instanceof Element && target.matches(BOX);
-  const halted = () => window.parent.document.body.dataset.mood === "stopped";
+  const stopped = () => window.parent.document.body.dataset.mood === "stopped";
 
   // The value that viser shows is the element's default value.
   const changed = (field) => field.value !== field.defaultValue;
@@ -61,9 +61,9 @@ const Fields = (() => {
 
   function leave(field) {
     box = null;
-    // A value typed before a stop must not be newer than the reset that was clicked to leave the box.
-    if (!halted()) commit(field);
-    if (halted() || field.getAttribute("aria-invalid")) restore(field);
+    // A value typed before a stop must not be newer than the Clear stop that was clicked to leave the box.
+    if (!stopped()) commit(field);
+    if (stopped() || field.getAttribute("aria-invalid")) restore(field);
   }
 
   function step(field, sign) {
@@ -93,7 +93,7 @@ const Fields = (() => {
   // When the window loses the focus, the box keeps it, and the draft stays one.
   on("focusout", ({ target }) => isBox(target) && document.activeElement !== target && leave(target));
   // The buttons beside the box go on from what is typed, and the scene does not take the focus.
-  on("pointerdown", ({ target }) => box && target !== box && !halted() && commit(box));
+  on("pointerdown", ({ target }) => box && target !== box && !stopped() && commit(box));
   on("keydown", (event) => {
     if (!isBox(event.target)) return;
     if (event.key === "Enter") commit(event.target);

@@ -50,7 +50,7 @@ function say(message) {
 function look() {
   if (looks.size >= AHEAD) return;
   const id = (count += 1);
-  if (say({ do: "look", id })) looks.set(id, performance.now());
+  if (say({ do: "query", id })) looks.set(id, performance.now());
 }
 
 // Without an arm yet there is none to be shown.
@@ -78,7 +78,7 @@ setInterval(() => {
     setTimeout(connect, AGAIN);
   } else if (open) {
     beats.set(++count, now);
-    say({ do: "beat", n: count });
+    say({ do: "heartbeat", n: count });
     postMessage({ silent: now - heard });
   }
 }, BEAT);

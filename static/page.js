@@ -10,7 +10,7 @@
   const QUIETLY = "quietly"; // the id of what is asked again until it is had
   const OPEN = "katana450.instruments.open";
   // What of the address is for viser; anything else would be a stranger's wish.
-  const ORDERS = { pause: "Pause", resume: "Resume", halt: "Cancel" };
+  const ORDERS = { pause: "Pause", resume: "Resume", end: "Cancel" };
   const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
 
   const byId = (id) => document.getElementById(id);
@@ -43,7 +43,7 @@
   // STOP
 
   // A press is told until it is heard, and counts once: on a thin line the last telling may come
-  // after a reset.
+  // after the stop was cleared.
   function stop() {
     press = unheardOf();
     say({ do: "stop", press });
@@ -121,7 +121,7 @@
       const buttons = wanting.map(({ number, name }) => act(`Give to ${name}`, { do: "give", to: number }, true));
       const more = others.filter(({ number }) => !wanting.some((each) => each.number === number));
       if (more.length) buttons.push(handOver(more));
-      return [...buttons, act("Let go", { do: "release" })];
+      return [...buttons, act("Let go", { do: "release_lease" })];
     }
     if (holder === null) return [act("Take", { do: "acquire" }, true)];
     const buttons = [asked ? act("Ask no more", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
@@ -147,7 +147,7 @@
     // A press is done once the arm itself has shown that it is stopped.
     stopButton.classList.toggle("asked", asking !== null || status.stop === "requested");
     byId("objects-button").hidden = status.role === "viewer";
-    byId("reset").hidden = !status.stopped || !status.resets;
+    byId("clear-stop").hidden = !status.stopped || !status.may_clear_stop;
     const { mine, holder, windows, asking: wanting } = status;
     const wants = mine && wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
@@ -161,7 +161,7 @@
     const orders = status.orders.join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
-      const made = (order) => act(ORDERS[order], { do: "steer", order }, order !== "halt");
+      const made = (order) => act(ORDERS[order], { do: "steer", order }, order !== "end");
       byId("orders").replaceChildren(...status.orders.map(made));
     }
     const slider = document.querySelector("#speed input");
@@ -222,7 +222,7 @@
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
-    else if (data.heard?.is === "stopping") stopped();
+    else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
       // Only what is new of it.
@@ -235,7 +235,7 @@
 
   // The rest of the bar
 
-  byId("reset").addEventListener("click", () => say({ do: "reset" }));
+  byId("clear-stop").addEventListener("click", () => say({ do: "clear_stop" }));
   // Below the bar and not modal: STOP must be there for a mouse and a finger too.
   const [help, helpButton] = [byId("help"), byId("help-button")];
   helpButton.addEventListener("click", () => {

@@ -1,1 +1,97 @@
-"""Browser teleoperation and interactive simulation of the Katana450 arm."""
+"""Five-axis robot arms: exact kinematics, collision-free plans and teleoperation in a browser.
+
+The library in a few lines::
+
+    import katana450
+
+    arm = katana450.load()  # or load("my_arm.urdf", tool="gripper_tip")
+    T = arm.fk([0.0, -1.2, 1.5, 0.1, 0.0])
+    for solution in arm.ik(T).feasible:
+        print(solution.branch, solution.q)
+    circle = arm.circle(centre=(0.15, 0.0, -0.11), radius=0.1)
+    circle.plot()
+    arm.show(circle)
+
+Lengths are in m, angles in rad, times in s. `load` says which frame poses are in. Everything below
+is loaded when it is first used, so that ``import katana450`` takes no time of its own.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from katana450.client import Client, connect
+    from katana450.errors import (
+        BlockedError,
+        ConfigurationError,
+        InputError,
+        KatanaError,
+        RobotDescriptionError,
+    )
+    from katana450.extensions.reachability.map import ReachabilityMap
+    from katana450.library.arm import Arm
+    from katana450.library.loading import load
+    from katana450.library.motion_plan import MotionPlan
+    from katana450.library.nearest import NearestPose
+    from katana450.library.solutions import IKSolutions
+    from katana450.library.trajectory import Trajectory
+    from katana450.library.viewer import Viewer
+    from katana450.maths.kinematics.branch import Branch
+    from katana450.maths.kinematics.inverse import Solution
+
+__all__ = [
+    "Arm",
+    "BlockedError",
+    "Branch",
+    "Client",
+    "ConfigurationError",
+    "IKSolutions",
+    "InputError",
+    "KatanaError",
+    "MotionPlan",
+    "NearestPose",
+    "ReachabilityMap",
+    "RobotDescriptionError",
+    "Solution",
+    "Trajectory",
+    "Viewer",
+    "connect",
+    "load",
+]
+
+_MODULES = {
+    "Arm": "library.arm",
+    "BlockedError": "errors",
+    "Branch": "maths.kinematics.branch",
+    "Client": "client",
+    "ConfigurationError": "errors",
+    "IKSolutions": "library.solutions",
+    "InputError": "errors",
+    "KatanaError": "errors",
+    "MotionPlan": "library.motion_plan",
+    "NearestPose": "library.nearest",
+    "ReachabilityMap": "extensions.reachability.map",
+    "RobotDescriptionError": "errors",
+    "Solution": "maths.kinematics.inverse",
+    "Trajectory": "library.trajectory",
+    "Viewer": "library.viewer",
+    "connect": "client",
+    "load": "library.loading",
+}
+
+
+# Hidden from type checkers, which would take it for any name there is.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """Load a public name when it is first used (PEP 562)."""
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from importlib import import_module
+
+        value = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

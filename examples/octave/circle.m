@@ -42,7 +42,7 @@ while (t = toc (begun)) < seconds
 end
 katana_say (arm, struct ("do", "watch", "hz", 0));
 state = katana_go (arm, joints (2 * pi));
-katana_say (arm, struct ("do", "release", "id", 2));
+katana_say (arm, struct ("do", "release_lease", "id", 2));
 katana_hear (arm, "done");
 clear arm
 

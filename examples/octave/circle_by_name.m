@@ -30,7 +30,7 @@ for k = 1:places
 end
 colour = katana_get (arm, {"upper_arm_link_paint"}, "diffuseColor");
 katana_set (arm, {"upper_arm_link_look"}, "whichChoice", 0);
-katana_say (arm, struct ("do", "release", "id", 2));
+katana_say (arm, struct ("do", "release_lease", "id", 2));
 katana_hear (arm, "done");
 clear arm
 

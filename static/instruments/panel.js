@@ -60,8 +60,8 @@ export class Panel {
 
   #ask() {
     const { say, quietly } = this.#line;
-    if (!this.#board) say({ do: "look", at: "arm", id: quietly });
-    say({ do: "look", at: "loop", id: quietly });
+    if (!this.#board) say({ do: "query", at: "arm", id: quietly });
+    say({ do: "query", at: "loop", id: quietly });
   }
 
   #build(arm) {

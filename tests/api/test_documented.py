@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from typing import get_args
 
 from docs.api import PAGE, page
 from katana450.server.api import answers, requests, schema
+from katana450.server.api.fields import Request, RequestTraits, tag_of
 
 
 def test_the_page_is_what_the_shapes_say() -> None:
@@ -16,7 +18,7 @@ def test_every_message_is_on_it_with_a_sentence() -> None:
     said = PAGE.read_text(encoding="utf-8")
     for union, tag in ((requests.AnyRequest, "do"), (answers.AnyAnswer, "is")):
         for kind in schema.kinds(union):
-            assert f'### `"{tag}": "{kind.__name__.lower()}"`' in said
+            assert f'### `"{tag}": "{tag_of(kind.__name__)}"`' in said
             assert len(schema.summary(kind)) > 5, kind
 
 
@@ -27,3 +29,22 @@ def test_the_description_for_tools_holds_together() -> None:
     assert len(named) > 20
     for reference in {part.partition('"')[0] for part in named}:
         assert reference in described["components"]["schemas"]
+
+
+def test_every_request_class_is_a_request_and_declares_its_traits() -> None:
+    kinds: tuple[type[Request], ...] = get_args(requests.AnyRequest)
+    assert set(Request.__subclasses__()) == set(kinds)
+    for kind in kinds:
+        assert isinstance(vars(kind).get("traits"), RequestTraits), f"{kind.__name__}: no traits"
+        assert kind.__name__ in requests.__all__
+    assert [kind for kind in kinds if kind.traits.safety] == [requests.Stop]
+
+
+def test_who_holds_the_arm_and_heartbeats_cost_nothing() -> None:
+    every: tuple[type[Request], ...] = get_args(requests.AnyRequest)
+    kinds = [kind for kind in every if kind.traits.free]
+    assert {kind.__name__ for kind in kinds} == {
+        *("Stop", "ClearStop", "Heartbeat"),
+        *("Acquire", "Take", "Ask", "Withdraw", "Give", "ReleaseLease"),
+    }
+    assert not any(kind.traits.question for kind in kinds)

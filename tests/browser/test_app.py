@@ -125,7 +125,7 @@ def go_home(robot: Robot) -> None:
     def there() -> bool:
         # A machine that starves browser and server of time stops the arm, rightly.
         if robot.page.page.get_attribute("body", "data-mood") == "stopped":
-            robot.page.press_in_bar("Reset")
+            robot.page.press_in_bar("Clear stop")
             robot.page.page.wait_for_timeout(500)
             robot.page.click_button("Home")
         return np.allclose(robot.q, READY, atol=1e-6)

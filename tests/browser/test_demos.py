@@ -48,7 +48,7 @@ class Stage:
 
     def wait(self, until: Callable[[answers.State], bool], seconds: float = 60.0) -> answers.State:
         due = time.monotonic() + seconds
-        while not until(state := self.arm.look(answers.State)):
+        while not until(state := self.arm.query(answers.State)):
             assert time.monotonic() < due, (state.program, state.water, state.stopped)
             time.sleep(0.01)
         return state
@@ -76,7 +76,7 @@ def at_rest(stage: Stage) -> FloatArray:
     """The joints of an arm that stands, looked at for a while."""
     before = stage.wait(lambda state: not state.moving and max(map(abs, state.qd)) == 0.0)
     time.sleep(0.3)
-    after = stage.arm.look(answers.State)
+    after = stage.arm.query(answers.State)
     assert after.q == before.q
     return np.array(after.q)
 
@@ -100,11 +100,11 @@ def test_a_circle_is_looked_at_run_and_traced(
     page.click_button("Preview")
     stage.wait_for("ready")
     page.wait_until(lambda: stage.shown("/path/sweep"), "the ghosts")
-    q = stage.arm.look(answers.State).q
+    q = stage.arm.query(answers.State).q
     page.drag_slider("Look at", 2.0)
     page.wait_until(lambda: stage.shown("/path/ghost"), "the one to be looked at")
     page.screenshot(artefacts / "demo-preview.png")
-    assert stage.arm.look(answers.State).q == q
+    assert stage.arm.query(answers.State).q == q
 
     stage.run(CIRCLE)
     stage.wait_for("running")
@@ -130,12 +130,12 @@ def test_the_arm_is_taken_from_a_program(stage: Stage) -> None:
     state = stage.wait_for("stopped")
     assert "taken" in program(state).why
     at_rest(stage)
-    assert stage.arm.look(answers.State).holder != program(state).name
+    assert stage.arm.query(answers.State).holder != program(state).name
 
 
 def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -> None:
     def water() -> answers.Water:
-        found = stage.arm.look(answers.State).water
+        found = stage.arm.query(answers.State).water
         assert found is not None
         parts = found.cup_ml + found.basin_ml + found.air_ml + found.spilled_ml
         assert parts == pytest.approx(WATER, abs=1e-9)
@@ -164,11 +164,11 @@ def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -
     assert after.spilled_ml == 0.0
     page.screenshot(artefacts / "demo-stopped.png")
 
-    page.press_in_bar("Reset")
+    page.press_in_bar("Clear stop")
     stage.wait(lambda state: state.stopped is None)
     assert np.array_equal(at_rest(stage), stopped)
     assert water().cup_ml == pytest.approx(after.cup_ml, abs=0.5)
-    assert program(stage.arm.look(answers.State)).status == "stopped"
+    assert program(stage.arm.query(answers.State)).status == "stopped"
 
 
 def test_the_whole_pour(open_page: OpenPage, artefacts: Path) -> None:
@@ -177,7 +177,7 @@ def test_the_whole_pour(open_page: OpenPage, artefacts: Path) -> None:
         stage.run(POUR)
         stage.wait_for("running")
         least = np.inf
-        while program(state := arm.look(answers.State)).status == "running":
+        while program(state := arm.query(answers.State)).status == "running":
             if state.water is not None and state.water.basin_ml + state.water.air_ml == 0.0:
                 least = min(least, state.water.margin_to_rim)
             time.sleep(0.02)

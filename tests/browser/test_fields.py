@@ -13,7 +13,7 @@ from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import Truth, prepare, reset
+from tests.browser.test_gateway import Truth, clear_stop, prepare
 
 MOVE = "/target/move"
 READY = Settings().ready
@@ -148,9 +148,9 @@ def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Tru
     box.press("Escape")
     assert box.input_value() == home
     truth.wait(mood="stopped")
-    # A value typed and not sent must not follow the reset.
+    # A value typed and not sent must not follow Clear stop.
     type_slowly(page, box, "40")
-    reset(page, truth)
+    clear_stop(page, truth)
     page.wait_until(lambda: box.input_value() == home, "the value of before")
     assert watch.sent == []
     assert np.allclose(truth.status()["q"], READY, atol=1e-9)

@@ -87,8 +87,8 @@ def mood(page: Page) -> str | None:
     return page.get_attribute("body", "data-mood")
 
 
-def reset(page: ViserPage, truth: Truth) -> None:
-    page.press_in_bar("Reset")
+def clear_stop(page: ViserPage, truth: Truth) -> None:
+    page.press_in_bar("Clear stop")
     truth.wait(stopped=None)
     page.wait_until(lambda: mood(page.page) != "stopped", "the bar to follow")
 
@@ -133,7 +133,7 @@ def prepare(page: ViserPage, truth: Truth) -> None:
     take(page)
     if truth.status()["stopped"] is not None:
         # The window before went while its arm still moved.
-        reset(page, truth)
+        clear_stop(page, truth)
     go_home(page, truth)
 
 
@@ -189,7 +189,7 @@ def test_stop_stops_every_time_whatever_else_goes_on(
             presser.page.click("#stop")
             stopped()
             page.page.keyboard.up(key)
-            reset(page, truth)
+            clear_stop(page, truth)
         page.page.click("#jog-button")
 
     with SlowLink(server.port, 1e9) as line, crowd(server, 8):
@@ -202,12 +202,12 @@ def test_stop_stops_every_time_whatever_else_goes_on(
                 page.page.keyboard.press("Space" if number % 2 else "Escape")
                 stopped()
                 grip.to(-0.02)
-            reset(page, truth)
+            clear_stop(page, truth)
         for number in range(STOPS):
             page.drag_slider("Axis 1", 20.0 if number % 2 else -20.0, steps=2)
             page.frame.locator("body").press("Escape" if number % 2 else " ")
             stopped()
-            reset(page, truth)
+            clear_stop(page, truth)
         line.rate = THIN
         while_jogging(far)
         line.rate = 1e9
@@ -238,8 +238,8 @@ def test_nothing_of_before_a_stop_moves_after_it(page: ViserPage, truth: Truth) 
 
 def reset_by_key(page: ViserPage, truth: Truth) -> None:
     """The mouse is busy."""
-    page.page.wait_for_selector("#reset:not([hidden])")
-    page.page.focus("#reset")
+    page.page.wait_for_selector("#clear-stop:not([hidden])")
+    page.page.focus("#clear-stop")
     page.page.keyboard.press("Enter")
     truth.wait(stopped=None)
 
@@ -388,7 +388,7 @@ def test_a_line_that_falls_silent_is_told_and_the_arm_stops(open_page: OpenPage)
         truth.wait(5.0, holder=None)
         line.cut = False
         page.page.wait_for_selector("#banner", state="hidden", timeout=10_000)
-        reset(page, truth)
+        clear_stop(page, truth)
         assert page.errors == []
     print(f"stopped {1e3 * took:.0f} ms after the line was cut")
 
@@ -498,7 +498,7 @@ def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
     )
     truth.wait(mood="stopped")
     page.page.evaluate("() => { navigator.getGamepads = () => [] }")
-    reset(page, truth)
+    clear_stop(page, truth)
 
 
 SPACEMOUSE = """
@@ -542,7 +542,7 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     truth.wait(mood="ok")
     page.page.evaluate("() => device.press(1)")
     truth.wait(mood="stopped")
-    reset(page, truth)
+    clear_stop(page, truth)
 
 
 # The page itself
@@ -591,7 +591,7 @@ def test_stop_is_always_there_and_the_biggest(
         if state == "stopped":
             page.page.click("#stop")
             truth.wait(mood="stopped")
-            page.page.wait_for_selector("#reset:not([hidden])")
+            page.page.wait_for_selector("#clear-stop:not([hidden])")
         found = areas()
         assert min(found.values()) > 0.0, found
         assert found["stop"] == max(found.values())
@@ -600,7 +600,7 @@ def test_stop_is_always_there_and_the_biggest(
         page.keep(artefacts / f"gateway-{size}-{scheme}-{state}.png")
         places.append(sized.locator("#scene").bounding_box())
     assert places[0] == places[1]
-    reset(page, truth)
+    clear_stop(page, truth)
 
 
 def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None:

@@ -20,7 +20,7 @@ from katana450.server.api import answers, requests
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import MOVE, THIN, Truth, bar, reset, take
+from tests.browser.test_gateway import MOVE, THIN, Truth, bar, clear_stop, take
 from tests.gateway.slow_link import SlowLink
 
 KEPT = "katana450.instruments"
@@ -57,7 +57,7 @@ def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
     """Its person drives, its panel is open, and the arm rests."""
     take(window)
     if truth.status()["stopped"] is not None:
-        reset(window, truth)
+        clear_stop(window, truth)
     show(window, True)
     truth.wait(20.0, mood="ok")
     yield window
@@ -202,14 +202,14 @@ def test_a_watchers_knob_springs_back_and_says_why(
         turn(page, "axis-2", -30.0)
         page.wait_until(lambda: bar(page, "toast") == "Octave holds the arm: ask for it.", "why")
         page.wait_until(lambda: goal(page, "axis-2") == before, "the knob to spring back")
-        assert not other.look(answers.State).moving
+        assert not other.query(answers.State).moving
         # It shows what the other one does.
         other.ask(requests.Joint(axis=2, value=math.radians(before + 5.0)))
         page.wait_until(
             lambda: goal(page, "axis-2") == pytest.approx(before + 5.0, abs=0.02), "the goal"
         )
         truth.wait(10.0, mood="ok")
-        other.ask(requests.Release())
+        other.ask(requests.ReleaseLease())
 
 
 @pytest.mark.parametrize("key", ["Space", "Escape"])
@@ -232,7 +232,7 @@ def test_stop_is_stop_on_a_knob_too(page: ViserPage, truth: Truth, key: str) -> 
         pause.focus()
         page.page.keyboard.press(key)
         assert pause.get_attribute("aria-pressed") == "false"
-        reset(page, truth)
+        clear_stop(page, truth)
 
 
 def test_gauges_say_what_the_server_says(page: ViserPage, truth: Truth) -> None:

@@ -66,7 +66,7 @@ def test_each_window_looks_from_where_its_person_asks(
 
     page.wait_until(lambda: np.allclose(seen_from(page)[1], on_tool(READY), atol=1e-3), "it")
     page.keep(artefacts / "look-tool.png")
-    page.click_button("Stretch")
+    page.click_button("Go to zero")
     page.wait_until(
         lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
         "the camera to ride along",

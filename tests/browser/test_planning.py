@@ -62,7 +62,7 @@ def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
 
 def wait(arm: Client, condition: Callable[[answers.State], bool]) -> answers.State:
     due = time.monotonic() + PLANNED
-    while not condition(state := arm.look(answers.State)):
+    while not condition(state := arm.query(answers.State)):
         assert time.monotonic() < due, state
         time.sleep(0.02)
     return state
@@ -102,7 +102,7 @@ def test_a_previewed_plan_has_one_clock_and_is_run_at_once(
     assert time.monotonic() - begun < 2.0
     page.press_in_bar("STOP")
     wait(arm, lambda state: state.stopped is not None and not state.moving)
-    page.press_in_bar("Reset")
+    page.press_in_bar("Clear stop")
     until(page, "On target", 5.0)
 
 
@@ -120,9 +120,9 @@ def test_a_pause_while_it_is_planned_lasts_until_resume(
     assert page.page.locator("header").bounding_box() == height
     page.keep(artefacts / "planning-paused.png")
     until(page, "Square, paused")
-    before = arm.look(answers.State)
+    before = arm.query(answers.State)
     page.page.wait_for_timeout(1500)
-    after = arm.look(answers.State)
+    after = arm.query(answers.State)
     assert after.q == before.q
     assert headline(page) == "Square, paused"
     press(page, "Resume")
@@ -143,7 +143,7 @@ def test_a_pause_while_it_is_planned_lasts_until_resume(
     assert not page.page.locator("#toast.shown").is_visible()
     page.press_in_bar("STOP")
     wait(arm, lambda state: state.stopped is not None and not state.moving)
-    page.press_in_bar("Reset")
+    page.press_in_bar("Clear stop")
     until(page, "On target", 5.0)
 
 

@@ -24,8 +24,8 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
-def offers_reset(page: ViserPage) -> bool:
-    return page.page.locator("#reset").is_visible()
+def offers_clear_stop(page: ViserPage) -> bool:
+    return page.page.locator("#clear-stop").is_visible()
 
 
 def wait_headline(page: ViserPage, words: str) -> None:
@@ -45,7 +45,7 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
         other.page.keyboard.press("Space")
         for page in (driver, other):
             wait_headline(page, "Stop requested")
-            assert mood(page.page) == "stopping"
+            assert mood(page.page) == "stopped"
             assert "The arm has not confirmed it." in bar(page, "why")
         assert other.page.locator("#stop.asked").count() == 1
         other.keep(artefacts / "stop-requested.png")
@@ -56,18 +56,18 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
         assert mood(page.page) == "stopped"
     assert other.page.locator("#stop.asked").count() == 0
     # Only who may end the stop is offered to; the other page names who can.
-    assert offers_reset(driver)
-    assert bar(driver, "why").endswith("Nothing moves until Reset.")
-    assert not offers_reset(other)
-    assert bar(other, "why").endswith(f"Nothing moves until {me} resets it.")
+    assert offers_clear_stop(driver)
+    assert bar(driver, "why").endswith("Nothing moves until Clear stop is pressed.")
+    assert not offers_clear_stop(other)
+    assert bar(other, "why").endswith(f"Nothing moves until {me} clears the stop.")
     other.keep(artefacts / "stop-of-another.png")
-    driver.press_in_bar("Reset")
-    other.wait_until(lambda: mood(other.page) == "ok", "the reset")
+    driver.press_in_bar("Clear stop")
+    other.wait_until(lambda: mood(other.page) == "ok", "the stop to be cleared")
     # With nobody driving everybody here may.
     driver.press_in_bar("Let go")
     driver.page.keyboard.press("Space")
-    other.wait_until(lambda: offers_reset(other), "the offer")
-    other.press_in_bar("Reset")
-    other.wait_until(lambda: not offers_reset(other), "the reset")
+    other.wait_until(lambda: offers_clear_stop(other), "the offer")
+    other.press_in_bar("Clear stop")
+    other.wait_until(lambda: not offers_clear_stop(other), "the stop to be cleared")
     assert driver.errors == []
     assert other.errors == []

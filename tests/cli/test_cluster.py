@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.cli import cluster
 from katana450.cli.main import main
 from katana450.errors import ConfigurationError
+from katana450.extensions.reachability import cluster
 from katana450.extensions.reachability import map as map_module
 from katana450.extensions.reachability.map import Survey
 from katana450.extensions.reachability.reachability import Reachability

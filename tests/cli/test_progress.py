@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from katana450.cli.progress import progress
+from katana450.extensions.progress import progress
 
 
 class Terminal(io.StringIO):

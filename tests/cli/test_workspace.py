@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from katana450.cli.main import main
-from katana450.extensions.export.reachability_file import load_map
+from katana450.extensions.reachability.reachability_file import load_map
 
 ROOT = Path(__file__).resolve().parents[2]
 COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4", "--samples", "30")

@@ -9,9 +9,12 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import described
 from katana450.maths.collision.shape import cylinder, half_space
 from katana450.maths.collision.world import World, obstacle
 from katana450.maths.geometry import se3
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 
 
 @pytest.fixture
@@ -28,3 +31,9 @@ def world(robot: Robot) -> World:
     cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
     cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
     return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
+
+
+@pytest.fixture(scope="session")
+def shipped() -> Session:
+    """The session that the app begins with: the arm on its table, its objects and the water."""
+    return described(Settings(), URDF_PATH, None).session

@@ -42,7 +42,7 @@ def point(arm: Arm, q: FloatArray) -> FloatArray:
 def at_the_edge(session: Session, state: State) -> State:
     """Dragged slowly until the limits let the pitch go no further."""
     T = se3.from_rotation_translation(so3.rotation_y(SPLIT_PITCH), SPLIT - 0.02 * ACROSS)
-    before = take(session, state, cmd.SetPose(T), cmd.Settle())
+    before = take(session, state, cmd.SetPose(T), cmd.EndDrag())
     assert before.status is Status.OK
     for along in np.arange(-0.02, 0.02, 5e-4):
         before = take(session, before, cmd.MoveTool(SPLIT + along * ACROSS))
@@ -95,7 +95,7 @@ def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
 ) -> None:
     """From a place that all four branches reach: high over the base."""
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
-    state = take(session, state, cmd.SetPose(T), cmd.Settle())
+    state = take(session, state, cmd.SetPose(T), cmd.EndDrag())
     badge = choices(arm, state)[BRANCHES.index(branch)].badge
     taken = take(session, state, cmd.TakeBranch(branch))
     assert taken.branch == branch
@@ -187,7 +187,9 @@ def test_each_reading_keeps_its_promise_and_says_what_it_gives_up(
     if kept == "position":
         assert np.allclose(point(arm, state.goal), FAR_OUT, atol=1e-9)
     else:
-        assert pitch_and_roll(session.arm.chain, state.goal)[0] == pytest.approx(1.2, abs=1e-9)
+        assert pitch_and_roll(session.require_arm().chain, state.goal)[0] == pytest.approx(
+            1.2, abs=1e-9
+        )
         (gap,) = (f.amount for f in state.findings if f.reason is Reason.POSITION_CHANGED)
         assert gap == pytest.approx(math.dist(point(arm, state.goal), FAR_OUT), abs=1e-12)
 
@@ -197,13 +199,13 @@ def test_dragging_outwards_each_reading_gives_way_in_its_own_manner(
     arm: Arm, session: Session, state: State, reading: Reading
 ) -> None:
     state = take(session, state, cmd.SetReading(reading))
-    pitch, _ = pitch_and_roll(session.arm.chain, state.goal)
+    pitch, _ = pitch_and_roll(session.require_arm().chain, state.goal)
     target = point(arm, state.goal)
     for _ in range(20):
         target = target + 0.006 * OUT
         state = take(session, state, cmd.MoveTool(target))
     # 0.6 m out and level with the shoulder, the arm is nearly stretched.
-    tilted = abs(pitch_and_roll(session.arm.chain, state.goal)[0] - pitch)
+    tilted = abs(pitch_and_roll(session.require_arm().chain, state.goal)[0] - pitch)
     short = math.dist(point(arm, state.goal), target)
     if reading is Reading.PITCH:
         assert tilted < 1e-9
@@ -225,14 +227,16 @@ def test_a_new_reading_rereads_the_wish_and_moves_nothing_without_one(
     posed = take(session, state, cmd.SetPose(T))
     reread = take(session, posed, cmd.SetReading(Reading.PITCH))
     assert reread.target is posed.target
-    assert pitch_and_roll(session.arm.chain, reread.goal)[0] == pytest.approx(1.2, abs=1e-9)
+    assert pitch_and_roll(session.require_arm().chain, reread.goal)[0] == pytest.approx(
+        1.2, abs=1e-9
+    )
     back = take(session, reread, cmd.SetReading(Reading.POSE))
     assert np.allclose(back.goal, posed.goal, atol=1e-9)
 
 
 def test_a_roll_beyond_its_limit_is_told_as_roll(arm: Arm, session: Session, state: State) -> None:
-    _, roll = pitch_and_roll(session.arm.chain, state.goal)
-    turn = cmd.TurnTool(pitch_and_roll(session.arm.chain, state.goal)[0], roll + 3.05)
+    _, roll = pitch_and_roll(session.require_arm().chain, state.goal)
+    turn = cmd.TurnTool(pitch_and_roll(session.require_arm().chain, state.goal)[0], roll + 3.05)
     state = take(session, state, turn)
     while state.since is not None:
         state = take(session, state)

@@ -22,7 +22,7 @@ LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 
 @pytest.fixture
 def guarded(session: Session, world: World) -> Session:
-    return Session(session.arm, session.ready, world)
+    return Session(session.require_arm(), session.ready, world)
 
 
 def clearance(world: World, state: State) -> float:
@@ -98,7 +98,9 @@ def test_it_goes_away_at_full_speed(guarded: Session, what: str) -> None:
     state, near = run(guarded, blocked, [back])
     assert (state.setpoint == start).all()
     assert state.findings == ()
-    free, _ = run(Session(guarded.arm, guarded.ready), standing(guarded, blocked.setpoint), [back])
+    free, _ = run(
+        Session(guarded.require_arm(), guarded.ready), standing(guarded, blocked.setpoint), [back]
+    )
     assert state.t - blocked.t <= free.t + 2.0 * TICK
     assert min(near) >= STOP - SLIGHTLY
 
@@ -119,7 +121,7 @@ def test_an_arm_that_waits_goes_on_once_the_way_is_free(guarded: Session, world:
     cup = len(world.parts) - 1
     pairs = [pair for pair in world.pairs if cup not in pair]
     without_cup = World(world.linkage, world.parts[:-1], pairs)
-    freed = Session(guarded.arm, guarded.ready, without_cup)
+    freed = Session(guarded.require_arm(), guarded.ready, without_cup)
     state, _ = run(freed, blocked, [])
     assert (state.setpoint == state.goal).all()
     assert state.status is Status.OK
@@ -129,26 +131,26 @@ def test_letting_go_before_a_contact_gives_the_rest_of_the_way_up(guarded: Sessi
     state = standing(guarded, LOW)
     blocked, _ = run(guarded, state, [cmd.MoveTool(np.array([0.40, 0.23, -0.35]))])
     assert blocked.blocked
-    let_go = guarded.step(blocked, [cmd.Settle()], blocked.t + TICK)
+    let_go = guarded.step(blocked, [cmd.EndDrag()], blocked.t + TICK)
     assert (let_go.goal == blocked.setpoint).all()
     assert isinstance(let_go.target, JointTarget)
     assert not let_go.under_way
     assert let_go.findings[0].reason is Reason.CONTACT
 
 
-def test_reset_forgets_the_contact(guarded: Session) -> None:
+def test_hold_forgets_the_contact(guarded: Session) -> None:
     start, commands, _ = INTO["table"]
     blocked, _ = run(guarded, standing(guarded, start), commands)
-    reset = guarded.step(blocked, [cmd.Reset()], blocked.t + TICK)
-    assert reset.findings == ()
-    assert reset.status is Status.OK
+    held = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
+    assert held.findings == ()
+    assert held.status is Status.OK
 
 
 def test_fingers_do_not_open_into_a_cup_and_the_arm_goes_on(guarded: Session) -> None:
     """The tool beside the cup, closed; then both are told to move."""
     start, commands, _ = INTO["cup"]
     blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), commands)
-    at_cup = guarded.step(blocked, [cmd.Reset()], blocked.t + TICK)
+    at_cup = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
     state, near = run(guarded, at_cup, [cmd.SetGripper(0.30)])
     assert state.blocked
     assert state.gripper_setpoint < 0.30

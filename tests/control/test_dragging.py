@@ -123,7 +123,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
     limit, turning = 3.0 * arm_of(chain).reach, trip.turns > 0.0
     for number in range(A_TRIP):
         if turning and number % 3 == 2:
-            wished = wish(session.arm, state)
+            wished = wish(session.require_arm(), state)
             turn = rng.normal(scale=trip.turns, size=2)
             command: cmd.Command = cmd.TurnTool(wished.pitch + turn[0], wished.roll + turn[1])
         else:
@@ -143,7 +143,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
         assert state.branch == branch
         yield state
         if number % trip.grab == trip.grab - 1:
-            state = session.step(state, [cmd.Settle()], state.t)
+            state = session.step(state, [cmd.EndDrag()], state.t)
             target = tool(chain, state.goal)
 
 
@@ -185,7 +185,7 @@ def check_tick(
     The arm itself has mass: it follows the goal as fast as it may, and turns no corner at once.
     """
     state = session.step(before, commands, before.t + TICK)
-    limits = session.arm.limits
+    limits = session.require_arm().limits
     dt = TICK * (1 + ROUNDING)
     assert (np.abs(state.setpoint - before.setpoint) <= limits.speed * dt).all()
     assert (np.abs(state.motion.qd - before.motion.qd) <= limits.acceleration * dt + TINY).all()

@@ -91,12 +91,12 @@ def run(
 
 def check_limits(session: Session, states: list[State]) -> None:
     """Finite differences over a tick are means of the derivative, so they keep its limits."""
-    limits, rounding = session.arm.limits, 1e-12
+    limits, rounding = session.require_arm().limits, 1e-12
     q = np.array([state.setpoint for state in states])
     for order, limit in enumerate((limits.speed, limits.acceleration, limits.jerk), 1):
         difference = np.abs(np.diff(q, order, axis=0)) / TICK**order
         assert (difference <= limit + rounding / TICK**order).all(), order
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     points = np.array([forward(chain, each)[:3, 3] for each in q])
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= TOOL_SPEED * TICK + 1e-12
     for before, after in pairwise(states):
@@ -120,14 +120,14 @@ def off_path(states: list[State], plan: Plan) -> float:
 
 def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, state: State) -> None:
     goal = np.array([1.0, -0.8, 0.9, 0.5, 1.2])
-    plan = plan_to(session.arm, None, state, goal)
+    plan = plan_to(session.require_arm(), None, state, goal)
     states = run(session, state, [cmd.Follow(plan)])
     last = states[-1]
     assert (last.setpoint == goal).all()
     assert (last.goal == goal).all()
     assert isinstance(last.target, JointTarget)
     assert last.status is Status.OK
-    assert last.branch == branch_of(session.arm.chain, goal)
+    assert last.branch == branch_of(session.require_arm().chain, goal)
     assert last.following is not None
     assert last.following.share == 1.0
     assert len(states) * TICK == pytest.approx(plan.duration, abs=2 * TICK)
@@ -234,7 +234,7 @@ def test_without_a_plan_there_is_nowhere_to_go_along(session: Session, state: St
         cmd.Home(),
         cmd.MoveTool(np.array([0.3, 0.1, 0.0])),
         cmd.Jog(np.array([0.05, 0.0, 0.0, 0.0, 0.0])),
-        cmd.Reset(),
+        cmd.Hold(),
     ],
 )
 def test_any_other_motion_ends_it_inside_the_limits(
@@ -246,7 +246,7 @@ def test_any_other_motion_ends_it_inside_the_limits(
     after = run(session, under_way[-1], [order])
     assert after[-1].following is None
     assert not after[-1].moving
-    limits, slack = session.arm.limits, 1.0 + 1e-6
+    limits, slack = session.require_arm().limits, 1.0 + 1e-6
     for a, b in pairwise([under_way[-1], *after]):
         assert (np.abs(b.motion.qd) <= limits.speed * slack).all()
         change = np.abs(b.motion.qd - a.motion.qd)
@@ -255,7 +255,7 @@ def test_any_other_motion_ends_it_inside_the_limits(
 
 def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
-    orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.Settle()]
+    orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.EndDrag()]
     states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 900)
     assert (states[-1].setpoint == poured.end).all()
     assert states[-1].gripper_setpoint == 0.2
@@ -265,20 +265,23 @@ def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, pour
 def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)[-1]
-    halted = run(session, under_way, [cmd.Stop()])
-    (finding,) = halted[-1].findings
-    assert finding.reason is Reason.HALTED
-    assert len(halted) * TICK == pytest.approx(finding.time, abs=2 * TICK)
+    stopped = run(session, under_way, [cmd.Stop()])
+    (finding,) = stopped[-1].findings
+    assert finding.reason is Reason.STOPPED
+    assert len(stopped) * TICK == pytest.approx(finding.time, abs=2 * TICK)
     way = math.dist(
-        *(forward(session.arm.chain, each.setpoint)[:3, 3] for each in (under_way, halted[-1]))
+        *(
+            forward(session.require_arm().chain, each.setpoint)[:3, 3]
+            for each in (under_way, stopped[-1])
+        )
     )
     assert finding.amount == pytest.approx(way, abs=1e-4)
-    assert halted[0].following is None
+    assert stopped[0].following is None
     for order in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
-        after = trace(session, halted[-1], {0: [order]}, 20)[-1]
-        assert (after.setpoint == halted[-1].setpoint).all()
-    free = trace(session, halted[-1], {0: [cmd.Release()]}, 50)[-1]
-    assert (free.setpoint == halted[-1].setpoint).all()
+        after = trace(session, stopped[-1], {0: [order]}, 20)[-1]
+        assert (after.setpoint == stopped[-1].setpoint).all()
+    free = trace(session, stopped[-1], {0: [cmd.ClearStop()]}, 50)[-1]
+    assert (free.setpoint == stopped[-1].setpoint).all()
 
 
 def clearance(world: World, state: State) -> float:
@@ -315,11 +318,11 @@ def test_a_stop_beside_the_cup_keeps_clear_of_it(
     states = run(guarded, start, [cmd.Follow(round_cup)])
     along = 0
     for at in range(60, len(states) - 40, 12):
-        halted = run(guarded, states[at], [cmd.Stop()])
-        along += halted[0].following is not None
-        assert min(clearance(world, each) for each in halted) >= STOP - SLIGHTLY
-        assert halted[-1].motion.at_rest
-        check_limits(guarded, [*states[at - 3 : at + 1], *halted])
+        stopped = run(guarded, states[at], [cmd.Stop()])
+        along += stopped[0].following is not None
+        assert min(clearance(world, each) for each in stopped) >= STOP - SLIGHTLY
+        assert stopped[-1].motion.at_rest
+        check_limits(guarded, [*states[at - 3 : at + 1], *stopped])
     assert along > 0
     for at in range(60, len(states) - 40, 60):
         away = trace(guarded, states[at], {0: [cmd.Home()]}, 100)

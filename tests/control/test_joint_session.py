@@ -12,10 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.joints import Joints
 from katana450.arm.control.looks import Choice, Trait
-from katana450.arm.control.session import LONGEST_STEP
+from katana450.arm.control.session import LONGEST_STEP, Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import InputError
 
@@ -32,23 +31,21 @@ JOINTS = Joints(
 
 
 @pytest.fixture
-def session() -> JointSession:
-    return JointSession(JOINTS, lambda a, b: float(np.abs(a - b).max()))
+def session() -> Session:
+    return Session(JOINTS, JOINTS.ready, travel=lambda a, b: float(np.abs(a - b).max()))
 
 
 @pytest.fixture
-def state(session: JointSession) -> State:
+def state(session: Session) -> State:
     return session.begin(JOINTS.ready, 0.0, 0.0)
 
 
-def after(session: JointSession, state: State, seconds: float, *first: cmd.Command) -> State:
+def after(session: Session, state: State, seconds: float, *first: cmd.Command) -> State:
     *_, last = ticks(session, state, seconds, *first)
     return last
 
 
-def ticks(
-    session: JointSession, state: State, seconds: float, *first: cmd.Command
-) -> Iterator[State]:
+def ticks(session: Session, state: State, seconds: float, *first: cmd.Command) -> Iterator[State]:
     t, end = state.t, state.t + seconds
     while t < end - DT / 2:
         t += DT
@@ -76,7 +73,7 @@ joint_vectors = st.tuples(st.floats(-0.5, 0.9), st.floats(-4.0, 4.0), st.floats(
 def test_no_wish_breaks_a_limit_and_the_last_is_reached(
     wishes: list[tuple[tuple[float, float, float], float]], share: float
 ) -> None:
-    rules = JointSession(JOINTS, lambda _a, _b: 0.0)
+    rules = Session(JOINTS, JOINTS.ready)
     state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.SpeedScale(share))
     limits, seen = JOINTS.limits, [state]
     for wish, seconds in wishes:
@@ -94,7 +91,7 @@ def test_no_wish_breaks_a_limit_and_the_last_is_reached(
         assert (jump <= limits.jerk * (1.0 + 1e-3) + 1e-6).all()
 
 
-def test_what_is_cut_is_told_in_its_own_unit(session: JointSession, state: State) -> None:
+def test_what_is_cut_is_told_in_its_own_unit(session: Session, state: State) -> None:
     there = after(session, state, DT, cmd.SetAxes(((0, 9.0), (1, 9.0), (2, 0.1))))
     told = [(f.reason, f.axis, f.amount) for f in there.findings]
     assert told == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
@@ -103,26 +100,26 @@ def test_what_is_cut_is_told_in_its_own_unit(session: JointSession, state: State
 
 
 def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
-    session: JointSession, state: State
+    session: Session, state: State
 ) -> None:
     moving = after(session, state, 0.8, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
     stopped = after(session, moving, DT, cmd.Stop())
-    assert stopped.halted is not None
-    rest = after(session, stopped, stopped.halted.time)
+    assert stopped.stopped is not None
+    rest = after(session, stopped, stopped.stopped.time)
     assert rest.motion.at_rest
     np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
     far = np.abs(moving.setpoint - rest.q).max()
-    assert stopped.halted.way == pytest.approx(far, abs=1e-9)
+    assert stopped.stopped.way == pytest.approx(far, abs=1e-9)
     ignored = after(session, rest, 0.5, cmd.Home(), cmd.Dress("a", Trait.CHOICE, -1))
     np.testing.assert_array_equal(ignored.q, rest.q)
     assert ignored.looks.of("a").choice is Choice.HIDDEN
-    free = after(session, ignored, 0.5, cmd.Release())
-    assert (free.halted, free.findings, free.moving) == (None, (), False)
+    free = after(session, ignored, 0.5, cmd.ClearStop())
+    assert (free.stopped, free.findings, free.moving) == (None, (), False)
     home = after(session, free, 10.0, cmd.Home())
     np.testing.assert_array_equal(home.q, JOINTS.ready)
 
 
-def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: JointSession, state: State) -> None:
+def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: Session, state: State) -> None:
     goal = np.array((0.3, 2.0, 0.1))
     moving = after(session, state, 0.8, cmd.SetJoints(goal))
     paused = after(session, moving, 3.0, cmd.Pause())
@@ -131,12 +128,12 @@ def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: JointSession, sta
     share = (paused.q - state.q) / (goal - state.q)
     np.testing.assert_allclose(share, share[0], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(after(session, paused, 10.0, cmd.Resume()).q, goal)
-    held = after(session, moving, 3.0, cmd.Reset())
+    held = after(session, moving, 3.0, cmd.Hold())
     assert not held.moving
     assert not np.allclose(held.q, goal)
 
 
-def test_a_stream_is_followed_and_its_end_is_a_rest(session: JointSession, state: State) -> None:
+def test_a_stream_is_followed_and_its_end_is_a_rest(session: Session, state: State) -> None:
     q = np.array(JOINTS.ready)
     for _ in range(200):
         q = q + np.array((0.1, 0.5, 0.0)) * DT
@@ -154,11 +151,11 @@ def test_a_stream_is_followed_and_its_end_is_a_rest(session: JointSession, state
     [
         cmd.SetPose(np.eye(4)), cmd.MoveTool(np.zeros(3)), cmd.TurnTool(0.0, 0.0), cmd.Fill(1e-4),
         cmd.SetTool("tcp"), cmd.SetGripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.ones(5)),
-        cmd.Remove("cup"), cmd.Together((cmd.Home(), cmd.SetGripper(0.0))),
+        cmd.Remove("cup"), cmd.Batch((cmd.Home(), cmd.SetGripper(0.0))),
     ],
 )  # fmt: skip
 def test_what_wants_a_tool_is_refused_with_the_reason(
-    session: JointSession, state: State, command: cmd.Command
+    session: Session, state: State, command: cmd.Command
 ) -> None:
     with pytest.raises(InputError, match=r"Only its joints can be driven\. It is a gantry"):
         session.step(state, [command], DT)
@@ -167,22 +164,18 @@ def test_what_wants_a_tool_is_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (cmd.SetJoint(3, 0.0), "axis 4: this mechanism has 3"),
+        (cmd.SetJoint(3, 0.0), "axis 4, only 3"),
         (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
         (cmd.SetJoints(np.zeros(5)), "3 driven joints, the command 5"),
         (cmd.Servo(np.zeros(2)), "3 driven joints, the command 2"),
     ],
 )
-def test_what_does_not_fit_is_refused(
-    session: JointSession, command: cmd.Command, said: str
-) -> None:
+def test_what_does_not_fit_is_refused(session: Session, command: cmd.Command, said: str) -> None:
     with pytest.raises(InputError, match=said):
         session.check(command)
 
 
-def test_a_late_tick_is_no_leap_and_an_error_of_ours_holds(
-    session: JointSession, state: State
-) -> None:
+def test_a_late_tick_is_no_leap_and_an_error_of_ours_holds(session: Session, state: State) -> None:
     moving = after(session, state, 0.5, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
     late = session.step(moving, (), moving.t + 5.0)
     on_time = session.step(moving, (), moving.t + LONGEST_STEP)

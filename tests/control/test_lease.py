@@ -27,7 +27,7 @@ EVENTS: dict[str, Event] = {
     "request": lambda lease, who, _, __: lease.request(who),
     "withdraw": lambda lease, who, _, __: lease.withdraw(who),
     "hand over": lambda lease, who, to, t: lease.hand_over(who, to, t),
-    "give up": lambda lease, who, _, __: lease.give_up(who),
+    "release": lambda lease, who, _, __: lease.release(who),
     "hear": lambda lease, who, _, t: lease.hear(who, t),
     "leave": lambda lease, who, _, __: lease.leave(who),
     "expire": lambda lease, _, __, t: lease.expire(t),
@@ -49,7 +49,7 @@ def legal(event: str, lease: Lease, who: Person, to: Person) -> bool:
             return who in lease.waiting
         case "hand over":
             return mine and to != who and to.role is not Role.VIEWER
-        case "give up" | "hear":
+        case "release" | "hear":
             return mine
     return True
 
@@ -109,7 +109,7 @@ def test_whatever_happens_one_person_at_most_holds_the_arm_and_waits_for_nothing
         assert DORA not in lease.waiting
         if lease.holder != before.holder and before.holder is not None:
             # Nobody loses the arm but by these.
-            assert event in {"take", "hand over", "give up", "expire"}
+            assert event in {"take", "hand over", "release", "expire"}
         if event == "hear":
             assert lease == replace(before, heard=t)
 
@@ -138,7 +138,7 @@ def test_who_asked_first_is_first_and_who_gets_it_waits_no_more() -> None:
     assert lease.waiting == (CARA, BERT)
     lease = lease.hand_over(ANNA, BERT, 2.0)
     assert (lease.holder, lease.waiting) == (BERT, (CARA,))
-    lease = lease.give_up(BERT)
+    lease = lease.release(BERT)
     assert (lease.holder, lease.waiting) == (None, (CARA,))
     assert lease.acquire(CARA, 3.0).waiting == ()
 

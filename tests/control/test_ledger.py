@@ -31,7 +31,7 @@ FAULTS: dict[Reason, list[cmd.Command]] = {
     Reason.AXIS_LIMIT: [cmd.SetJoint(0, 4.0)],
     Reason.GRIPPER_LIMIT: [cmd.SetGripper(2.0)],
     Reason.OUT_OF_REACH: [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))],
-    Reason.HALTED: [cmd.Stop()],
+    Reason.STOPPED: [cmd.Stop()],
     Reason.PAUSED: [cmd.Pause()],
 }
 
@@ -48,9 +48,9 @@ def test_what_holds_the_arm_back_is_told_once(
 
 
 def test_what_is_over_is_told_too(session: Session, state: State) -> None:
-    halted, _ = run(session, state, [cmd.Stop()], 3)
-    released, entries = run(session, halted, [cmd.Release()], 3)
-    assert [(e.finding.reason, e.began) for e in entries] == [(Reason.HALTED, False)]
+    stopped, _ = run(session, state, [cmd.Stop()], 3)
+    released, entries = run(session, stopped, [cmd.ClearStop()], 3)
+    assert [(e.finding.reason, e.began) for e in entries] == [(Reason.STOPPED, False)]
     assert released.findings == ()
 
 

@@ -32,12 +32,12 @@ def typed(session: Session, q: FloatArray, T: FloatArray) -> State:
 
 def tilt(session: Session, q: FloatArray) -> float:
     """Angle [rad] between the tool's z axis and the vertical at ``q`` (5,) [rad]."""
-    T = forward(session.arm.chain, q)
+    T = forward(session.require_arm().chain, q)
     return math.atan2(math.hypot(T[0, 2], T[1, 2]), T[2, 2])
 
 
 def test_typed_level_cup_stays_level_from_any_posture(session: Session) -> None:
-    chain, rng = session.arm.chain, np.random.default_rng(5)
+    chain, rng = session.require_arm().chain, np.random.default_rng(5)
     gave_way = behind = 0
     for azimuth in np.linspace(-math.pi, math.pi, COUNT):
         radius, height = rng.uniform(0.1, 0.7), rng.uniform(-0.3, 0.5)
@@ -71,12 +71,12 @@ def test_kept_pitch_is_still_kept_when_the_arm_arrives(session: Session) -> None
         state = session.observe(session.step(state, (), state.t + 0.01), state.setpoint, 0.0)
     assert not state.moving
     assert tilt(session, state.setpoint) <= LEVEL
-    assert math.dist(forward(session.arm.chain, state.setpoint)[:3, 3], place) < 1e-6
+    assert math.dist(forward(session.require_arm().chain, state.setpoint)[:3, 3], place) < 1e-6
 
 
 def test_lost_pitch_is_reported_also_out_of_reach(session: Session) -> None:
     narrow = np.full(5, math.radians(20.0))
-    chain = dataclasses.replace(session.arm.chain, lower=-narrow, upper=narrow)
+    chain = dataclasses.replace(session.require_arm().chain, lower=-narrow, upper=narrow)
     T = se3.from_rotation_translation(so3.rotation_y(math.pi / 2.0), np.array((1.0, 0.0, 0.0)))
     p = project(chain, T, reading=Reading.PITCH)
     assert p.pitch_error > 0.1

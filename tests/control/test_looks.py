@@ -86,7 +86,7 @@ def test_there_is_an_end_to_what_is_remembered() -> None:
 def test_what_is_said_together_happens_in_one_tick_or_not_at_all(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     q = session.ready + np.array((0.1, 0.0, 0.05, 0.0, 0.0))
-    said = cmd.Together(
+    said = cmd.Batch(
         (
             cmd.SetAxes(((0, float(q[0])), (2, float(q[2])))),
             cmd.Dress("pan_link", Trait.CHOICE, -1),
@@ -97,16 +97,16 @@ def test_what_is_said_together_happens_in_one_tick_or_not_at_all(session: Sessio
     assert state.looks.of("pan_link").choice is Choice.HIDDEN
     for bad in (cmd.SetAxes(((5, 0.0),)), cmd.SetTool("spoon")):
         with pytest.raises(InputError):
-            session.check(cmd.Together((cmd.Dress("pan_link", Trait.CHOICE, 0), bad)))
-    with pytest.raises(InputError, match="single"):
-        cmd.Together((said,))
+            session.check(cmd.Batch((cmd.Dress("pan_link", Trait.CHOICE, 0), bad)))
+    with pytest.raises(InputError, match="singly"):
+        cmd.Batch((said,))
     with pytest.raises(InputError, match="finite"):
         cmd.SetAxes(((0, math.nan),))
 
 
 def test_a_stop_lets_parts_be_painted_and_no_joint_be_moved(session: Session) -> None:
     state = session.step(session.begin(session.ready, 0.0, 0.0), [cmd.Stop()], 0.01)
-    said = cmd.Together((cmd.SetAxes(((0, 0.5),)), cmd.Dress("cup", Trait.CHOICE, -1)))
+    said = cmd.Batch((cmd.SetAxes(((0, 0.5),)), cmd.Dress("cup", Trait.CHOICE, -1)))
     state = session.step(state, [said], 0.02)
     np.testing.assert_array_equal(state.goal, session.ready)
     assert look_of(state, "cup").choice is Choice.HIDDEN

@@ -30,9 +30,11 @@ def session(robot: Robot, arm: MountedArm) -> Session:
 @pytest.mark.parametrize("seed", range(6))
 def test_each_margin_is_the_least_there_is(session: Session, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     q = rng.uniform(chain.lower, chain.upper)
-    x = np.append(q, rng.uniform(session.arm.gripper.lower, session.arm.gripper.upper))
+    x = np.append(
+        q, rng.uniform(session.require_arm().gripper.lower, session.require_arm().gripper.upper)
+    )
     world = session.world_at(session.begin(session.ready, 0.0, 0.0))
     assert world is not None
     found = margins(chain, world, x)
@@ -54,7 +56,7 @@ def test_each_margin_is_the_least_there_is(session: Session, seed: int) -> None:
 
 
 def test_beyond_a_limit_the_margin_is_negative(session: Session) -> None:
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     q = np.array(session.ready)
     q[3] = chain.upper[3] + 0.01
     found = margins(chain, None, np.append(q, 0.0))

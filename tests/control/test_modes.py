@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import Idle, Jogging, Positioning, Servoing, Tracking
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Dragging, Jogging, State, ToolTarget
+from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.motion.stream import Stream
 
 TICK = 0.01
 
@@ -43,7 +43,7 @@ def streamed(session: Session, state: State, ticks: int) -> State:
 
 
 def point(session: Session, q: FloatArray) -> FloatArray:
-    return forward(session.arm.chain, q)[:3, 3]
+    return forward(session.require_arm().chain, q)[:3, 3]
 
 
 def test_a_jog_held_after_a_stream_keeps_going(session: Session, state: State) -> None:
@@ -67,7 +67,7 @@ def test_a_drag_during_a_jog_is_followed_and_leaves_nothing_behind(
     wanted = FAR_DRAG.position
     np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
     # The next drag takes its goal along its own line.
-    settled = run(session, dragged, cmd.Settle())
+    settled = run(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
     for share in np.linspace(0.05, 1.0, 20):
         settled = run(session, settled, cmd.MoveTool(start + share * way))
@@ -84,8 +84,8 @@ def test_a_drag_during_a_stream_is_followed(session: Session, state: State) -> N
 
 BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
     Jogging: lambda session, state: run(session, state, JOG),
-    Stream: lambda session, state: streamed(session, state, 1),
-    Dragging: lambda session, state: run(session, state, FAR_DRAG),
+    Servoing: lambda session, state: streamed(session, state, 1),
+    Tracking: lambda session, state: run(session, state, FAR_DRAG),
 }
 
 
@@ -98,33 +98,30 @@ def test_the_later_mode_replaces_the_earlier_one(
     assert isinstance(BEGINNINGS[second](session, begun).mode, second)
 
 
-def test_random_orders_never_leave_a_drag_without_its_target(
-    session: Session, state: State
-) -> None:
+def test_every_mode_of_a_random_order_comes_to_an_end(session: Session, state: State) -> None:
     rng = np.random.default_rng(13)
     kinds: list[Callable[[State], cmd.Command]] = [
         lambda _: JOG,
         lambda state: cmd.Servo(state.goal + rng.normal(scale=0.01, size=5)),
         lambda state: cmd.MoveTool(point(session, state.goal) + rng.normal(scale=0.1, size=3)),
         lambda _: cmd.TurnTool(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)),
-        lambda _: cmd.Settle(),
+        lambda _: cmd.EndDrag(),
         lambda _: cmd.Home(),
-        lambda _: cmd.SetTool(str(rng.choice(list(session.arm.tools)))),
-        lambda _: cmd.Reset(),
+        lambda _: cmd.SetTool(str(rng.choice(list(session.require_arm().tools)))),
+        lambda _: cmd.Hold(),
         lambda _: cmd.Pause(),
         lambda _: cmd.Resume(),
         lambda _: cmd.Stop(),
-        lambda _: cmd.Release(),
+        lambda _: cmd.ClearStop(),
     ]
     for _ in range(1500):
         command = kinds[rng.integers(len(kinds))](state)
         state = run(session, state, command, int(rng.integers(1, 4)))
-        assert isinstance(state.target, ToolTarget) or not isinstance(state.mode, Dragging)
-        if state.halted is not None:
-            assert state.mode is None
+        if state.stopped is not None:
+            assert isinstance(state.mode, Idle)
     # Left alone, every mode but a pause comes to an end.
-    state = run(session, run(session, state, cmd.Release()), cmd.Resume())
+    state = run(session, run(session, state, cmd.ClearStop()), cmd.Resume())
     assert not math.isnan(state.setpoint.sum())
     over = run(session, state, None, 600)
-    assert over.mode is None
+    assert isinstance(over.mode, Idle | Positioning)
     assert not over.moving

@@ -33,7 +33,7 @@ def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: 
 
 
 def check(session: Session, before: Motion, after: Motion) -> None:
-    limits, slack = session.arm.limits, 1.0 + 1e-6
+    limits, slack = session.require_arm().limits, 1.0 + 1e-6
     assert (np.abs(after.qd) <= limits.speed * slack).all()
     assert (np.abs(after.qd - before.qd) <= limits.acceleration * TICK * slack + 1e-8).all()
     assert (np.abs(after.qdd - before.qdd) <= limits.jerk * TICK * slack + 1e-7).all()
@@ -50,24 +50,24 @@ def point(chain: Chain, q: FloatArray) -> FloatArray:
 def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
     session: Session, state: State
 ) -> None:
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     moving = run(session, state, [cmd.SetJoints(FAR)], 60)
     assert speed(chain, moving.motion) > 0.1
-    halted = run(session, moving, [cmd.Stop()])
-    assert halted.status is Status.HALTED
-    (finding,) = halted.findings
-    assert finding.reason is Reason.HALTED
+    stopped = run(session, moving, [cmd.Stop()])
+    assert stopped.status is Status.STOPPED
+    (finding,) = stopped.findings
+    assert finding.reason is Reason.STOPPED
     ticks = 1
-    while halted.moving:
+    while stopped.moving:
         # Braking from the first tick on.
-        before, halted = halted, run(session, halted, [])
-        assert speed(chain, halted.motion) <= speed(chain, before.motion) + 0.05
+        before, stopped = stopped, run(session, stopped, [])
+        assert speed(chain, stopped.motion) <= speed(chain, before.motion) + 0.05
         ticks += 1
-    assert halted.motion.at_rest
+    assert stopped.motion.at_rest
     assert ticks * TICK == pytest.approx(finding.time, abs=2 * TICK)
-    way = math.dist(point(chain, moving.setpoint), point(chain, halted.setpoint))
+    way = math.dist(point(chain, moving.setpoint), point(chain, stopped.setpoint))
     assert finding.amount == pytest.approx(way, abs=1e-4)
-    assert halted.findings == (finding,)
+    assert stopped.findings == (finding,)
 
 
 ORDERS: list[cmd.Command] = [
@@ -78,9 +78,9 @@ ORDERS: list[cmd.Command] = [
     cmd.SetPose(np.eye(4)),
     cmd.SetGripper(0.2),
     cmd.Home(),
-    cmd.Stretch(),
-    cmd.Reset(),
-    cmd.Settle(),
+    cmd.GoToZero(),
+    cmd.Hold(),
+    cmd.EndDrag(),
     cmd.Pause(),
     cmd.Resume(),
     cmd.Jog(np.array([0.1, 0.0, 0.0, 0.0, 0.0])),
@@ -91,16 +91,16 @@ def test_nothing_moves_after_a_stop_until_it_is_released_and_told_afresh(
     session: Session, state: State
 ) -> None:
     moving = run(session, state, [cmd.SetJoints(FAR), cmd.SetGripper(0.3)], 30)
-    halted = run(session, moving, [cmd.Stop()], 200)
+    stopped = run(session, moving, [cmd.Stop()], 200)
     grip = moving.gripper_setpoint
     for order in ORDERS:
-        after = run(session, halted, [order], 50)
-        assert (after.setpoint == halted.setpoint).all(), order
-        assert after.gripper_setpoint == halted.gripper_setpoint == grip
-        assert after.status is Status.HALTED
-    released = run(session, halted, [cmd.Release()], 100)
+        after = run(session, stopped, [order], 50)
+        assert (after.setpoint == stopped.setpoint).all(), order
+        assert after.gripper_setpoint == stopped.gripper_setpoint == grip
+        assert after.status is Status.STOPPED
+    released = run(session, stopped, [cmd.ClearStop()], 100)
     assert released.status is Status.OK
-    assert (released.setpoint == halted.setpoint).all()
+    assert (released.setpoint == stopped.setpoint).all()
     assert isinstance(released.target, JointTarget)
     assert released.gripper_setpoint == grip
     assert run(session, released, [cmd.SetJoint(0, 1.0)], 5).moving
@@ -114,7 +114,7 @@ def test_a_stop_in_the_same_tick_beats_what_came_with_it(session: Session, state
     for batch in batches:
         after = run(session, state, batch, 100)
         assert (after.setpoint == state.setpoint).all()
-        assert after.status is Status.HALTED
+        assert after.status is Status.STOPPED
 
 
 def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
@@ -122,7 +122,7 @@ def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
     once = run(session, moving, [cmd.Stop()], 20)
     twice = run(session, once, [cmd.Stop()])
     assert twice.findings == once.findings
-    assert twice.halted == once.halted
+    assert twice.stopped == once.stopped
 
 
 def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: State) -> None:
@@ -149,7 +149,7 @@ def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: S
 def test_the_speed_scale_counts_at_once_and_for_every_joint(session: Session, state: State) -> None:
     moving = run(session, state, [cmd.SetJoints(FAR)], 70)
     slow = run(session, moving, [cmd.SpeedScale(0.1)], 120)
-    limits = session.arm.limits
+    limits = session.require_arm().limits
     assert (np.abs(slow.motion.qd) <= 0.1 * limits.speed * (1 + 1e-9)).all()
     assert (np.abs(slow.motion.qd) / limits.speed).max() > 0.09
     fast = run(session, slow, [cmd.SpeedScale(1.0)], 600)
@@ -164,7 +164,7 @@ def test_a_speed_that_is_none_is_refused(share: float) -> None:
 
 def test_the_tool_is_never_faster_than_it_may_be(session: Session, state: State) -> None:
     rng = np.random.default_rng(7)
-    chain, fastest = session.arm.chain, 0.0
+    chain, fastest = session.require_arm().chain, 0.0
     for number in range(40):
         goal = rng.uniform(chain.lower, chain.upper)
         ticks = int(rng.integers(20, 200))
@@ -190,7 +190,7 @@ JOGS: dict[str, tuple[list[float], JogFrame]] = {
 @pytest.mark.parametrize("name", JOGS)
 def test_a_jog_goes_where_it_is_held_to(session: Session, name: str) -> None:
     rates, frame = JOGS[name]
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     state = session.begin(np.array([0.4, -1.2, 1.6, 0.3, 0.2]), 0.0, 0.0)
     start, R = point(chain, state.setpoint), forward(chain, state.setpoint)[:3, :3]
     before = pitch_and_roll(chain, state.setpoint)
@@ -218,9 +218,9 @@ def test_a_jog_nobody_holds_on_to_ends_by_itself(session: Session, state: State)
     until = held.t + cmd.JOG_TIME
     while held.t < until:
         held = run(session, held, [])
-    assert speed(session.arm.chain, held.motion) > 0.05
+    assert speed(session.require_arm().chain, held.motion) > 0.05
     # From then on it brakes, about as fast as it can.
-    fastest = Limiter(session.arm.limits).time_to_halt(held.motion)
+    fastest = Limiter(session.require_arm().limits).time_to_halt(held.motion)
     while held.moving:
         held = run(session, held, [])
     assert held.t <= until + 1.2 * fastest + 3 * TICK
@@ -238,7 +238,7 @@ def test_after_any_jog_the_arm_comes_to_rest_where_it_says(session: Session, sta
         rates[random.integers(3)] = random.choice((-0.25, 0.25))
         for _ in range(random.integers(2, 18)):
             state = run(session, state, [cmd.Jog(rates)], 5)
-        near += not session.arm.chain.within_limits(state.setpoint, slack=-0.05)
+        near += not session.require_arm().chain.within_limits(state.setpoint, slack=-0.05)
         state = run(session, state, [cmd.Jog(np.zeros(5))], 200)
         assert not state.moving
         assert (state.setpoint == state.goal).all()
@@ -246,7 +246,7 @@ def test_after_any_jog_the_arm_comes_to_rest_where_it_says(session: Session, sta
 
 
 def test_a_jog_stops_before_a_limit(session: Session, state: State) -> None:
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     for _ in range(500):
         state = run(session, state, [cmd.Jog(np.array([0.0, 0.3, 0.0, 0.0, 0.0]))])
         assert chain.within_limits(state.setpoint, slack=0.0)
@@ -254,7 +254,7 @@ def test_a_jog_stops_before_a_limit(session: Session, state: State) -> None:
 
 def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None:
     """From the stretched arm axis 2 soon is at its limit, and the wrist has to make up for it."""
-    chain = session.arm.chain
+    chain = session.require_arm().chain
     state = session.begin(np.zeros(5), 0.0, 0.0)
     height = point(chain, state.setpoint)[2]
     for _ in range(160):
@@ -277,7 +277,7 @@ def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None
 def test_a_jog_that_is_held_up_says_by_what(
     session: Session, q: list[float], rates: list[float], told: tuple[Reason, int | None] | None
 ) -> None:
-    state = session.begin(session.arm.chain.clamp(np.array(q)), 0.0, 0.0)
+    state = session.begin(session.require_arm().chain.clamp(np.array(q)), 0.0, 0.0)
     for _ in range(30):
         state = run(session, state, [cmd.Jog(np.array(rates))])
     assert [(f.reason, f.axis) for f in state.findings] == ([] if told is None else [told])

@@ -63,7 +63,7 @@ def arriving(
 
     Each is stamped with its arrival, as on a server; limits are checked in every tick.
     """
-    rng, limits = np.random.default_rng(3), session.arm.limits
+    rng, limits = np.random.default_rng(3), session.require_arm().limits
     sent = np.arange(0.0, seconds, 1.0 / hz)
     arrived = np.maximum.accumulate(sent + 0.004 + rng.exponential(jitter, len(sent)))
     stream, due = on_axis_1(session, signal), 0
@@ -220,7 +220,7 @@ def test_a_stream_that_ends_leads_to_rest_at_its_last(session: Session) -> None:
 
 def test_any_other_command_ends_it(session: Session) -> None:
     _, states = streamed(session, wave(session), 1.0)
-    for command in (cmd.Home(), cmd.Reset(), cmd.Stop(), cmd.SetJoint(0, 0.1)):
+    for command in (cmd.Home(), cmd.Hold(), cmd.Stop(), cmd.SetJoint(0, 0.1)):
         state = session.step(states[-1], [command], states[-1].t + DT)
         assert state.servo is None
 

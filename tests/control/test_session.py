@@ -88,7 +88,9 @@ def test_moving_the_tool_keeps_pitch_and_roll_and_needs_no_yaw(
     wanted = np.array([0.25, 0.25, -0.05])
     state = run(session, state, [cmd.MoveTool(wanted)], ticks=5)
     assert np.allclose(tool_point(arm, state), wanted, atol=1e-12)
-    assert pitch_and_roll(session.arm.chain, state.goal) == pytest.approx((0.6, 0.4), abs=1e-12)
+    assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
+        (0.6, 0.4), abs=1e-12
+    )
     assert state.status is Status.OK
 
 
@@ -96,7 +98,9 @@ def test_turning_the_tool_keeps_its_position(arm: Arm, session: Session, state: 
     before = tool_point(arm, state)
     state = run(session, state, [cmd.TurnTool(0.55, -1.0)], ticks=5)
     assert np.allclose(tool_point(arm, state), before, atol=1e-12)
-    assert pitch_and_roll(session.arm.chain, state.goal) == pytest.approx((0.55, -1.0), abs=1e-12)
+    assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
+        (0.55, -1.0), abs=1e-12
+    )
 
 
 def test_a_pose_with_a_yaw_of_its_own_says_how_much_is_lost(
@@ -132,11 +136,13 @@ def test_dragging_back_from_out_of_reach_brings_the_wished_pitch_back(
     session: Session, state: State
 ) -> None:
     home = run(session, state, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))], ticks=5)
-    pitch, _ = pitch_and_roll(session.arm.chain, home.goal)
+    pitch, _ = pitch_and_roll(session.require_arm().chain, home.goal)
     away = run(session, home, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=50)
-    assert abs(pitch_and_roll(session.arm.chain, away.goal)[0] - pitch) > 0.3
+    assert abs(pitch_and_roll(session.require_arm().chain, away.goal)[0] - pitch) > 0.3
     back = run(session, away, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))], ticks=10)
-    assert pitch_and_roll(session.arm.chain, back.goal)[0] == pytest.approx(pitch, abs=1e-12)
+    assert pitch_and_roll(session.require_arm().chain, back.goal)[0] == pytest.approx(
+        pitch, abs=1e-12
+    )
 
 
 def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
@@ -144,12 +150,14 @@ def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
 ) -> None:
     away = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=10)
     assert not isinstance(away.target, JointTarget)
-    away = run(session, away, [cmd.Settle()])
+    away = run(session, away, [cmd.EndDrag()])
     assert isinstance(away.target, JointTarget)
     assert away.target.q is away.goal
     assert reasons(away) == {Reason.OUT_OF_REACH, Reason.LINKS}
     # The next wish starts from what the arm does, and clears the reason.
-    back = run(session, away, [cmd.TurnTool(*pitch_and_roll(session.arm.chain, away.goal))])
+    back = run(
+        session, away, [cmd.TurnTool(*pitch_and_roll(session.require_arm().chain, away.goal))]
+    )
     assert np.allclose(back.goal, away.goal, atol=1e-6)
     assert reasons(back) == set()
 
@@ -159,7 +167,7 @@ def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
 ) -> None:
     """One tick has no time for all the way; what was wished is not lost with the hand."""
     wanted = np.array([-0.2, 0.35, 0.1])
-    flung = run(session, state, [cmd.MoveTool(wanted), cmd.Settle()])
+    flung = run(session, state, [cmd.MoveTool(wanted), cmd.EndDrag()])
     assert flung.since is not None
     assert flung.findings == ()
     assert math.dist(tool_point(arm, flung), wanted) > 0.1
@@ -173,7 +181,7 @@ def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
     assert np.allclose(tool_point(arm, again), wanted, atol=1e-12)
     assert not isinstance(again.target, JointTarget)
     # Whatever else is asked of the arm ends it.
-    for command in (cmd.Reset(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
+    for command in (cmd.Hold(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
         ended = run(session, flung, [command])
         assert ended.since is None
         assert isinstance(ended.target, JointTarget)
@@ -210,7 +218,7 @@ def test_dragging_never_changes_the_branch(arm: Arm, session: Session, state: St
     for _ in range(400):
         position = position + rng.normal(scale=0.03, size=3)
         position = np.clip(position, -0.9, 0.9)
-        pitch, roll = pitch_and_roll(session.arm.chain, state.goal)
+        pitch, roll = pitch_and_roll(session.require_arm().chain, state.goal)
         batch: list[cmd.Command] = [cmd.MoveTool(position)]
         if rng.random() < 0.2:
             batch.append(cmd.TurnTool(pitch + rng.normal(scale=0.3), roll + rng.normal(scale=0.3)))
@@ -236,11 +244,11 @@ def test_sliders_may_change_the_branch_because_a_person_says_so(
 
 
 def test_home_stretch_and_reset(session: Session, state: State) -> None:
-    state = run(session, state, [cmd.Stretch()])
+    state = run(session, state, [cmd.GoToZero()])
     assert (state.goal == 0.0).all()
     state = run(session, state, [], ticks=20)
     assert state.moving
-    held = run(session, state, [cmd.Reset()], ticks=100)
+    held = run(session, state, [cmd.Hold()], ticks=100)
     assert not held.moving
     assert (held.goal == held.setpoint).all()
     home = run(session, held, [cmd.Home()])

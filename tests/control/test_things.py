@@ -238,7 +238,7 @@ def test_what_cannot_be_is_refused(session: Session) -> None:
     ):
         with pytest.raises(InputError):
             session.check(command)
-    blind = Session(session.arm, session.ready)
+    blind = Session(session.require_arm(), session.ready)
     for asked in (
         cmd.Attach("it", Mount.HAND),
         cmd.Place(knot(T, fixed=True)),

@@ -31,13 +31,13 @@ ORDERS: dict[str, list[Order]] = {
     "jogs": [lambda rng, _: cmd.Jog(rng.uniform(-0.5, 0.5, 5))],
     "turns": [lambda rng, _: cmd.TurnTool(rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0))],
     "joints": [lambda rng, arm: cmd.SetJoints(anywhere(rng, arm))],
-    "pauses": [lambda *_: cmd.Pause(), lambda *_: cmd.Resume(), lambda *_: cmd.Reset()],
-    "stops": [lambda *_: cmd.Together((cmd.Stop(), cmd.Release()))],
+    "pauses": [lambda *_: cmd.Pause(), lambda *_: cmd.Resume(), lambda *_: cmd.Hold()],
+    "stops": [lambda *_: cmd.Batch((cmd.Stop(), cmd.ClearStop()))],
 }
 
 
 def speed(session: Session, state: State) -> float:
-    J = jacobian_body(session.arm.chain_to(state.tool), state.setpoint)
+    J = jacobian_body(session.require_arm().chain_to(state.tool), state.setpoint)
     return float(np.linalg.norm(J[3:] @ state.motion.qd))
 
 
@@ -48,13 +48,13 @@ def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list
     for _ in range(ticks):
         commands = []
         if wait == 0:
-            commands = [orders[rng.integers(len(orders))](rng, session.arm)]
+            commands = [orders[rng.integers(len(orders))](rng, session.require_arm())]
             wait = int(rng.integers(60))
         else:
             wait -= 1
         state = session.step(state, commands, state.t + TICK)
         found.append(speed(session, state))
-        assert session.arm.chain.within_limits(state.setpoint, slack=0.0)
+        assert session.require_arm().chain.within_limits(state.setpoint, slack=0.0)
     return found
 
 
@@ -75,7 +75,7 @@ def test_fast_jump_drags_keep_below_it(
 ) -> None:
     """The hand leaps up to ``size`` [m] away every few ticks."""
     rng, wait, fastest = np.random.default_rng([450, seed]), 0, 0.0
-    state = session.begin(anywhere(rng, session.arm), 0.0, 0.0)
+    state = session.begin(anywhere(rng, session.require_arm()), 0.0, 0.0)
     for _ in range(2500):
         commands: list[cmd.Command] = []
         if wait == 0:

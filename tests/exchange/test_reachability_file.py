@@ -12,10 +12,15 @@ import trimesh
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.export.reachability_file import FORMAT, load_map, write_npz, write_ply
 from katana450.extensions.reachability.colors import share_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
+from katana450.extensions.reachability.reachability_file import (
+    FORMAT,
+    load_map,
+    write_npz,
+    write_ply,
+)
 
 POINTS = np.array([[0.11, -0.2, 0.3], [0.13, -0.2, 0.3], [0.15, 0.2, 0.5]])
 SHARE = np.array([0.25, 1.0, 1 / 3])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.extensions.importers import shape_file
-from katana450.extensions.importers.meshes import read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import SECONDS
 from katana450.extensions.importers.surface import MOST_TRIANGLES
 from katana450.maths.geometry.arrays import FloatArray

@@ -16,16 +16,17 @@ from hypothesis import strategies as st
 
 from katana450.arm.control.solid import Look, Solid
 from katana450.arm.control.things import Form, Thing
+from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError
 from katana450.extensions.importers import scene_file
-from katana450.extensions.importers.meshes import Mesh, Meshes, read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import (
     StoredScene,
     read_scene_folder,
     read_scene_zip,
     scene_zip,
 )
-from katana450.extensions.importers.shape_file import Format, Up
+from katana450.extensions.importers.shape_file import Up
 from katana450.extensions.scene.scene import MeshFile, Scene
 from katana450.extensions.scene.text import parsed, written
 from katana450.maths.geometry import se3, so3
@@ -259,9 +260,7 @@ def test_a_broken_or_swollen_zip_is_refused(mesh: Mesh, monkeypatch: pytest.Monk
 def made(key: str, size: int) -> Mesh:
     solid = Solid(key, SOLID.size, SOLID.corners)
     none = np.zeros((0, 3))
-    return Mesh(
-        bytes(size), Format.STL, "mm", None, key, none, none.astype(np.int64), None, solid, ""
-    )
+    return Mesh(bytes(size), "stl", "mm", None, key, none, none.astype(np.int64), None, solid, "")
 
 
 def test_the_store_gives_up_what_is_not_used_and_nothing_else() -> None:

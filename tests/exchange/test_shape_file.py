@@ -22,7 +22,7 @@ from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.vrml import world_of
 from katana450.extensions.export.vrml_text import world_text
 from katana450.extensions.importers import shape_file
-from katana450.extensions.importers.meshes import read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import (
     LARGEST,
     LONGEST_NAME,

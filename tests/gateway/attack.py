@@ -66,7 +66,7 @@ async def asking(
     """Programs on ``sockets`` connections that ask ``hz`` times a second each; what they hear."""
     heard: Counter[str] = Counter()
     headers = {"Authorization": f"Bearer {token}"} if token else {}
-    request = f'{{"do":"look","at":"{what}"}}'
+    request = f'{{"do": "query","at":"{what}"}}'
 
     async def ask() -> None:
         path = "/api/v1/socket?name=Asks"
@@ -109,7 +109,7 @@ async def stop_seconds(control: Control, times: int, seconds: float = 30.0) -> l
     for _ in range(times):
         said = time.perf_counter()
         await control.say("stop")
-        await control.notice("stopping", seconds)
+        await control.notice("stopped", seconds)
         took.append(time.perf_counter() - said)
         await asyncio.sleep(0.05)
     return sorted(took)

@@ -144,7 +144,7 @@ class Control:
             while True:
                 if self.alive:
                     n += 1
-                    await self.say("beat", n=n)
+                    await self.say("heartbeat", n=n)
                     self.last_beat = time.perf_counter()
                 await asyncio.sleep(BEAT)
 

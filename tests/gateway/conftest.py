@@ -22,9 +22,9 @@ def server() -> Iterator[AppServer]:
 def program(server: AppServer) -> Iterator[Client]:
     """A program that holds the arm; what it was told to do is forgotten afterwards."""
     with connect(server.url, "Test") as program:
-        program.ask(requests.Reset())
+        program.ask(requests.ClearStop())
         program.ask(requests.Speed(value=1.0))
         yield program
-        program.ask(requests.Reset())
+        program.ask(requests.ClearStop())
         program.go(requests.Home())
-        program.ask(requests.Release())
+        program.ask(requests.ReleaseLease())

@@ -44,7 +44,7 @@ def test_a_program_drives_the_joints_and_knows_when_they_are_there(
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
     np.testing.assert_allclose(np.array(there.T), forward(arm.chain, THERE), rtol=0, atol=1e-12)
     assert there.holder == program.welcome.name == "Test"
-    described = program.look(answers.Arm)
+    described = program.query(answers.Arm)
     assert described.joints == list(arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
     np.testing.assert_array_equal(described.T_base_shoulder, arm.T_base_shoulder)
@@ -85,11 +85,11 @@ def test_what_the_arm_cannot_do_comes_with_its_reason(program: Client) -> None:
 
 def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
     asked: list[requests.Request] = [
-        requests.Beat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),
+        requests.Heartbeat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),
         requests.Tool(name="tcp"), requests.Joint(axis=5, value=0.1), requests.Pause(),
-        requests.Resume(), requests.Settle(), requests.Hold(), requests.Stretch(),
+        requests.Resume(), requests.EndDrag(), requests.Hold(), requests.GoToZero(),
         requests.Home(), requests.Jog(rates=(0.0, 0.0, 0.05, 0.0, 0.0)),
-        requests.Servo(q=READY.tolist()), requests.Fill(ml=150.0), requests.Look(at="loop"),
+        requests.Servo(q=READY.tolist()), requests.Fill(ml=150.0), requests.Query(at="loop"),
         requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
         *(requests.Read(reading=each) for each in reversed(Reading)),
     ]  # fmt: skip
@@ -97,7 +97,7 @@ def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
         answer = program.ask(request)
         assert not isinstance(answer, answers.Refused), request
     for kind in (answers.State, answers.Arm, answers.Ledger, answers.Branches, answers.Loop):
-        assert isinstance(program.look(kind), kind)
+        assert isinstance(program.query(kind), kind)
     refusals = (requests.Acquire(), requests.Take(), requests.Ask(), requests.Withdraw())
     for request in refusals:
         with pytest.raises(RefusedError):
@@ -110,7 +110,7 @@ def test_a_state_tells_what_follows_from_the_posture(
     q = THERE + np.array((0.3, 0.0, 0.0, 0.0, 0.0))
     program.joints(q)
     time.sleep(0.3)
-    state = program.look(answers.State)
+    state = program.query(answers.State)
     assert state.told > state.t + 0.2
     assert (state.setpoint, state.tool_speed) == (state.q, 0.0)
     assert (state.touching, state.held) == ([], None)
@@ -123,7 +123,7 @@ def test_a_state_tells_what_follows_from_the_posture(
     assert state.margins.clearance > 0.005
     program.tell(requests.Joints(q=THERE.tolist()))
     deadline = time.monotonic() + 5.0
-    while (program.look(answers.State).tool_speed or 0.0) < 0.05:
+    while (program.query(answers.State).tool_speed or 0.0) < 0.05:
         assert time.monotonic() < deadline
 
 
@@ -133,10 +133,10 @@ def test_a_stream_of_joints_is_followed_and_its_end_is_a_rest(program: Client) -
         wave = READY + math.sin(2.0 * t) * np.array((0.2, 0.0, 0.0, 0.0, 0.4))
         program.tell(requests.Servo(q=wave.tolist()))
         time.sleep(0.02)
-    moving = program.look(answers.State)
+    moving = program.query(answers.State)
     assert abs(np.array(moving.qd)[0]) > 0.05
     time.sleep(1.2)
-    rest = program.look(answers.State)
+    rest = program.query(answers.State)
     assert not rest.moving
     # It braked at once and did not go on to where the stream had wanted it.
     assert abs(rest.q[0] - 0.2 * math.sin(2.0 * 1.5)) < 0.2
@@ -154,7 +154,7 @@ def test_a_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool
         q[0] += size * math.sin(omega * t)
         qd[0] = size * omega * math.cos(omega * t)
         program.tell(requests.Servo(q=q.tolist(), qd=qd.tolist() if rates else None))
-        seen.append(program.look(answers.State).setpoint[0] - READY[0])
+        seen.append(program.query(answers.State).setpoint[0] - READY[0])
         time.sleep(max(0.0, began + t + 0.02 - time.monotonic()))
     assert 0.9 * size < max(abs(each) for each in seen) < 1.05 * size
 
@@ -177,15 +177,15 @@ def test_stop_is_anybodys_and_ends_what_a_program_does(server: AppServer, progra
         other.ask(requests.Home())
     status, _, _ = ask(f"{server.url}/api/v1/stop", data=b"", X_Name="bystander")
     assert status == 204
-    assert program.look(answers.State).stopped == "bystander pressed STOP."
-    with pytest.raises(RefusedError, match="reset it first"):
+    assert program.query(answers.State).stopped == "bystander pressed STOP."
+    with pytest.raises(RefusedError, match="clear the stop first"):
         program.joints(READY)
-    while (rest := program.look(answers.State)).moving:
+    while (rest := program.query(answers.State)).moving:
         time.sleep(0.02)
-    program.ask(requests.Reset())
+    program.ask(requests.ClearStop())
     time.sleep(0.3)
-    assert program.look(answers.State).q == rest.q
-    ledger = program.look(answers.Ledger)
+    assert program.query(answers.State).q == rest.q
+    ledger = program.query(answers.Ledger)
     assert any(line.who == "bystander" and line.began for line in ledger.lines)
 
 
@@ -198,12 +198,12 @@ def test_a_program_that_falls_silent_stops_the_arm(server: AppServer) -> None:
             await silent.send('{"do": "speed", "value": 0.1}')
             await silent.send(json.dumps({"do": "joints", "q": THERE.tolist()}))
             async with asyncio.timeout(5.0):
-                while (await watcher.look(answers.State)).stopped is None:
+                while (await watcher.query(answers.State)).stopped is None:
                     await asyncio.sleep(0.02)
-            state = await watcher.look(answers.State)
+            state = await watcher.query(answers.State)
             assert state.stopped == "Frozen fell silent while the arm moved."
             await _freed(watcher)
-            await watcher.ask(requests.Reset())
+            await watcher.ask(requests.ClearStop())
             await watcher.go(requests.Home())
 
     asyncio.run(act())
@@ -211,27 +211,27 @@ def test_a_program_that_falls_silent_stops_the_arm(server: AppServer) -> None:
 
 async def _freed(client: AsyncClient) -> None:
     async with asyncio.timeout(10.0):
-        while (await client.look(answers.State)).holder is not None:
+        while (await client.query(answers.State)).holder is not None:
             await asyncio.sleep(0.05)
 
 
 def test_a_line_of_json_at_a_time_does_the_same(server: AppServer) -> None:
     with speaking(server, "Octave") as lines:
-        lines.answer(do="reset")
+        lines.answer(do="clear_stop")
         done = lines.answer(do="joints", q=THERE.tolist())
         assert done["is"] == "done"
         lines.say(do="watch", hz=20)
         state: dict[str, Any] = {"ticket": -1}
         while state["ticket"] < done["ticket"] or state["moving"]:
             # Whatever is asked is a sign of life.
-            lines.say(do="beat")
+            lines.say(do="heartbeat")
             while (state := lines.hear())["is"] != "state":
                 pass
         np.testing.assert_allclose(state["q"], THERE, rtol=0, atol=1e-12)
         assert state["holder"] == "Octave"
         lines.say(do="watch", hz=0)
         assert "5 joints" in lines.answer(do="joints", q=[0])["why"]
-        assert lines.answer(do="release")["is"] == "done"
+        assert lines.answer(do="release_lease")["is"] == "done"
 
 
 @pytest.mark.parametrize(
@@ -255,14 +255,14 @@ def test_who_does_not_say_hello_on_the_tcp_port_is_sent_away(
             lines.raw(first)
         assert lines.ends()
     with connect(server.url) as program:
-        assert program.look(answers.State).stopped is None
+        assert program.query(answers.State).stopped is None
 
 
 def test_requests_that_are_none_change_nothing_and_end_the_line_after_a_while(
     server: AppServer,
 ) -> None:
     with connect(server.url) as watcher:
-        before = watcher.look(answers.State)
+        before = watcher.query(answers.State)
         with speaking(server) as lines:
             for text in ("{", "[]", '{"do":"fly"}', '{"do":"joints","q":[NaN,0,0,0,0]}',
                          '{"do":"joints","q":[1e999,0,0,0,0],"id":4}', '{"do":"watch","hz":-1}',
@@ -271,12 +271,12 @@ def test_requests_that_are_none_change_nothing_and_end_the_line_after_a_while(
                 assert lines.hear()["is"] == "refused"
             lines.raw(b"{\n" * 60)
             assert lines.ends()
-        after = watcher.look(answers.State)
+        after = watcher.query(answers.State)
         assert (after.q, after.holder, after.stopped) == (before.q, before.holder, before.stopped)
 
 
 def test_single_requests_may_be_posted(server: AppServer) -> None:
-    assert post(server, do="reset", id=1) == (200, {"is": "done", "id": 1})
+    assert post(server, do="clear_stop", id=1) == (200, {"is": "done", "id": 1})
     status, done = post(server, do="joint", axis=5, value=0.3)
     assert status == 200
     state: dict[str, Any] = {"ticket": 0}
@@ -294,7 +294,7 @@ def test_single_requests_may_be_posted(server: AppServer) -> None:
     assert post(server, do="watch", hz=3)[0] == 422
     assert post(server, "short", do="home")[0] == 422
     assert ask(f"{server.url}/api/v1/do", data=b"x" * 5000, X_Program="a-test-that-posts")[0] == 413
-    assert post(server, do="release")[0] == 200
+    assert post(server, do="release_lease")[0] == 200
 
 
 def test_another_sites_page_cannot_speak_for_a_program(server: AppServer) -> None:
@@ -356,7 +356,7 @@ def _rows(T: npt.ArrayLike) -> Matrix4:
 
 
 def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> None:
-    known = {each.name: each for each in program.look(answers.Things).things}
+    known = {each.name: each for each in program.query(answers.Things).things}
     assert set(known) == {"cup", "basin"}
     T = np.array(known["cup"].T)
     T[:2, 3] = (0.1, -0.45)
@@ -372,7 +372,7 @@ def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> Non
     assert "wall" in met.why
     program.ask(requests.Remove(name="wall"))
     assert program.go(requests.Joint(axis=1, value=1.2)).status == "ok"
-    now = {each.name: each for each in program.look(answers.Things).things}
+    now = {each.name: each for each in program.query(answers.Things).things}
     assert set(now) == {"cup", "basin"}
     np.testing.assert_array_equal(now["cup"].T, T)
     beyond_the_table = T.copy()
@@ -400,8 +400,8 @@ def test_another_branch_is_taken_on_a_way_that_is_clear(program: Client) -> None
     # A STOP while the way is being worked out ends that too.
     program.ask(requests.Branch(shoulder="front", elbow="down"))
     program.ask(requests.Stop())
-    program.ask(requests.Reset())
+    program.ask(requests.ClearStop())
     time.sleep(2.0)
-    rest = program.look(answers.State)
+    rest = program.query(answers.State)
     assert not rest.moving
     assert rest.q == back.q

@@ -57,7 +57,9 @@ async def _tell(client: AsyncClient) -> None:
 
 ACTS = {"ask": _ask, "states": _states, "tell": _tell}
 
-WELCOME = msgspec.json.encode(answers.Welcome(name="x", number=1, role="admin", beat=10.0)).decode()
+WELCOME = msgspec.json.encode(
+    answers.Welcome(name="x", number=1, role="admin", heartbeat=10.0)
+).decode()
 
 
 async def _mute(connection: ServerConnection) -> None:

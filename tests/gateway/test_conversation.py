@@ -28,7 +28,7 @@ class Torrent:
         if not self.left:
             await asyncio.Event().wait()
         self.left -= 1
-        return '{"do": "beat"}'
+        return '{"do": "heartbeat"}'
 
     async def send(self, _text: str) -> None:
         return

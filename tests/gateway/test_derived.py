@@ -35,17 +35,17 @@ def test_branches_are_computed_once_per_snapshot_for_all_who_ask() -> None:
         return ()
 
     arm.choices = choices
-    hub.arm = cast(Arm, arm)
+    hub.gate.arm = cast(Arm, arm)
     budgets = Budgets(hub.clock)
     for number in range(3):
         visitor = Identity(f"session-{number}", "Viewer", Role.VIEWER)
         window = hub.join(visitor, "a-page", lambda _notice: None)
-        request = requests.Look(at="branches", id=number)
+        request = requests.Query(at="branches", id=number)
         answer = Dispatcher(hub).do(window, request, budgets.of(visitor.session))
         assert answer == answers.Branches(choices=[], id=number)
     assert len(computed) == 1
     arm.snapshot = _snapshot()
-    Dispatcher(hub).look("branches")
+    Dispatcher(hub).query("branches")
     assert len(computed) == 2
 
 

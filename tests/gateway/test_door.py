@@ -246,10 +246,10 @@ def test_each_may_do_what_their_role_says(guarded: tuple[AppServer, Path]) -> No
             assert "Viewer pressed STOP" in (await driver.wait(mood="stopped"))["stopped"]
             status, _, body = ask(f"{server.url}/api/v1/ledger", Cookie=enter(server.url, viewer))
             last = json.loads(body)["lines"][-1]
-            assert (status, last["finding"]["reason"], last["who"]) == (200, "halted", "Viewer")
-            await watcher.say("reset")
+            assert (status, last["finding"]["reason"], last["who"]) == (200, "stopped", "Viewer")
+            await watcher.say("clear_stop")
             await watcher.notice("refused")
-            await driver.say("reset")
+            await driver.say("clear_stop")
             await watcher.wait(stopped=None)
 
     asyncio.run(act())
@@ -270,7 +270,7 @@ def test_a_press_of_stop_that_is_told_both_ways_counts_once() -> None:
                 await control.wait(mood="ok")
                 await control.say("stop", press="one")
                 await control.wait(mood="stopped")
-                await control.say("reset")
+                await control.say("clear_stop")
                 await control.wait(stopped=None)
                 post("?press=one")
                 await asyncio.sleep(0.3)
@@ -279,7 +279,7 @@ def test_a_press_of_stop_that_is_told_both_ways_counts_once() -> None:
                 for query in ("?press=two", "?press=" + 100 * "x", "?press=", ""):
                     post(query)
                     await control.wait(mood="stopped")
-                    await control.say("reset")
+                    await control.say("clear_stop")
                     await control.wait(stopped=None)
 
     asyncio.run(act())

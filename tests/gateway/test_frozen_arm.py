@@ -74,11 +74,11 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
                     assert (status, b"No word from the arm" in said) == (503, True)
                     await control.say("stop")
                     told = await control.wait(stop="requested")
-                    assert (told["mood"], told["headline"]) == ("stopping", "Stop requested")
+                    assert (told["mood"], told["headline"]) == ("stopped", "Stop requested")
                     assert "not confirmed" in told["why"]
                     # Longer than a pipe full of heartbeats: nothing blocks, and STOP is answered.
                     await asyncio.sleep(6.0)
-                    state = arm.look(answers.State)
+                    state = arm.query(answers.State)
                     assert state.stop == "requested"
                     assert state.age > 6.0
                     assert control.status["stop"] == "requested"
@@ -87,7 +87,7 @@ def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> N
                 told = await control.wait(stop="confirmed")
                 assert (told["mood"], told["headline"]) == ("stopped", "Stopped")
                 await asyncio.sleep(1.0)
-                state = arm.look(answers.State)
+                state = arm.query(answers.State)
                 assert state.stop == "confirmed"
                 assert state.age < 1.0
                 assert not state.moving
@@ -104,22 +104,22 @@ def test_arm_that_was_frozen_stands_still_and_waits_for_a_reset() -> None:
     command = (*ATTENTIVE_APP, "--silence", "0.6", "--lines", "0")
     with AppServer(command) as server, speaking(server, "Driver") as driver:
         driver.say(do="joints", q=FAR.tolist())
-        while driver.answer(do="look")["q"][0] < 0.2:
+        while driver.answer(do="query")["q"][0] < 0.2:
             time.sleep(0.02)
         with frozen(server.pid):
             end = time.monotonic() + 10.0
             while state_of(server)["stopped"] is None:
-                driver.say(do="beat")
+                driver.say(do="heartbeat")
                 assert time.monotonic() < end
                 time.sleep(0.1)
-            refused = driver.answer(do="reset")
+            refused = driver.answer(do="clear_stop")
             assert "has not answered" in refused["why"]
         assert "did not answer" in str(state_of(server)["stopped"])
         end = time.monotonic() + 5.0
         while (state := state_of(server))["stop"] != "confirmed" or state["moving"]:
             assert time.monotonic() < end
             time.sleep(0.05)
-        assert driver.answer(do="reset")["is"] == "done"
+        assert driver.answer(do="clear_stop")["is"] == "done"
         time.sleep(0.5)
         np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 

@@ -50,11 +50,11 @@ JSON: list[dict[str, Any]] = [
     {"do": "jog", "rates": [0.1, 0.0, 0.0, 0.0, 0.0], "frame": "tool"},
     {"do": "place", "name": "cup", "T": np.eye(4).tolist()},
     {"do": "program", "text": "- home\n"},
-    {"do": "reset"},
-    {"do": "release"},
+    {"do": "clear_stop"},
+    {"do": "release_lease"},
     {"do": "give", "to": 1},
     {"do": "speed", "value": 0.5},
-    {"do": "look", "at": "arm"},
+    {"do": "query", "at": "arm"},
     {"do": "watch", "hz": 10},
 ]
 """What the mutants come from. No STOP: that is everybody's."""
@@ -268,13 +268,13 @@ def test_nothing_falls_and_nothing_moves(server: AppServer) -> None:
     lines_port = int(server.output.rpartition(f"JSON lines on {HERE}:")[2].split(".")[0])
     with connect_program(server.url, "Driver") as arm:
         arm.ask(requests.Acquire())
-        before = arm.look(answers.State)
-        things = arm.look(answers.Things).things
+        before = arm.query(answers.State)
+        things = arm.query(answers.Things).things
         uuids = asyncio.run(learned(server.url))
         taken = asyncio.run(storm(server, lines_port, uuids))
         print(f"{MESSAGES} messages; lines it took: {taken}")
-        assert kept(arm.look(answers.State)) == kept(before)
-        assert arm.look(answers.Things).things == things
+        assert kept(arm.query(answers.State)) == kept(before)
+        assert arm.query(answers.Things).things == things
         # Whoever drives, drives on.
         q = np.add(before.q, (0.2, 0.0, 0.0, 0.0, 0.0))
         assert np.allclose(arm.joints(q).q, q, atol=1e-9)

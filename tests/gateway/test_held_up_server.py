@@ -41,7 +41,7 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
             async def beat(seconds: float) -> None:
                 end = time.monotonic() + seconds
                 while time.monotonic() < end:
-                    await driver.send('{"do": "beat"}')
+                    await driver.send('{"do": "heartbeat"}')
                     await asyncio.sleep(0.1)
 
             await driver.send('{"do": "speed", "value": 0.1}')
@@ -58,12 +58,12 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
                 return
         state = look(server, "state")
         assert state["stopped"] == "Driver fell silent while the arm moved."
-        halted = [
+        stopped = [
             line["when"]
             for line in look(server, "ledger")["lines"]
-            if line["began"] and line["finding"]["reason"] == "halted"
+            if line["began"] and line["finding"]["reason"] == "stopped"
         ]
-        took = datetime.fromisoformat(halted[-1]).timestamp() - last
+        took = datetime.fromisoformat(stopped[-1]).timestamp() - last
         # As soon as it is awake again, and not once the load has ended.
         assert took < SILENCE + 2 * HELD_UP
 

@@ -483,7 +483,7 @@ def test_a_driver_whose_page_hangs_stops_the_arm_in_time() -> None:
                 await control.wait(mood="stopped")
                 took.append(time.perf_counter() - control.last_beat)
                 control.alive = True
-                await control.say("reset")
+                await control.say("clear_stop")
                 await control.wait(stopped=None)
                 assert await peer.listen()
         return took
@@ -559,6 +559,8 @@ def test_every_answer_tells_the_browser_what_it_may_do(server: AppServer) -> Non
         assert "'unsafe-eval'" not in scripts
 
 
-@pytest.mark.parametrize("path", ["/static/../app/cli/main.py", "/static/%2e%2e/pyproject.toml"])
+@pytest.mark.parametrize(
+    "path", ["/static/../app/katana450/cli/main.py", "/static/%2e%2e/pyproject.toml"]
+)
 def test_no_other_file_is_given_out(server: AppServer, path: str) -> None:
     assert ask(server.url + path)[0] == 404

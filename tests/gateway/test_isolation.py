@@ -35,7 +35,7 @@ def server() -> Iterator[AppServer]:
 def under_way(arm: Client) -> answers.State:
     """Set out for FAR; the state once the arm is on its way."""
     arm.ask(requests.Joints(q=FAR.tolist()))
-    while (state := arm.look(answers.State)).q[0] < 0.2:
+    while (state := arm.query(answers.State)).q[0] < 0.2:
         assert state.stopped is None
     return state
 
@@ -46,7 +46,7 @@ def again(server: AppServer, seconds: float = 20.0) -> answers.State:
     while True:
         # A front that is not quite there yet hangs up, or has no arm yet.
         with suppress(KatanaError, TimeoutError), connect(server.url) as arm:
-            return arm.look(answers.State)
+            return arm.query(answers.State)
         assert time.monotonic() < end, server.output
         time.sleep(0.2)
 
@@ -60,13 +60,13 @@ def test_a_front_that_is_killed_comes_again_and_finds_an_arm_at_rest(server: App
     state = again(server)
     assert server.front != killed
     assert state.stopped == "The arm lost the server and stopped."
-    assert state.status == "halted"
+    assert state.status == "stopped"
     assert before.q[0] < state.q[0] < FAR[0] - 0.2
     assert "ended with status -9" in server.output
     with connect(server.url, "Driver") as arm:
-        arm.ask(requests.Reset())
+        arm.ask(requests.ClearStop())
         time.sleep(0.5)
-        assert arm.look(answers.State).q == state.q
+        assert arm.query(answers.State).q == state.q
         there = arm.joints(np.deg2rad((10.0, -68.0, 85.0, 8.0, 0.0)))
         assert there.status == "ok"
 
@@ -79,7 +79,7 @@ def test_a_front_that_freezes_stops_the_arm_in_time() -> None:
         time.sleep(1.5)
         os.kill(front, signal.SIGCONT)
         # What came meanwhile is read first.
-        while (state := arm.look(answers.State)).stopped is None:
+        while (state := arm.query(answers.State)).stopped is None:
             time.sleep(0.02)
         # A quarter of a second of silence, and the way it takes to brake.
         assert state.q[0] - before.q[0] < 2.2 * 0.5 + 1.0

@@ -38,7 +38,7 @@ def table(session: Session) -> Table:
 
 def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) -> None:
     driver = table.join(PAGES[0])
-    table.hub.drive(driver.person.key)
+    table.touch(driver.person.key)
     table.arm.moves = True
     table.hub.tick()
     assert table.arm.beats == 1
@@ -52,7 +52,7 @@ def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) 
 
 def test_arm_gets_no_heartbeat_for_a_silent_driver_at_rest(table: Table) -> None:
     driver = table.join(PAGES[0])
-    table.hub.drive(driver.person.key)
+    table.touch(driver.person.key)
     table.wait(Settings.silence - TICK)
     beats = table.arm.beats
     table.wait(5 * TICK)
@@ -65,7 +65,7 @@ def test_arm_gets_no_heartbeat_for_a_silent_driver_at_rest(table: Table) -> None
 def test_message_that_waits_for_a_late_server_is_no_silence(table: Table) -> None:
     heartbeat = Received(lambda: table.t)
     driver = table.join(PAGES[0], heartbeat=heartbeat)
-    table.hub.drive(driver.person.key)
+    table.touch(driver.person.key)
     table.arm.moves = True
     for _ in range(5):
         table.t += 2.0
@@ -81,7 +81,7 @@ def test_message_that_waits_for_a_late_server_is_no_silence(table: Table) -> Non
 
 def test_reason_tells_a_silent_window_from_a_closed_one(table: Table) -> None:
     driver = table.join(PAGES[0])
-    table.hub.drive(driver.person.key)
+    table.touch(driver.person.key)
     table.arm.moves = True
     table.hub.leave(driver)
     table.wait(2 * Settings.silence)
@@ -93,20 +93,20 @@ def test_stop_is_requested_until_a_newer_state_is_stopped(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.arm.taken = 0
     table.arm.moves = True
-    table.hub.drive(driver.person.key)
-    table.hub.stop("Vera")
+    table.touch(driver.person.key)
+    table.stop("Vera")
     table.wait(0.2, driver)
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
     # A state that is stopped, but older than the request, confirms nothing.
-    table.arm.halted = True
+    table.arm.stopped = True
     table.wait(TICK, driver)
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
     table.arm.taken = table.arm.stops
     table.wait(TICK, driver)
     assert stage(table) == ("stopped", "confirmed")
     # So does every further press.
-    table.hub.stop("Vera")
-    assert stage(table) == ("stopping", "requested")
+    table.stop("Vera")
+    assert stage(table) == ("stopped", "requested")
     assert table.arm.stops == 2
 
 
@@ -117,7 +117,7 @@ def stage(table: Table) -> tuple[str, str]:
 
 def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> None:
     driver = table.join(PAGES[0])
-    table.hub.drive(driver.person.key)
+    table.touch(driver.person.key)
     table.arm.moves = True
     assert status.health(table.hub) is None
     table.arm.taken, table.arm.age = 0, 0.4
@@ -131,7 +131,7 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
     assert table.hub.stopped == Stopped(
         None, "The arm's process did not answer for 0.6 s.", ticket=1, confirmed=False
     )
-    assert stage(table) == ("stopping", "requested")
+    assert stage(table) == ("stopped", "requested")
 
 
 @pytest.fixture

@@ -16,10 +16,10 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosedError
 
+from katana450.extensions.importers.uploads import WAITING, WAITING_EACH
 from katana450.server.web.acceptor import SILENCE
 from katana450.server.web.admission import SOCKETS_EACH, TOO_MUCH
 from katana450.server.web.bodies import BODY_SECONDS
-from katana450.server.web.uploads import WAITING, WAITING_EACH
 from tests.browser.server import APP, ROOT, AppServer
 from tests.gateway.attack import FEW_DESCRIPTORS, answered, asking, closed, silent, stop_seconds
 from tests.gateway.client import ask, controlling, enter, websocket
@@ -157,7 +157,7 @@ def test_what_is_refused_says_when_to_ask_again(server: AppServer) -> None:
             # No more on each than one connection may say at once.
             for _ in range(700):
                 for line in lines:
-                    await line.send('{"do":"look","at":"world"}')
+                    await line.send('{"do": "query","at":"world"}')
             while True:
                 for line in lines:
                     heard: dict[str, Any] = json.loads(await asyncio.wait_for(line.recv(), 5.0))

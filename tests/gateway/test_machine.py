@@ -68,7 +68,7 @@ def test_every_link_is_where_another_program_has_it(
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
         # It is told driven joints alone, and works out by itself what follows them.
         urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
-        told = {link.name: link.T for link in program.look(answers.Links).links}
+        told = {link.name: link.T for link in program.query(answers.Links).links}
         assert set(told) == set(urdf.link_map)
         for name, T in told.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
@@ -77,7 +77,7 @@ def test_every_link_is_where_another_program_has_it(
 def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
     server: AppServer, program: Client, robot: Robot
 ) -> None:
-    told = program.look(answers.Arm)
+    told = program.query(answers.Arm)
     assert told.joints == list(robot.joint_group.names)
     assert told.slides == list(robot.joint_group.slides)
     assert (told.tools, told.default_tool, told.gripper, told.T_base_shoulder) == (
@@ -87,7 +87,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         None,
     )
     assert "no joints in a row that carry a tool" in told.joints_only
-    state = program.look(answers.State)
+    state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
     cartesian: list[requests.Request] = [
@@ -131,19 +131,19 @@ def test_stop_pause_and_lease_are_those_of_an_arm(
     with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
     program.ask(requests.Pause())
-    while (now := program.look(answers.State)).moving:
+    while (now := program.query(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "paused"
     assert now.q[0] != far[0]
     program.ask(requests.Resume())
     with connect(server.url, "Other") as other:
         other.ask(requests.Stop())
-    while (now := program.look(answers.State)).moving:
+    while (now := program.query(answers.State)).moving:
         time.sleep(0.02)
-    assert now.status == "halted"
+    assert now.status == "stopped"
     assert now.stopped == "Other pressed STOP."
     assert now.q[0] != far[0]
-    with pytest.raises(RefusedError, match="reset it first"):
+    with pytest.raises(RefusedError, match="clear the stop first"):
         program.joints(far)
 
 
@@ -151,11 +151,11 @@ def test_its_world_is_named_too(program: Client, robot: Robot) -> None:
     slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
     axis = robot.axis(robot.joints[slide])
     program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert program.look(answers.State).q[robot.joint_group.names.index(slide)] == pytest.approx(
+    assert program.query(answers.State).q[robot.joint_group.names.index(slide)] == pytest.approx(
         0.05
     )
     program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
-    world = {node.node: node for node in program.look(answers.World).nodes}
+    world = {node.node: node for node in program.query(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
     program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
@@ -179,7 +179,7 @@ def test_a_slider_moves_it_in_its_own_unit(server: AppServer, robot: Robot) -> N
                     await asyncio.sleep(0.05)
             await control.say("home")
             await control.wait(mood="ok")
-            await control.say("release")
+            await control.say("release_lease")
 
     asyncio.run(act())
 

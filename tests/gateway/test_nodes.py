@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.looks import Trait
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -29,10 +28,10 @@ from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
 from katana450.extensions.export.vrml import world_of
 from katana450.extensions.export.vrml_node import FIELDS
+from katana450.extensions.export.vrml_nodes import VrmlNodes
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
-from katana450.server.service.vrml_nodes import Nodes
 from katana450.settings import Settings
 from tests.browser.server import AppServer
 from tests.exchange.conftest import GANTRY
@@ -51,8 +50,8 @@ def rules(arm: MountedArm) -> Session:
 
 
 @pytest.fixture(scope="module")
-def nodes(robot: Robot, rules: Session) -> Nodes:
-    return Nodes(robot, rules.surroundings)
+def nodes(robot: Robot, rules: Session) -> VrmlNodes:
+    return VrmlNodes(robot, rules.surroundings)
 
 
 @pytest.fixture(scope="module")
@@ -70,13 +69,13 @@ def rotation(joint: str, angle: float) -> list[float]:
     return [*AXES.get(joint, (0, 1, 0)), angle]
 
 
-def get(nodes: Nodes, state: State, node: str, field: str) -> Any:
+def get(nodes: VrmlNodes, state: State, node: str, field: str) -> Any:
     (value,) = nodes.read(state, [requests.Named(node=node, field=field)])
     return value.value
 
 
 def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
-    nodes: Nodes, state: State, robot: Robot
+    nodes: VrmlNodes, state: State, robot: Robot
 ) -> None:
     angles = robot.joint_values(state.q, state.gripper)
     file = world_of(robot, angles).named()
@@ -103,7 +102,7 @@ def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
 @settings(max_examples=50, deadline=None)
 @given(st.dictionaries(st.sampled_from(sorted(THERE)), st.floats(-2.0, 2.0), min_size=1))
 def test_joints_are_told_to_go_and_never_put(
-    nodes: Nodes, state: State, wanted: dict[str, float]
+    nodes: VrmlNodes, state: State, wanted: dict[str, float]
 ) -> None:
     said = nodes.command(
         state,
@@ -123,7 +122,7 @@ def test_joints_are_told_to_go_and_never_put(
     assert dict(again.values) == dict(said.values)
 
 
-def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
+def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None:
     said = nodes.command(
         state,
         [
@@ -135,7 +134,7 @@ def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
             setting("finger_right_joint", "rotation", [0, 0, 1, 0.3]),
         ],
     )
-    assert isinstance(said, cmd.Together)
+    assert isinstance(said, cmd.Batch)
     turned, moved, spun, painted, gripped = said.commands
     assert turned == cmd.SetAxes(((0, 0.1), (1, -1.0)))
     assert isinstance(moved, cmd.Shift)
@@ -179,7 +178,7 @@ def test_all_of_a_message_is_one_command(nodes: Nodes, state: State) -> None:
     ],
 )
 def test_what_cannot_be_set_is_refused_with_all_that_came_with_it(
-    nodes: Nodes, state: State, node: str, field: str, value: Any, said: str
+    nodes: VrmlNodes, state: State, node: str, field: str, value: Any, said: str
 ) -> None:
     fine = setting("axis_1", "rotation", [0, 0, 1, 0.1])
     with pytest.raises(InputError, match=said):
@@ -200,7 +199,7 @@ anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
 def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
-    nodes: Nodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
+    nodes: VrmlNodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
 ) -> None:
     try:
         command = nodes.command(state, [setting(*each) for each in said])
@@ -213,7 +212,7 @@ def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
             assert np.isfinite(np.array(each.value)).all()
 
 
-def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
+def test_what_is_held_is_not_moved_by_name(nodes: VrmlNodes, state: State) -> None:
     held = replace(state, things=(replace(state.things[0], held=True),))
     with pytest.raises(InputError, match="open the gripper first"):
         nodes.command(held, [setting("left_cube", "translation", [0, 0, 0])])
@@ -221,7 +220,7 @@ def test_what_is_held_is_not_moved_by_name(nodes: Nodes, state: State) -> None:
 
 def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(robot: Robot) -> None:
     session = described(Settings(), URDF_PATH, None).session
-    nodes = Nodes(robot, session.surroundings)
+    nodes = VrmlNodes(robot, session.surroundings)
     begun = session.begin(session.ready, 0.0, 0.0)
     nodes.command(begun, [setting("cup", "translation", [0.5, -0.5, 0.0])])
     with pytest.raises(InputError, match="nothing carries it there"):
@@ -232,7 +231,7 @@ def test_a_bare_arm_has_no_names_for_the_gripper(robot: Robot) -> None:
     stripped = bare(robot)
     arm = stripped.require_arm()
     session = Session(arm, arm.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
-    nodes = Nodes(stripped, session.surroundings)
+    nodes = VrmlNodes(stripped, session.surroundings)
     told = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
     assert "axis_5" in told
     assert not {name for name in told if "finger" in name or "gripper" in name}
@@ -240,8 +239,8 @@ def test_a_bare_arm_has_no_names_for_the_gripper(robot: Robot) -> None:
 
 def test_what_slides_has_a_translation_along_its_axis() -> None:
     gantry = load(GANTRY)
-    session = JointSession(gantry.joint_group, gantry.distance)
-    nodes = Nodes(gantry, session.surroundings)
+    session = Session(gantry.joint_group, np.zeros(3), travel=gantry.distance)
+    nodes = VrmlNodes(gantry, session.surroundings)
     state = session.begin(np.array((0.2, 0.0, 0.0)), 0.0, 0.0)
     along = np.array((math.cos(0.3), math.sin(0.3), 0.0))
     np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)
@@ -257,7 +256,7 @@ def test_joint_that_rests_has_its_value_and_cannot_be_set(tmp_path: Path) -> Non
     robot = load(written(tmp_path, "arm", [*PX150, pan]))
     arm = robot.require_arm()
     session = Session(arm, arm.ready(Settings().ready))
-    nodes = Nodes(robot, session.surroundings)
+    nodes = VrmlNodes(robot, session.surroundings)
     state = session.begin(session.ready, 0.0, 0.0)
     assert get(nodes, state, "pan", "rotation") == [0.0, 1.0, 0.0, 0.3]
     with pytest.raises(InputError, match="pan stays where it is"):
@@ -266,7 +265,7 @@ def test_joint_that_rests_has_its_value_and_cannot_be_set(tmp_path: Path) -> Non
 
 def arrived(lines: Lines, ticket: int) -> None:
     """Once the arm is at rest with that order in it."""
-    while (now := lines.answer(do="look"))["ticket"] < ticket or now["moving"]:
+    while (now := lines.answer(do="query"))["ticket"] < ticket or now["moving"]:
         time.sleep(0.02)
 
 
@@ -278,7 +277,7 @@ def all_joints(q: dict[str, float]) -> dict[str, Any]:
 
 def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
     with speaking(server, "VR Sink") as lines:
-        before = lines.answer(do="look")["q"]
+        before = lines.answer(do="query")["q"]
         done = lines.answer(do="set", **all_joints(THERE))
         assert done["is"] == "done"
         soon = lines.answer(do="get", node="axis_1", field="rotation")["values"][0]["value"][3]
@@ -296,14 +295,14 @@ def test_a_real_server_is_driven_by_name_on_a_line(server: AppServer) -> None:
         refused = lines.answer(do="set", **bad)
         assert refused["is"] == "refused"
         assert "axis_5 turns about 1 0 0" in refused["why"]
-        assert lines.answer(do="look")["goal"][0] == THERE["axis_1"]
+        assert lines.answer(do="query")["goal"][0] == THERE["axis_1"]
         # STOP is stronger than any name.
         lines.answer(do="stop")
         stopped = lines.answer(do="set", node="axis_1", field="rotation", value=[0, 0, 1, 0])
-        assert "reset it first" in stopped["why"]
-        assert lines.answer(do="reset")["is"] == "done"
+        assert "clear the stop first" in stopped["why"]
+        assert lines.answer(do="clear_stop")["is"] == "done"
         arrived(lines, lines.answer(do="home")["ticket"])
-        lines.answer(do="release")
+        lines.answer(do="release_lease")
 
 
 def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
@@ -340,11 +339,11 @@ def test_the_world_is_painted_moved_and_watched(server: AppServer) -> None:
             with pytest.raises(RefusedError, match="Painter holds"):
                 watcher.ask(requests.Set(node="pan_link_look", field="whichChoice", value=-1))
             assert not painted(watcher)
-        lines.answer(do="release")
+        lines.answer(do="release_lease")
 
 
 def painted(client: Client) -> bool:
-    world = client.look(answers.World)
+    world = client.query(answers.World)
     return any(
         field.value != 0.0
         for node in world.nodes
@@ -368,5 +367,5 @@ def test_it_is_the_same_over_http(server: AppServer) -> None:
     assert (status, said["is"]) == (200, "values")
     status, said = post(server, do="set", node="axis_5", field="rotation", value="round")
     assert (status, said["is"]) == (422, "refused")
-    status, said = post(server, do="release")
+    status, said = post(server, do="release_lease")
     assert status == 200

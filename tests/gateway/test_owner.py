@@ -37,7 +37,7 @@ def arm(server: AppServer) -> Iterator[Client]:
         wait(arm, lambda state: not state.moving)
         with connect(server.url, "Cleaner") as cleaner:
             cleaner.ask(requests.Take())
-            cleaner.ask(requests.Reset())
+            cleaner.ask(requests.ClearStop())
             cleaner.ask(requests.Resume())
             cleaner.ask(requests.Speed(value=1.0))
             cleaner.go(requests.Home())
@@ -47,7 +47,7 @@ def wait(
     arm: Client, until: Callable[[answers.State], bool], seconds: float = 40.0
 ) -> answers.State:
     due = time.monotonic() + seconds
-    while not until(state := arm.look(answers.State)):
+    while not until(state := arm.query(answers.State)):
         assert time.monotonic() < due, (state.program, state.why)
         time.sleep(0.01)
     return state
@@ -67,14 +67,14 @@ def planning(arm: Client) -> None:
     """Have it planned, and run once it is; never a plan that is kept."""
     send(arm, f"{LONG}# {next(NUMBERS)}\n")
     arm.ask(requests.Steer(order=Order.RUN))
-    assert status(arm.look(answers.State)) == "planning"
+    assert status(arm.query(answers.State)) == "planning"
 
 
 def stays(arm: Client, seconds: float = 1.0) -> None:
     """The arm stands still for a while."""
-    before = arm.look(answers.State)
+    before = arm.query(answers.State)
     time.sleep(seconds)
-    after = arm.look(answers.State)
+    after = arm.query(answers.State)
     assert after.q == before.q
     assert not after.moving
 
@@ -86,7 +86,7 @@ def test_pause_during_planning_lasts_until_resume(arm: Client, by: str) -> None:
     arm.ask(request)
     start = wait(arm, lambda state: status(state) != "planning")
     stays(arm)
-    state = arm.look(answers.State)
+    state = arm.query(answers.State)
     assert (status(state), state.status, state.q) == ("paused", "paused", start.q)
     arm.ask(requests.Resume())
     wait(arm, lambda state: status(state) == "running" and state.moving, 5.0)
@@ -98,12 +98,12 @@ def test_pause_during_planning_over_http(server: AppServer, arm: Client) -> None
         assert code == 200
     assert post(server, do="pause")[0] == 200
     due = time.monotonic() + 40.0
-    while (state := post(server, do="look", at="state")[1])["program"]["status"] == "planning":
+    while (state := post(server, do="query", at="state")[1])["program"]["status"] == "planning":
         assert time.monotonic() < due
         time.sleep(0.05)
     assert post(server, do="steer", order="run")[0] == 200
     stays(arm)
-    state = post(server, do="look", at="state")[1]
+    state = post(server, do="query", at="state")[1]
     assert (state["program"]["status"], state["status"]) == ("paused", "paused")
     assert post(server, do="speed", value=0.5)[0] == 200
     code, refused = post(server, "another-that-posts", do="resume")
@@ -124,10 +124,10 @@ def test_hold_stop_and_motions_during_planning_keep_it_from_running(
     planning(arm)
     arm.ask(request_)
     if isinstance(request_, requests.Stop):
-        arm.ask(requests.Reset())
+        arm.ask(requests.ClearStop())
     wait(arm, lambda state: status(state) != "planning")
     stays(arm)
-    state = arm.look(answers.State)
+    state = arm.query(answers.State)
     assert state.program is not None
     assert status(state) == "ready"
     assert state.program.why.startswith("Not run")
@@ -144,8 +144,8 @@ def test_planning_is_cancelled_at_once_and_the_planner_is_free(
         with pytest.raises(RefusedError, match="being planned"):
             send(other, "steps: [home]\n")
         begun = time.monotonic()
-        arm.ask(requests.Steer(order=Order.HALT))
-        assert status(arm.look(answers.State)) == "cancelled"
+        arm.ask(requests.Steer(order=Order.END))
+        assert status(arm.query(answers.State)) == "cancelled"
         send(other, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
         assert time.monotonic() - begun < PROMPT
         state = wait(other, lambda state: status(state) == "ready")
@@ -172,7 +172,7 @@ def test_a_moved_arm_is_planned_for_anew(arm: Client) -> None:
     wait(arm, lambda state: status(state) == "ready")
     arm.joints([0.1, -1.1, 1.4, 0.3, 0.0])
     arm.ask(requests.Steer(order=Order.RUN))
-    program = arm.look(answers.State).program
+    program = arm.query(answers.State).program
     assert program is not None
     assert (program.status, program.why) == ("planning", "Planned anew: the arm has moved.")
     wait(arm, lambda state: status(state) == "done")
@@ -188,7 +188,7 @@ def test_the_owner_paces_it_and_others_only_stop_it(server: AppServer, arm: Clie
         for request in (requests.Pause(), requests.Resume(), requests.Speed(value=1.0)):
             with pytest.raises(RefusedError, match="Long holds the arm"):
                 other.ask(request)
-        assert status(other.look(answers.State)) == "paused"
+        assert status(other.query(answers.State)) == "paused"
         arm.ask(requests.Resume())
         state = wait(arm, lambda state: status(state) == "running" and state.moving, 5.0)
         assert state.speed == 0.2
@@ -215,7 +215,7 @@ def test_the_page_paces_its_own_program_by_both_its_sockets(server: AppServer, a
             async def until(**wanted: Any) -> None:
                 async with asyncio.timeout(40.0):
                     while True:
-                        state = await asyncio.to_thread(arm.look, answers.State)
+                        state = await asyncio.to_thread(arm.query, answers.State)
                         known = {"program": status(state), "speed": state.speed}
                         if all(known[key] == wanted[key] for key in wanted):
                             return

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.lease import Role
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.bench import PlanContext
@@ -17,6 +17,8 @@ from katana450.extensions.programs.order import PATIENCE
 from katana450.server.api.fields import Order
 from katana450.server.service.hub import Window
 from tests.gateway.test_hub import PAGES, Table
+
+NOBODY = Person("nobody", "Nobody", Role.ADMIN)
 
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
@@ -48,7 +50,7 @@ def table(session: Session) -> Staged:
 
 def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
     window = table.join(PAGES[0])
-    table.hub.drive(window.person.key)
+    table.touch(window.person.key)
     table.plan(window)
     assert table.status == "ready"
     table.hub.performer.steer(window, Order.RUN)
@@ -59,7 +61,7 @@ def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
     assert table.hub.lease.holder == holder
     assert any(isinstance(command, cmd.SpeedScale) for command in table.arm.commands)
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        table.hub.drive(window.person.key)
+        table.touch(window.person.key)
 
 
 def test_time_passes_for_it_while_the_arm_tells_nothing_new(table: Staged) -> None:
@@ -101,13 +103,13 @@ def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> 
     performer.steer(owner, Order.RUN)
     for window, said in ((viewer, "watch"), (other, "is Window 1's")):
         with pytest.raises(LeaseError, match=said):
-            performer.touch(window)
+            performer.check_may_touch(window.actor)
         with pytest.raises(LeaseError, match=said):
-            performer.steer(window, Order.HALT)
+            performer.steer(window, Order.END)
     with pytest.raises(LeaseError, match="end it first"):
         table.plan(other)
-    performer.touch(admin)
-    performer.steer(admin, Order.HALT)
+    performer.check_may_touch(admin.actor)
+    performer.steer(admin, Order.END)
     assert table.status == "stopped"
     assert table.hub.lease.holder is None
 
@@ -115,7 +117,7 @@ def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> 
 def test_it_does_not_take_the_arm_from_somebody(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES)
     table.plan(owner)
-    table.hub.drive(other.person.key)
+    table.touch(other.person.key)
     with pytest.raises(LeaseError, match="Window 2 holds the arm"):
         table.hub.performer.steer(owner, Order.RUN)
     assert len(table.hub.windows) == 2
@@ -126,11 +128,11 @@ def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window)
     table.hub.performer.steer(window, Order.RUN)
-    table.hub.stop("Somebody")
+    table.stop("Somebody")
     table.wait(0.1, window)
     assert table.status == "stopped"
-    table.hub.reset(window)
-    table.hub.give_up(window)
+    table.hub.clear_stop(window)
+    table.hub.release_lease(window)
     table.hub.performer.steer(window, Order.RUN)
     table.wait(0.5, window)
     table.hub.leave(window)
@@ -145,11 +147,10 @@ def test_what_the_panel_asked_for_is_done_once_it_is_planned(table: Staged) -> N
     window = table.join(PAGES[0])
     performer = table.hub.performer
     with pytest.raises(LeaseError, match="front page"):
-        performer.plan(SCRIPT, Order.RUN)
-    performer.touch(window)
-    performer.plan(SCRIPT, Order.RUN)
+        performer.plan(SCRIPT, Order.RUN, replace(window.actor, person=NOBODY))
+    performer.plan(SCRIPT, Order.RUN, window.actor)
     with pytest.raises(LeaseError, match="being planned"):
-        performer.plan(SCRIPT, Order.RUN)
+        performer.plan(SCRIPT, Order.RUN, window.actor)
     due = time.monotonic() + 10.0
     while table.status in ("planning", "ready") and time.monotonic() < due:
         table.wait(0.02, window)
@@ -160,10 +161,15 @@ def test_what_the_panel_asked_for_is_done_once_it_is_planned(table: Staged) -> N
 def test_what_was_asked_for_before_a_stop_is_not_done_after_it(table: Staged) -> None:
     window = table.join(PAGES[0])
     performer = table.hub.performer
-    performer.touch(window)
-    performer.plan(SCRIPT, Order.RUN)
-    table.hub.stop("Anybody")
-    table.hub.reset(window)
+    performer.plan(SCRIPT, Order.RUN, window.actor)
+    clicked = table.hub.at_scene(window.person.key, table.hub.gate.revocations)
+    table.stop("Anybody")
+    table.hub.clear_stop(window)
+    # A click that was on its way meanwhile.
+    with pytest.raises(LeaseError, match="Do it again"):
+        performer.plan(SCRIPT, Order.RUN, clicked)
+    with pytest.raises(LeaseError, match="Do it again"):
+        performer.order(Order.RUN, clicked)
     due = time.monotonic() + 10.0
     while table.status == "planning" and time.monotonic() < due:
         time.sleep(0.005)

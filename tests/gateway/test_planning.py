@@ -61,8 +61,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
 
 def ask(table: Staged, window: Window, then: Order | None = Order.RUN) -> None:
     """Run ``SCRIPT`` as the panel of the page asks for it."""
-    table.hub.performer.touch(window)
-    table.hub.performer.plan(SCRIPT, then)
+    table.hub.performer.plan(SCRIPT, then, window.actor)
     table.wait(0.1, window)
 
 
@@ -90,7 +89,7 @@ def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: 
     table.arm.rest = replace(table.arm.rest, paused=True)
     shown = bar(table, window)
     assert shown["headline"] == "Planning Wave, paused"
-    assert shown["orders"] == ["resume", "halt"]
+    assert shown["orders"] == ["resume", "end"]
     finish(table, window, slow)
     assert table.status == "paused"
     assert bar(table, window)["headline"] == "Wave, paused"
@@ -132,19 +131,19 @@ def test_other_commands_during_planning_keep_the_program_from_running(
 def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
-    table.hub.stop("Anybody")
+    table.stop("Anybody")
     performer = table.hub.performer
-    with pytest.raises(LeaseError, match="reset it first"):
+    with pytest.raises(LeaseError, match="clear the stop first"):
         performer.steer(window, Order.RUN)
-    with pytest.raises(LeaseError, match="reset it first"):
-        performer.plan(SCRIPT, Order.RUN)
+    with pytest.raises(LeaseError, match="clear the stop first"):
+        performer.plan(SCRIPT, Order.RUN, window.actor)
     finish(table, window, slow)
     q = table.arm.rest.setpoint + 0.01
     motion = replace(table.arm.rest.motion, q=q)
     table.arm.rest = replace(table.arm.rest, q=q, goal=q, motion=motion)
-    with pytest.raises(LeaseError, match="reset it first"):
+    with pytest.raises(LeaseError, match="clear the stop first"):
         performer.steer(window, Order.RUN)
-    table.hub.reset(window)
+    table.hub.clear_stop(window)
     table.wait(1.0, window)
     assert table.status == "ready"
     assert not performer.running
@@ -153,7 +152,7 @@ def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> 
 def test_a_run_asked_for_while_planning_is_done_after_it(table: Staged, slow: Slow) -> None:
     window, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     ask(table, window, None)
-    assert bar(table, window)["orders"] == ["halt"]
+    assert bar(table, window)["orders"] == ["end"]
     assert bar(table, other)["orders"] == []
     for order in Order:
         with pytest.raises(LeaseError, match="is Window 1's"):
@@ -170,7 +169,7 @@ def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, s
     assert job is not None
     with pytest.raises(LeaseError, match="being planned"):
         table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
-    table.hub.performer.steer(window, Order.HALT)
+    table.hub.performer.steer(window, Order.END)
     assert table.status == "cancelled"
     table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
     assert table.status == "planning"
@@ -204,7 +203,7 @@ def test_a_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) ->
     assert table.status == "running"
     assert table.hub.performer.program is before
     assert slow.begun == 1
-    table.hub.performer.steer(window, Order.HALT)
+    table.hub.performer.steer(window, Order.END)
     table.hub.performer.script(window, SCRIPT, more=False, speed=0.5)
     finish(table, window, slow)
     assert slow.begun == 2
@@ -249,9 +248,9 @@ def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> No
     assert (shown["mood"], shown["headline"]) == ("moving", "Moving")
     assert shown["why"].startswith("Planning Wave. Step 1 of 2")
     table.arm.moves = False
-    table.hub.stop("Anybody")
-    assert bar(table, window)["mood"] == "stopping"
-    table.hub.reset(window)
+    table.stop("Anybody")
+    assert bar(table, window)["mood"] == "stopped"
+    table.hub.clear_stop(window)
     finish(table, window, slow)
     assert bar(table, window)["headline"] == "On target"
 
@@ -261,20 +260,20 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     table.plan(owner)
     performer, hub = table.hub.performer, table.hub
     performer.steer(owner, Order.RUN)
-    hub.move(performer.actor(owner), cmd.Pause())
+    hub.move(owner, cmd.Pause())
     assert isinstance(table.arm.commands[-1], cmd.Pause)
-    hub.set_speed(performer.actor(owner), 0.5)
+    hub.set_speed(owner, 0.5)
     assert table.arm.share == 0.5
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        hub.move(performer.actor(other), cmd.Pause())
+        hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        hub.set_speed(performer.actor(other), 1.0)
+        hub.set_speed(other, 1.0)
     assert bar(table, owner)["orders"] == ["pause"]
     assert bar(table, other)["orders"] == []
     # The page of the owner is loaded anew.
     hub.leave(owner)
     again = table.join(PAGES[0])
-    hub.move(performer.actor(again), cmd.Resume())
+    hub.move(again, cmd.Resume())
 
 
 def test_a_persons_speed_holds_to_the_end_of_the_program(table: Staged) -> None:

@@ -57,9 +57,9 @@ def wait(server: AppServer, status: str, seconds: float = 30.0) -> dict[str, Any
         time.sleep(0.02)
 
 
-def reset(server: AppServer) -> None:
-    assert post(server, do="reset")[0] == 200
-    assert post(server, do="release")[0] == 200
+def clear_stop(server: AppServer) -> None:
+    assert post(server, do="clear_stop")[0] == 200
+    assert post(server, do="release_lease")[0] == 200
 
 
 def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
     # At rest on its way, neither stopped for good nor held by anybody.
     assert (state["stopped"], state["holder"]) == (None, None)
     assert 0.05 < state["q"][0] < np.deg2rad(100) - 0.05
-    reset(server)
+    clear_stop(server)
 
 
 def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> None:
@@ -99,7 +99,7 @@ def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> N
 
             await say(do="program", text=SCRIPT)
             while (await asyncio.to_thread(state_of, server))["program"]["status"] != "ready":
-                await say(do="beat")
+                await say(do="heartbeat")
                 await asyncio.sleep(0.05)
             await say(do="steer", order="run")
             began = time.monotonic()
@@ -109,4 +109,4 @@ def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> N
     took, state = asyncio.run(act())
     assert Settings.owner_silence <= took < Settings.owner_silence + BRAKING
     assert "Owner fell silent" in state["program"]["why"]
-    reset(server)
+    clear_stop(server)

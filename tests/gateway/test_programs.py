@@ -42,13 +42,13 @@ def server() -> Iterator[AppServer]:
 def arm(server: AppServer) -> Iterator[Client]:
     with connect(server.url, "Test") as arm:
         yield arm
-        state = arm.look(answers.State)
+        state = arm.query(answers.State)
         if state.program is not None and state.program.status in ("running", "paused"):
-            arm.ask(requests.Steer(order=Order.HALT))
-        arm.ask(requests.Reset())
+            arm.ask(requests.Steer(order=Order.END))
+        arm.ask(requests.ClearStop())
         arm.go(requests.Resume())
         arm.go(requests.Home())
-        arm.ask(requests.Release())
+        arm.ask(requests.ReleaseLease())
 
 
 def planned(arm: Client, text: str) -> answers.Progress:
@@ -64,7 +64,7 @@ def wait(
 ) -> answers.Progress:
     due = time.monotonic() + seconds
     while time.monotonic() < due:
-        program = arm.look(answers.State).program
+        program = arm.query(answers.State).program
         assert program is not None
         if until(program):
             return program
@@ -79,17 +79,17 @@ def run(arm: Client, order: Order = Order.RUN) -> None:
 
 def test_a_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
     run(arm)
-    during = arm.look(answers.State)
+    during = arm.query(answers.State)
     assert during.holder is not None
     assert during.holder.startswith("There and back")
     lines = set()
-    while (program := arm.look(answers.State).program) is not None and program.status == "running":
+    while (program := arm.query(answers.State).program) is not None and program.status == "running":
         lines.add(program.line)
         time.sleep(0.02)
     assert program is not None
     assert (program.status, program.why) == ("done", "")
     assert {3, 4, 5} <= lines
-    after = arm.look(answers.State)
+    after = arm.query(answers.State)
     assert after.holder is None
     assert np.abs(np.array(after.q) - READY).max() < 1e-9
 
@@ -102,22 +102,22 @@ def test_stop_ends_it_in_the_middle(arm: Client) -> None:
     assert program.status == "stopped"
     assert "STOP" in program.why
     time.sleep(0.5)
-    state = arm.look(answers.State)
+    state = arm.query(answers.State)
     assert not state.moving
     assert np.abs(state.qd).max() == 0.0
-    with pytest.raises(RefusedError, match="reset"):
+    with pytest.raises(RefusedError, match="clear the stop first"):
         arm.ask(requests.Steer(order=Order.RUN))
 
 
-def test_it_pauses_steps_and_is_halted(arm: Client) -> None:
+def test_it_pauses_steps_and_is_ended(arm: Client) -> None:
     run(arm, Order.STEP)
     assert wait(arm, lambda program: program.status == "paused").line == 4
     arm.ask(requests.Steer(order=Order.RESUME))
     wait(arm, lambda program: program.line == 5 and program.share > 0.1)
     arm.ask(requests.Steer(order=Order.PAUSE))
     assert wait(arm, lambda program: program.status == "paused").line == 5
-    arm.ask(requests.Steer(order=Order.HALT))
-    state = arm.look(answers.State)
+    arm.ask(requests.Steer(order=Order.END))
+    state = arm.query(answers.State)
     assert state.program is not None
     assert state.program.status == "stopped"
     assert state.holder is None
@@ -130,7 +130,7 @@ def test_the_arm_can_be_taken_from_it(server: AppServer, arm: Client) -> None:
         program = wait(boss, lambda program: program.status != "running", 1.0)
         assert program.status == "stopped"
         assert "taken" in program.why
-        boss.ask(requests.Release())
+        boss.ask(requests.ReleaseLease())
 
 
 def test_it_ends_when_whoever_started_it_leaves(server: AppServer) -> None:
@@ -141,7 +141,7 @@ def test_it_ends_when_whoever_started_it_leaves(server: AppServer) -> None:
         assert program.status == "stopped"
         assert "left" in program.why
         watcher.go(requests.Home())
-        watcher.ask(requests.Release())
+        watcher.ask(requests.ReleaseLease())
 
 
 def test_what_is_wrong_is_told_with_its_lines(arm: Client) -> None:
@@ -188,10 +188,10 @@ def test_from_the_command_line(server: AppServer, tmp_path: Path, interrupted: b
     assert "Traceback" not in error
     assert ("the arm holds" in error) if interrupted else ("Done." in said)
     with connect(server.url, "Watcher") as watcher:
-        state = watcher.look(answers.State)
+        state = watcher.query(answers.State)
         assert state.program is not None
         assert state.program.status == ("stopped" if interrupted else "done")
         assert state.holder is None
         watcher.go(requests.Home())
-        assert not watcher.look(answers.State).moving
-        watcher.ask(requests.Release())
+        assert not watcher.query(answers.State).moving
+        watcher.ask(requests.ReleaseLease())

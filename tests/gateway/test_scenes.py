@@ -16,18 +16,18 @@ import trimesh
 
 from katana450.arm.control.lease import Role
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.initial_scene import furnished
 from katana450.assembly.robot_session import described
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
+from katana450.extensions.importers.initial_scene import furnished
 from katana450.extensions.importers.scene_file import SCENE
 from katana450.extensions.importers.shape_file import MOST_BYTES
+from katana450.extensions.importers.uploads import AT_ONCE
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Matrix4
 from katana450.server.web.access_links import AccessFile
-from katana450.server.web.uploads import AT_ONCE
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.gateway import client
@@ -85,11 +85,11 @@ def arm(server: AppServer, tokens: dict[str, str]) -> Iterator[Client]:
     with connect(server.url, "Test", tokens["operator"]) as arm:
         arm.ask(requests.Acquire())
         yield arm
-        arm.ask(requests.Release())
+        arm.ask(requests.ReleaseLease())
 
 
 def things(arm: Client) -> dict[str, answers.Thing]:
-    return {each.name: each for each in arm.look(answers.Things).things}
+    return {each.name: each for each in arm.query(answers.Things).things}
 
 
 def until(true: Callable[[], bool]) -> None:
@@ -104,7 +104,7 @@ def test_the_server_begins_with_its_scene_and_objects(server: AppServer, arm: Cl
     assert list(now) == ["cup", "gate", "ring"]
     assert now["gate"].colour == "#2477d4"
     np.testing.assert_allclose(np.array(now["ring"].T)[:3, 3], (0.3, -0.4, 0.05), atol=1e-12)
-    state = arm.look(answers.State)
+    state = arm.query(answers.State)
     assert state.q[0] == pytest.approx(np.radians(10.0), abs=1e-12)
     assert state.water is not None
     assert state.water.cup_ml == pytest.approx(80.0, abs=1e-9)
@@ -129,7 +129,7 @@ def test_a_mesh_is_placed_fixed_to_the_hand_and_met(arm: Client, ring: Path, rob
     arm.ask(requests.Attach(name="it", to=requests.Mount.HAND, T=_rows(on_tool)))
     until(lambda: things(arm)["it"].fixed)
     mounted = robot.require_arm()
-    T = mounted.T_base_shoulder @ forward(mounted.chain, np.array(arm.look(answers.State).q))
+    T = mounted.T_base_shoulder @ forward(mounted.chain, np.array(arm.query(answers.State).q))
     np.testing.assert_allclose(things(arm)["it"].T, T @ on_tool, atol=1e-9)
     arm.ask(requests.Place(name="it", colour="#ff0000", hidden=True))
     until(lambda: things(arm)["it"].hidden)
@@ -203,7 +203,7 @@ def test_what_is_too_much_is_refused(
     assert 429 in seen
     # From another site's page nothing comes in.
     assert ask(f"{url}/mesh?name=a.stl", data=b"x", Origin="https://evil.example")[0] == 403
-    assert arm.look(answers.State).status == "ok"
+    assert arm.query(answers.State).status == "ok"
 
 
 def test_who_only_watches_brings_nothing(
@@ -230,10 +230,10 @@ def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path)
     ):
         broken.write_text(text)
         with pytest.raises(InputError, match=said):
-            furnished(robot, broken, [])
+            furnished(robot.session, broken, [])
     for told in ("/nowhere/it.stl", f"{scene}@1,2,x"):
         with pytest.raises(InputError, match=r"it\.stl cannot be read|no format"):
-            furnished(robot, None, [told])
+            furnished(robot.session, None, [told])
 
 
 def _rows(T: Any) -> Matrix4:

@@ -8,7 +8,6 @@ import sys
 import sysconfig
 import venv
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -65,7 +64,7 @@ def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(params=["app.py", "app/__init__.py"])
-def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """Return the folder of a user who has files with our old names, and works there."""
     for name in (request.param, "static/__init__.py", "robot_description/__init__.py"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -101,6 +100,16 @@ def test_package_is_imported_from_the_wheel(python: Path, folder: Path) -> None:
     words = "import katana450; print(katana450.__file__)"
     imported = Path(run(folder, python, "-c", words).strip())
     assert imported.is_relative_to(python.parents[1])
+
+
+def test_library_is_used_beside_files_of_the_user(python: Path, folder: Path) -> None:
+    words = (
+        "import katana450; arm = katana450.load(); print(arm.fk([0, 0, 0, 0, 0])[0].tolist()); "
+        "print(arm.circle((0.15, 0.0, -0.11), 0.1).end.shape)"
+    )
+    first, second = run(folder, python, "-c", words).splitlines()
+    assert first.startswith("[1.0, 0.0, 0.0, 0.63")
+    assert second == "(5,)"
 
 
 def test_commands_run_beside_files_of_the_user(python: Path, folder: Path) -> None:

@@ -16,7 +16,7 @@ from katana450.errors import InputError
 from katana450.maths.planning.curve import ToolLines
 from katana450.maths.planning.pacing import fastest
 from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
-from katana450.maths.planning.scaling import Bounds, Scaling, gone_after, rest_to_rest
+from katana450.maths.planning.scaling import Bounds, Scaling, motion_after, rest_to_rest
 from katana450.maths.planning.tool_path import ToolPath
 from tests.planning.time_optimal import least_time
 
@@ -139,10 +139,14 @@ def test_the_time_from_rest_to_rest_is_that_of_ruckig(way: float, a: float, j: f
     Ruckig(1).calculate(wanted, trajectory)
     assert rest_to_rest(way, a, j) == pytest.approx(trajectory.duration, rel=1e-6)
     for t in np.linspace(0.0, trajectory.duration, 21).tolist():
-        (there,), _, _ = trajectory.at_time(t)
-        assert gone_after(t, way, a, j) == pytest.approx(there, rel=1e-5, abs=1e-6 * way)
-    assert gone_after(-1.0, way, a, j) == 0.0
-    assert gone_after(trajectory.duration + 1.0, way, a, j) == way
+        (there,), (speed,), (acceleration,) = trajectory.at_time(t)
+        place, first, second = motion_after(t, way, a, j)
+        assert place == pytest.approx(there, rel=1e-5, abs=1e-6 * way)
+        # Ruckig knows its times to 1e-8 s or so: the slack is that times the next derivative.
+        assert first == pytest.approx(speed, rel=1e-5, abs=1e-6 * (1.0 + a))
+        assert second == pytest.approx(acceleration, rel=1e-5, abs=1e-5 * (1.0 + j))
+    assert motion_after(-1.0, way, a, j) == (0.0, 0.0, 0.0)
+    assert motion_after(trajectory.duration + 1.0, way, a, j) == (way, 0.0, 0.0)
 
 
 def test_numbers_that_are_none_are_refused(arm: Arm) -> None:

@@ -189,9 +189,9 @@ def test_stop_ends_it_and_so_does_a_person(stage: Stage, program: Program) -> No
         if end == "stop":
             state = stage.session.step(state, [cmd.Stop()], state.t + 0.01)
         elif end == "elsewhere":
-            state = stage.session.step(state, [cmd.Stretch()], state.t + 0.01)
+            state = stage.session.step(state, [cmd.GoToZero()], state.t + 0.01)
         else:
-            run, commands = runner.halted(run, "Enough.")
+            run, commands = runner.stopped(run, "Enough.")
             state = stage.session.step(state, commands, state.t + 0.01)
         for _ in range(300):
             run, state = stage.tick(program, run, state)

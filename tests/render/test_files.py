@@ -19,7 +19,7 @@ from PIL import Image
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.render import film, tracer
 from katana450.extensions.render.film import write_film
-from katana450.extensions.render.png import png
+from katana450.png import png
 
 Pixels = npt.NDArray[np.uint8]
 

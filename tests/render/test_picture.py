@@ -18,12 +18,12 @@ from katana450.arm.robot.surfaces import Material, Shape
 from katana450.extensions.render.camera import Camera
 from katana450.extensions.render.line import tube
 from katana450.extensions.render.picture import Picture, picture
-from katana450.extensions.render.png import png
 from katana450.extensions.render.scene import Item, Scene
 from katana450.extensions.render.sight import FLOOR, NOWHERE, look
 from katana450.extensions.render.tracer import Tracer
 from katana450.extensions.render.water import CUP
 from katana450.maths.geometry import se3
+from katana450.png import png
 from katana450.resources import URDF_PATH
 from katana450.server.view.room import DARK, LIGHT, THEMES
 from tests.exchange.conftest import POSES

@@ -269,7 +269,7 @@ def test_they_are_served_with_their_grippers(tmp_path: Path, joints: list[J]) ->
         assert "Traceback" not in server.output
         assert "Joints only" not in server.output
         with connect(server.url) as client:
-            arm = client.look(answers.Arm)
+            arm = client.query(answers.Arm)
             assert arm.gripper is not None
             closed, opened, _ = arm.gripper
             assert arm.gripper_slides == (opened < 0.1)

@@ -12,13 +12,16 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import Arm
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason, Verdict
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd, FrontEnd
 from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.errors import InputError
 
 SILENCE = 0.3
@@ -62,7 +65,7 @@ def until(true: Callable[[], bool], seconds: float = 5.0) -> None:
 
 
 def test_a_command_goes_over_and_its_ticket_comes_back(ends: Ends) -> None:
-    tickets = [ends.front.put(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
+    tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]
     assert ends.front.last_ticket == 3
     until(lambda: ends.front.board.snapshot.ticket == 3)
@@ -84,20 +87,20 @@ def alive(ends: Ends, true: Callable[[], bool]) -> None:
 
 def test_what_cannot_be_asked_does_not_go_over(ends: Ends) -> None:
     with pytest.raises(InputError, match="no axis 9"):
-        ends.front.put(cmd.SetJoint(8, 0.1))
+        ends.front.deliver(cmd.SetJoint(8, 0.1))
     assert ends.front.last_ticket == 0
 
 
 def test_more_than_can_be_taken_is_still_answered_for(ends: Ends) -> None:
     for _ in range(3000):
-        ends.front.put(cmd.Home())
+        ends.front.deliver(cmd.Home())
     until(lambda: ends.front.board.snapshot.ticket == 3000)
 
 
 def test_the_ledger_comes_over_entry_by_entry(ends: Ends) -> None:
-    ends.front.put(cmd.SetJoint(0, 99.0))
+    ends.front.deliver(cmd.SetJoint(0, 99.0))
     until(lambda: bool(ends.front.board.ledger))
-    ends.front.put(cmd.SetJoint(0, 0.0))
+    ends.front.deliver(cmd.SetJoint(0, 0.0))
     until(lambda: len(ends.front.board.ledger) == len(ends.loop.board.ledger) == 2)
     told = [(e.t, e.finding, e.began) for e in ends.front.board.ledger]
     assert told == [(e.t, e.finding, e.began) for e in ends.loop.board.ledger]
@@ -109,26 +112,26 @@ def test_the_ledger_comes_over_entry_by_entry(ends: Ends) -> None:
 
 def test_a_front_that_falls_silent_stops_an_arm_that_moves(ends: Ends) -> None:
     time.sleep(2 * SILENCE)
-    assert ends.loop.board.snapshot.state.halted is None
-    ends.front.put(cmd.SetJoint(0, 2.0))
+    assert ends.loop.board.snapshot.state.stopped is None
+    ends.front.deliver(cmd.SetJoint(0, 2.0))
     began = time.monotonic()
-    until(lambda: ends.loop.board.snapshot.state.halted is not None)
+    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
     assert SILENCE < time.monotonic() - began < 2 * SILENCE
     until(lambda: not ends.loop.board.snapshot.state.moving)
 
 
 def test_a_pipe_that_breaks_stops_the_arm_and_the_next_front_moves_nothing(ends: Ends) -> None:
-    ends.front.put(cmd.SetJoint(0, 2.0))
+    ends.front.deliver(cmd.SetJoint(0, 2.0))
     alive(ends, lambda: ends.front.board.snapshot.state.moving)
     with socket.socket(fileno=os.dup(ends.theirs.fileno())) as line:
         line.shutdown(socket.SHUT_RDWR)
     until(ends.arm_end.cut.is_set, 2.0)
-    until(lambda: ends.loop.board.snapshot.state.halted is not None)
+    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
     ends.arm_end, again = ends.connect()
-    assert again.board.snapshot.state.halted is not None
+    assert again.board.snapshot.state.stopped is not None
     until(lambda: not again.board.snapshot.state.moving)
-    again.put(cmd.Release())
-    until(lambda: again.board.snapshot.state.halted is None)
+    again.deliver(cmd.ClearStop())
+    until(lambda: again.board.snapshot.state.stopped is None)
     q = again.board.snapshot.state.q
     time.sleep(0.2)
     np.testing.assert_array_equal(again.board.snapshot.state.q, q)
@@ -142,3 +145,50 @@ def test_an_arm_that_hangs_up_is_heard_by_its_front(ends: Ends) -> None:
 def test_how_late_the_ticks_are_is_told_now_and_then(ends: Ends) -> None:
     until(lambda: ends.front.board.lateness.count > 50)
     assert ends.front.board.lateness.period == 0.01
+
+
+def test_actor_goes_over_and_is_named_in_the_event_log(ends: Ends) -> None:
+    actor = Actor(Person("a key", "Anna", Role.OPERATOR), CommandChannel.API, None, Grounds.LEASE)
+    ends.front.deliver(cmd.SetJoint(0, 99.0), actor)
+    until(lambda: bool(ends.front.board.ledger))
+    (entry,) = ends.front.board.ledger
+    assert (entry.actor, entry.command) == (actor, "SetJoint")
+    # A stop of the arm's own process is nobody's.
+    ends.mailbox.put(cmd.Stop())
+    until(lambda: ends.front.board.ledger[-1].finding.reason is Reason.STOPPED)
+    assert (ends.front.board.ledger[-1].actor, ends.front.board.ledger[-1].command) == (
+        None,
+        "Stop",
+    )
+
+
+def test_outcomes_come_back_by_the_tickets_of_the_front(ends: Ends) -> None:
+    front, wait = ends.front, 5.0
+    outcomes = front.board.outcomes
+    fine, far = front.deliver(cmd.SetJoint(0, 0.1)), front.deliver(cmd.SetJoint(1, 99.0))
+    assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
+    limited = outcomes.of(far).result(wait)
+    assert limited.verdict is Verdict.LIMITED
+    assert [found.axis for found in limited.findings] == [1]
+    # A stop that the front has not seen yet, as of an arm that lost it.
+    ends.mailbox.put(cmd.Stop())
+    late = outcomes.of(front.deliver(cmd.SetJoint(0, 0.2))).result(wait)
+    assert late.verdict is Verdict.REFUSED
+    assert "clear the stop first" in late.why
+    # A ticket that was recorded before it is asked for.
+    assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
+    both = front.deliver(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
+    assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
+    assert outcomes.of(front.deliver(cmd.ClearStop())).result(wait).verdict is Verdict.ACCEPTED
+
+
+def test_a_command_for_a_full_mailbox_is_refused_and_not_only_dropped(ends: Ends) -> None:
+    ends.loop.stop()
+    for _ in range(CAPACITY):
+        ends.mailbox.put(cmd.Home())
+    ticket = ends.front.deliver(cmd.Home())
+    time.sleep(0.2)
+    ends.loop.tick()
+    outcome = ends.front.board.outcomes.of(ticket).result(5.0)
+    assert outcome.verdict is Verdict.REFUSED
+    assert "slower" in outcome.why

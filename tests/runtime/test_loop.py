@@ -71,7 +71,7 @@ def test_an_arm_at_rest_publishes_nothing(table: LoopOnATable) -> None:
     resting = table.loop.board.snapshot
     table.tick(50)
     assert table.loop.board.snapshot is resting
-    table.mailbox.put(cmd.Settle())
+    table.mailbox.put(cmd.EndDrag())
     table.tick()
     assert table.loop.board.snapshot is not resting
 

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
-from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
+from katana450.arm.runtime.mailbox import CAPACITY, Drained, Mailbox, Submission
 from katana450.errors import InputError
 
 
@@ -19,19 +19,21 @@ def mailbox(session: Session) -> Mailbox:
 
 
 def test_commands_come_out_once_in_the_order_they_went_in(mailbox: Mailbox) -> None:
-    sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Reset()]
+    sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Hold()]
     tickets = [mailbox.put(command) for command in sent]
     assert tickets == [1, 2, 3]
-    assert mailbox.drain() == (sent, 3)
-    assert mailbox.drain() == ([], 3)
+    submissions = [Submission(each, None) for each in sent]
+    assert mailbox.drain() == Drained(submissions, [[1], [2], [3]], [], 3)
+    assert mailbox.drain() == Drained([], [], [], 3)
 
 
 def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) -> None:
     for i in range(50):
         mailbox.put(cmd.MoveTool(np.array([0.3, 0.0, 0.001 * i])))
-    commands, ticket = mailbox.drain()
-    assert ticket == 50 == mailbox.last_ticket
-    (last,) = commands
+    drained = mailbox.drain()
+    assert drained.last == 50 == mailbox.last_ticket
+    assert drained.tickets == [list(range(1, 51))]
+    (last,) = drained.commands
     assert isinstance(last, cmd.MoveTool)
     assert last.position[2] == 0.049
 
@@ -39,13 +41,22 @@ def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) 
 def test_sliders_of_two_axes_do_not_swallow_each_other(mailbox: Mailbox) -> None:
     for command in (cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.0), cmd.SetJoint(1, -1.1)):
         mailbox.put(command)
-    assert mailbox.drain()[0] == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
+    assert mailbox.drain().commands == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
+
+
+def test_a_stop_reports_what_it_drops(mailbox: Mailbox) -> None:
+    for command in (cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetJoint(0, 0.2), cmd.Stop()):
+        mailbox.put(command)
+    mailbox.put(cmd.Home())
+    assert mailbox.drain() == Drained(
+        [Submission(cmd.Stop(), None), Submission(cmd.Home(), None)], [[4], [5]], [1, 2, 3], 5
+    )
 
 
 def test_a_button_pressed_twice_is_two_commands(mailbox: Mailbox) -> None:
     mailbox.put(cmd.Home())
     mailbox.put(cmd.Home())
-    assert len(mailbox.drain()[0]) == 2
+    assert len(mailbox.drain().commands) == 2
 
 
 def test_a_flood_is_refused_and_what_waits_is_kept(mailbox: Mailbox) -> None:
@@ -53,14 +64,14 @@ def test_a_flood_is_refused_and_what_waits_is_kept(mailbox: Mailbox) -> None:
         mailbox.put(cmd.Home())
     with pytest.raises(InputError, match="slower"):
         mailbox.put(cmd.Home())
-    assert len(mailbox.drain()[0]) == CAPACITY
+    assert len(mailbox.drain().commands) == CAPACITY
     assert mailbox.put(cmd.Home()) == CAPACITY + 1
 
 
 def test_what_the_arm_cannot_be_asked_does_not_enter(mailbox: Mailbox) -> None:
     with pytest.raises(InputError, match="no axis 9"):
         mailbox.put(cmd.SetJoint(8, 0.0))
-    assert mailbox.drain() == ([], 0)
+    assert mailbox.drain() == Drained([], [], [], 0)
 
 
 def test_threads_lose_nothing(mailbox: Mailbox) -> None:
@@ -72,6 +83,6 @@ def test_threads_lose_nothing(mailbox: Mailbox) -> None:
     for writer in writers:
         writer.start()
     while any(writer.is_alive() for writer in writers):
-        taken += mailbox.drain()[0]
-    taken += mailbox.drain()[0]
+        taken += mailbox.drain().commands
+    taken += mailbox.drain().commands
     assert len(taken) == 240

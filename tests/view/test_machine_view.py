@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.looks import Looks, Trait
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
@@ -24,6 +24,7 @@ from katana450.server.view.paint import PaintNodes
 from katana450.server.view.programs import STEERING
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
+from tests.view.gestures import RecordedGestures
 
 
 @pytest.fixture
@@ -34,7 +35,8 @@ def robot(tmp_path: Path) -> Robot:
 
 
 def standing(robot: Robot) -> State:
-    session = JointSession(robot.joint_group, robot.distance)
+    joints = robot.joint_group
+    session = Session(joints, joints.ready, travel=robot.distance)
     return session.begin(session.ready, 0.0, 0.0)
 
 
@@ -71,14 +73,8 @@ def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
 def test_the_panel_has_a_slider_a_joint_and_says_why(
     server: viser.ViserServer, robot: Robot
 ) -> None:
-    said: list[Any] = []
-
-    def put(command: Any) -> int:
-        said.append(command)
-        return len(said)
-
     state = standing(robot)
-    MachinePanel(server.gui, robot.joint_group, put, state)
+    MachinePanel(server.gui, robot.joint_group, RecordedGestures(), state)
     controls = {
         handle.label: handle for handle in server.gui._gui_input_handle_from_uuid.values()
         if isinstance(handle, viser.GuiSliderHandle)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import viser
 
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -23,6 +24,7 @@ from katana450.server.api.fields import Order
 from katana450.server.view.preview import GHOSTS
 from katana450.server.view.programs import ProgramsPanel, _page
 from tests.browser.server import free_port
+from tests.view.gestures import ANNA, RecordedGestures
 
 
 class ProgramRunner:
@@ -33,10 +35,10 @@ class ProgramRunner:
         self.program: Program | None = None
         self.asked: list[tuple[str, Order | None]] = []
 
-    def plan(self, text: str, then: Order | None) -> None:
+    def plan(self, text: str, then: Order | None, _actor: Actor) -> None:
         self.asked.append((text, then))
 
-    def steer(self, order: Order) -> None:
+    def steer(self, order: Order, _actor: Actor) -> None:
         self.asked.append(("", order))
 
 
@@ -63,7 +65,9 @@ def test_it_previews_steers_and_teaches(
 ) -> None:
     performer = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(server, robot, performer, Scripts(tmp_path), lambda: state)
+    panel = ProgramsPanel(
+        server, robot, performer, Scripts(tmp_path), RecordedGestures(), lambda: state
+    )
     # Not the first, which is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
@@ -78,19 +82,19 @@ def test_it_previews_steers_and_teaches(
     assert np.abs(points[:, :2] - points[0, :2]).max() < 1e-6
 
     panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
-    panel._order()
+    panel._order(ANNA)
     performer.told = Told(name="x", by="me", status="running")
     for said in ("Wait", "Run", "End"):
         panel._orders.value = said  # type: ignore[misc]  # likewise
-        panel._order()
+        panel._order(ANNA)
     assert [order for _, order in performer.asked] == [
-        Order.RUN, Order.PAUSE, Order.RUN, Order.HALT
+        Order.RUN, Order.PAUSE, Order.RUN, Order.END
     ]  # fmt: skip
     assert parse(performer.asked[0][0]).name == "Circle with gripper"
 
     for said in ("Add pose", "Add pose", "Save"):
         panel._teach.value = said  # type: ignore[misc]  # likewise
-        panel._on_teach()
+        panel._on_teach(ANNA)
     assert len(parse((tmp_path / "My script.yaml").read_text(encoding="utf-8")).steps) == 2
     assert panel._choice.value == "My script"
 
@@ -100,7 +104,9 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
 ) -> None:
     performer = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ProgramsPanel(server, robot, performer, Scripts(tmp_path), lambda: state)
+    panel = ProgramsPanel(
+        server, robot, performer, Scripts(tmp_path), RecordedGestures(), lambda: state
+    )
     rig = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
     program = compiled(parse(text), rig, state)
@@ -117,7 +123,7 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     # Nobody asked to see it.
     assert not ghosts()
     panel._orders.value = "Preview"  # type: ignore[misc]  # viser declares it read-only
-    panel._order()
+    panel._order(ANNA)
     performer.program = compiled(parse(text), rig, state)
     performer.told = Told(name="x", by="me", status="ready")
     panel.follow()

@@ -17,13 +17,15 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Look
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.things import Environment, Form, Thing
+from katana450.arm.robot.creases import drawn, glb
+from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
-from katana450.extensions.importers.creases import drawn, glb
-from katana450.extensions.importers.meshes import Mesh, Meshes, read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.maths.water.environment import Table
 from katana450.server.view.objects import NOTHING, ObjectsPanel
 from katana450.server.view.things import ThingNodes
 from katana450.server.view.tint import Tint
+from tests.view.gestures import RecordedGestures
 
 PATH = "/things/1"
 
@@ -52,8 +54,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
 ) -> None:
     meshes = Meshes()
     meshes.put([mesh], ())
-    put: list[cmd.Command] = []
-    nodes = ThingNodes(server, load_props(), Environment(None, None), put.append, meshes)
+    nodes = ThingNodes(server, load_props(), Environment(None, None), RecordedGestures(), meshes)
     state = session.begin(session.ready, 0.0, 0.0)
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
 
@@ -94,7 +95,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
 def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
-    nodes = ThingNodes(server, load_props(), Environment(None, None), print, Meshes())
+    nodes = ThingNodes(server, load_props(), Environment(None, None), RecordedGestures(), Meshes())
     state = session.begin(session.ready, 0.0, 0.0)
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
     nodes.follow(seen(state, thing))
@@ -126,9 +127,10 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     server: viser.ViserServer, session: Session
 ) -> None:
     """The person hears why when they let go, and the handle comes back to the cup."""
-    put: list[cmd.Command] = []
+    gestures = RecordedGestures()
+    put = gestures.commands
     around = Environment(None, None, Table((-0.25, 0.75), (-0.7, 0.7), -0.025))
-    nodes = ThingNodes(server, load_props(), around, put.append, Meshes())
+    nodes = ThingNodes(server, load_props(), around, gestures, Meshes())
     cup = Thing("cup", Form.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
     nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))
     told: list[str] = []
@@ -136,7 +138,7 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
 
     def drag(phase: str, x: float) -> None:
         target = SimpleNamespace(position=(x, 0.1, 0.0))
-        event: Any = SimpleNamespace(phase=phase, target=target, client=client)
+        event: Any = SimpleNamespace(phase=phase, target=target, client=client, client_id=1)
         nodes._moved("cup", event)
 
     drag("start", 0.7)
@@ -155,7 +157,7 @@ def test_the_panel_shows_the_object_there_is(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    panel = ObjectsPanel(server, lambda _: 0, lambda: state, session.surroundings)
+    panel = ObjectsPanel(server, RecordedGestures(), lambda: state, session.surroundings)
     assert panel._choice.value == NOTHING
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid, scale=2.0, look=Look((9, 8, 7)))
     other = replace(thing, name="other", scale=1.0)

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from multiprocessing.connection import Connection
 
-from katana450.arm.control.joint_session import JointSession
+from katana450.arm.control.things import Environment
+from katana450.arm.robot.object_meshes import Meshes
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
-from katana450.assembly.robot_session import recognised
+from katana450.assembly.robot_session import Described, recognised
 from katana450.errors import ConfigurationError
-from katana450.extensions.export.reachability_file import load_map
-from katana450.extensions.importers.meshes import Meshes
+from katana450.extension import serve_extensions
 from katana450.extensions.programs.script_files import Scripts
-from katana450.server.service.arm_handle import Motion
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.arm_handle import ArmHandle
+from katana450.server.service.nodes import Nodes
 from katana450.server.view.follower import Follower
+from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.view import View, ViewOptions
 from katana450.server.web.web_server import Gateway
@@ -28,23 +31,65 @@ def attached(
 
     ``meshes``: those that things are of. Raises ConfigurationError, EOFError.
     """
-    settings, workspace = outfit.settings, outfit.workspace
+    settings, layers = outfit.settings, _layers(outfit.options)
     found = recognised(settings, outfit.urdf, outfit.tool)
     robot, session, _ = found
     link = FrontEnd(pipe, session.check)
-    nodes = Nodes(robot, session.surroundings)
-    if isinstance(session, JointSession):
-        if workspace is not None:
-            raise ConfigurationError(f"{workspace} maps where a tool can be. {robot.why}")
-        rate = settings.frame_rate
-        machine_view = MachineView(gateway.viser, robot, link.board, link, rate)
-        gateway.attach(Motion(robot, session, link, None, nodes, machine_view.let_go))
-        return link, machine_view
-    stored = None if workspace is None else load_map(workspace)
-    besides = ViewOptions(stored, (gateway.steering, Scripts(settings.programs)), meshes)
+    nodes = _nodes(outfit.options, robot, session.surroundings)
+    if robot.arm is None:
+        for layer in layers:
+            if layer.what:
+                raise ConfigurationError(f"{layer.what} {robot.why}")
+        gateway.attach(ArmHandle(robot, session, link, None, nodes))
+        return link, _machine_view(gateway, outfit, robot, link)
+    besides = ViewOptions(layers, (gateway.steering, Scripts(settings.programs)), meshes)
     navigator = PlanningWorker(session, link.board, link)
-    view = View(gateway.viser, robot, link.board, navigator, session, settings.frame_rate, besides)
+    view = _view(gateway, outfit, found, link, besides)
     navigator.tell = gateway.announce
     navigator.redirected = gateway.steering.redirected
-    gateway.attach(Motion(robot, session, link, navigator, nodes, view.let_go))
+    gateway.attach(ArmHandle(robot, session, link, navigator, nodes))
     return link, view
+
+
+def _layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
+    """Return what the extensions show in the scene of an arm."""
+    if options is None:
+        return ()
+    found = [part.view_layer(options) for part in serve_extensions() if part.view_layer is not None]
+    return tuple(layer for layer in found if layer is not None)
+
+
+def _nodes(options: Namespace | None, robot: Robot, environment: Environment) -> Nodes:
+    """Return the nodes of the first extension that names any, else the links alone."""
+    for part in () if options is None else serve_extensions():
+        if part.nodes is not None:
+            return part.nodes(robot, environment)
+    return Nodes(robot)
+
+
+def _view(
+    gateway: Gateway, outfit: FrontendConfig, found: Described, link: FrontEnd, besides: ViewOptions
+) -> View:
+    return View(
+        gateway.viser,
+        found.robot,
+        link.board,
+        gateway.gestures,
+        lambda: link.last_ticket,
+        found.session,
+        outfit.settings.frame_rate,
+        besides,
+    )
+
+
+def _machine_view(
+    gateway: Gateway, outfit: FrontendConfig, robot: Robot, link: FrontEnd
+) -> MachineView:
+    return MachineView(
+        gateway.viser,
+        robot,
+        link.board,
+        gateway.gestures,
+        lambda: link.last_ticket,
+        outfit.settings.frame_rate,
+    )

@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import signal
 import socket
+from argparse import Namespace
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -16,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 from katana450.assembly.log_lines import start_log
 from katana450.errors import ConfigurationError, KatanaError
+from katana450.extension import serve_extensions
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
-    from katana450.extensions.importers.meshes import Mesh
+    from katana450.arm.robot.object_meshes import Mesh
 
 START_SECONDS = 60.0
 GOODBYE_SECONDS = 5.0
@@ -36,8 +38,8 @@ class FrontendConfig:
     """What a front is given each time it is started.
 
     ``urdf``, ``tool``: see ``robot.loader.load``. ``listening``: the port for browsers. ``lines``:
-    the one for JSON lines. ``workspace``: file of a reachability map. ``meshes``: those of the
-    things there are at first.
+    the one for JSON lines. ``options``: those of the extensions; None where none takes part.
+    ``meshes``: those of the things there are at first.
     """
 
     settings: Settings
@@ -45,7 +47,7 @@ class FrontendConfig:
     tool: str | None
     listening: socket.socket
     lines: socket.socket | None
-    workspace: Path | None
+    options: Namespace | None
     meshes: tuple[Mesh, ...]
 
 
@@ -129,13 +131,15 @@ def _run(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
 
 
 def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
-    from katana450.extensions.importers.meshes import Meshes
+    from katana450.arm.robot.object_meshes import Meshes
     from katana450.server.viser_bridge.viser_server import close_server
     from katana450.server.web.web_server import Gateway
 
     kept = Meshes()
     kept.put(outfit.meshes, ())
-    gateway = Gateway(outfit.settings, outfit.listening, outfit.lines, kept)
+    taking_part = () if outfit.options is None else serve_extensions()
+    routes = [part.routes for part in taking_part if part.routes is not None]
+    gateway = Gateway(outfit.settings, outfit.listening, outfit.lines, kept, routes)
     gateway.start()
     telling.send(OPEN)
     try:

@@ -39,4 +39,4 @@ def start_log() -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(LineFormatter())
     logging.basicConfig(handlers=[handler])
-    logging.getLogger("app").setLevel(logging.INFO)
+    logging.getLogger("katana450").setLevel(logging.INFO)

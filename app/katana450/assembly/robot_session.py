@@ -9,15 +9,14 @@ from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.session import Session
 from katana450.arm.control.things import Hand, Thing
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -27,7 +26,6 @@ from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.scene.scene import Scene
 from katana450.server.view.texts import UNCHECKED
 from katana450.settings import Settings
 
@@ -37,18 +35,15 @@ PROMPT = -10
 """Niceness of the process that moves the arm, where the system allows it."""
 
 
-S = TypeVar("S", Session, JointSession)
-
-
-class Described(NamedTuple, Generic[S]):
+class Described(NamedTuple):
     """A robot as its files describe it, the rules for it, and sentences on what they leave open."""
 
     robot: Robot
-    session: S
+    session: Session
     notes: tuple[str, ...]
 
 
-def described(settings: Settings, urdf: Path, tool: str | None) -> Described[Session]:
+def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     """Return the robot with an arm in the file ``urdf``.
 
     ``tool``: the link its targets are set for; see ``load``. Raises RobotDescriptionError for a
@@ -57,9 +52,7 @@ def described(settings: Settings, urdf: Path, tool: str | None) -> Described[Ses
     return arm_session(settings, load(urdf, tool))
 
 
-def recognised(
-    settings: Settings, urdf: Path, tool: str | None
-) -> Described[Session] | Described[JointSession]:
+def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described:
     """Return the robot in the file ``urdf``: with all its arm can do, or driven joint by joint.
 
     Raises RobotDescriptionError for a robot that is neither, and for one without an arm where a
@@ -72,13 +65,13 @@ def recognised(
         if tool is not None or settings.bare:
             raise
         robot = replace(robot, arm=None, why=str(error))
-    session = JointSession(robot.joint_group, robot.distance)
-    return Described(
-        robot, session, (*robot.notes, *robot.joint_notes, f"Joints only. {robot.why}")
-    )
+    joints = robot.joint_group
+    session = Session(joints, joints.ready, travel=robot.distance)
+    notes = (*robot.notes, *robot.joint_notes, f"Joints only. {robot.why}")
+    return Described(robot, session, notes)
 
 
-def arm_session(settings: Settings, robot: Robot) -> Described[Session]:
+def arm_session(settings: Settings, robot: Robot) -> Described:
     """Return ``robot`` with the rules for its arm. Raises RobotDescriptionError without an arm."""
     if settings.bare:
         robot = bare(robot)
@@ -108,10 +101,7 @@ class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
     def __init__(
-        self,
-        settings: Settings,
-        found: Described[Session] | Described[JointSession],
-        scene: Scene | None = None,
+        self, settings: Settings, found: Described, scene: InitialScene | None = None
     ) -> None:
         """``scene``: what stands around in place of the robot's own, and where the arm stands."""
         robot, session, self.notes = found
@@ -120,7 +110,7 @@ class RunningArm:
         driver = SimulatedDriver(arm, start, gripper=0.0)
         self._mailbox = Mailbox(session.check)
         if scene is not None:
-            self._mailbox.put(cmd.Furnish(scene.things, scene.water))
+            self._mailbox.put(scene.command)
         self._loop = ControlLoop(
             session, driver, self._mailbox, MonotonicClock(), settings.rate, settings.silence
         )

@@ -7,21 +7,22 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from argparse import Namespace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
 from katana450.assembly.frontend_process import OPEN, READY, Front, FrontendConfig
 from katana450.assembly.log_lines import start_log
+from katana450.extension import serve_extensions
 from katana450.resources import URDF_PATH
 from katana450.server.web.listen import HERE, listen
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.arm.control.session import Session
+    from katana450.arm.robot.initial_scene import InitialScene
     from katana450.assembly.robot_session import Described
-    from katana450.extensions.importers.scene_file import StoredScene
 
 AWAKE = 0.2
 """[s] How soon a signal is heeded, and a front that ended."""
@@ -38,23 +39,41 @@ HUNG = 10.0
 log = logging.getLogger(__name__)
 
 
+def serve_with(options: Namespace) -> int:
+    """Run the app with the options of ``katana450 serve``; see ``serve``."""
+    settings = Settings(
+        host=options.host,
+        port=options.port,
+        silence=options.silence,
+        owner_silence=options.owner_silence,
+        access=options.access,
+        insecure=options.insecure,
+        tls_cert=options.tls_cert,
+        tls_key=options.tls_key,
+        public_url=options.public_url,
+        lines=options.lines,
+        bare=options.bare,
+        programs=options.programs,
+    )
+    # Sent to another process, which has no use for the command itself.
+    values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})
+    return serve(settings, options.urdf, options.tool, values)
+
+
 def serve(
     settings: Settings,
     urdf: Path = URDF_PATH,
     tool: str | None = None,
-    workspace: Path | None = None,
-    scene: Path | None = None,
-    objects: Sequence[str] = (),
+    options: Namespace | None = None,
 ) -> int:
     """Run the app until SIGINT or SIGTERM; returns the exit status, 1 if the control loop ended.
 
     ``urdf``, ``tool``: the arm, and the link its targets are set for; see ``robot.loader.load``.
-    ``workspace``: file of a reachability map that can be shown. ``scene``, ``objects``: see
-    ``furnished``.
+    ``options``: those of the extensions; None where none takes part.
     """
     start_log()
     # Read before anything runs: the front shows what it is given here, each time it is started.
-    robot, stored = _furnished(settings, (urdf, tool), scene, objects)
+    robot, scene = _with_scene(settings, urdf, tool, options)
     stopping = threading.Event()
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
@@ -67,15 +86,15 @@ def serve(
     lines = None if settings.lines is None else listen(HERE, settings.lines)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
-    meshes = () if stored is None else stored.meshes
-    outfit = FrontendConfig(settings, urdf, tool, listening, lines, workspace, meshes)
+    meshes = () if scene is None else scene.meshes
+    outfit = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
     current, arm = Front(outfit), None
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
         from katana450.assembly.robot_session import RunningArm, recognised
 
         found = recognised(settings, urdf, tool) if robot is None else robot
-        arm = RunningArm(settings, found, None if stored is None else stored.scene)
+        arm = RunningArm(settings, found, scene)
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr)
         current.wait_for(OPEN)
@@ -116,23 +135,28 @@ def serve(
     return 0 if stopping.is_set() else 1
 
 
-def _furnished(
-    settings: Settings,
-    urdf_and_tool: tuple[Path, str | None],
-    scene: Path | None,
-    objects: Sequence[str],
-) -> tuple[Described[Session] | None, StoredScene | None]:
-    """The robot and what stands around it, where somebody says what."""
-    if scene is None and not objects:
+def _with_scene(
+    settings: Settings, urdf: Path, tool: str | None, options: Namespace | None
+) -> tuple[Described | None, InitialScene | None]:
+    """Return the scene that an extension starts with, and the robot if it had to be read for it."""
+    if options is None:
         return None, None
-    from katana450.assembly.initial_scene import furnished
-    from katana450.assembly.robot_session import described
+    read: list[Described] = []
 
-    robot = described(settings, *urdf_and_tool)
-    stored, said = furnished(robot, scene, objects)
-    for sentence in said:
-        print(f"katana450: {sentence}", flush=True)
-    return robot, stored
+    def session() -> Session:
+        from katana450.assembly.robot_session import described
+
+        if not read:
+            read.append(described(settings, urdf, tool))
+        return read[0].session
+
+    scene = None
+    for part in serve_extensions():
+        if scene is None and part.initial_scene is not None:
+            scene = part.initial_scene(options, session)
+    for note in () if scene is None else scene.notes:
+        print(f"katana450: {note}", flush=True)
+    return (read[0] if read else None), scene
 
 
 def _address(settings: Settings, port: int) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from katana450.cli.arm_options import add_arm_options
+from katana450.extension import serve_extensions
 from katana450.settings import Settings
 
 SHORTEST_SILENCE, LONGEST_SILENCE, LONGEST_OWNER_SILENCE = 0.2, 2.0, 10.0
@@ -21,27 +23,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--workspace",
-        type=Path,
-        metavar="FILE.npz",
-        help="a map written by `katana450 workspace --out`, to be shown in the scene",
-    )
-    parser.add_argument(
-        "--scene",
-        type=Path,
-        metavar="FILE",
-        help="what stands around: a scene.yaml with its meshes beside it, or a .zip of both",
-    )
-    parser.add_argument(
-        "--object",
-        dest="objects",
-        action="append",
-        default=[],
-        metavar="FILE[@x,y,z]",
-        help="an object besides, of a .wrl, .stl, .obj, .ply, .glb or .gltf file; where it stands "
-        "in mm, else in front of the arm; as often as there are",
     )
     parser.add_argument(
         "--silence",
@@ -94,6 +75,10 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help="a TCP port of this machine for programs that speak a line of JSON at a time",
     )
+    for part in serve_extensions():
+        if part.add_options is not None:
+            part.add_options(parser)
+    add_arm_options(parser)
 
 
 def _silence(text: str) -> float:

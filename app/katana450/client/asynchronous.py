@@ -45,7 +45,7 @@ class AsyncClient:
         self._waiting: dict[Id, asyncio.Future[answers.Answer]] = {}
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
-        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
+        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._heartbeat())]
 
     async def close(self) -> None:
         """Hang up."""
@@ -73,9 +73,9 @@ class AsyncClient:
         """Say ``request`` and wait for no answer: for streams, Servo and Jog."""
         await self._say(request)
 
-    async def look(self, kind: type[A]) -> A:
+    async def query(self, kind: type[A]) -> A:
         """One of answers.State, Arm, Ledger, Branches, Loop, Things, World, Links."""
-        answer = await self.ask(requests.Look(at=kind.__name__.lower()))  # type: ignore[arg-type]
+        answer = await self.ask(requests.Query(at=kind.__name__.lower()))  # type: ignore[arg-type]
         if not isinstance(answer, kind):
             raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
         return answer
@@ -120,6 +120,13 @@ class AsyncClient:
         """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
         return await self.go(requests.Joints(q=np.asarray(q, dtype=float).tolist()))
 
+    async def nudge(self, axis: int, by: float) -> answers.State:
+        """Drive the joint ``axis``, from 1, on by the angle ``by`` [rad]; see ``go``.
+
+        ``why`` of the state says so where the joint's range limits it.
+        """
+        return await self.go(requests.Nudge(axis=axis, by=by))
+
     async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """Bring the mesh in ``file`` to the server, to be placed by its key.
 
@@ -150,10 +157,10 @@ class AsyncClient:
             self._lose(f"The server has read nothing for {ASKED_FOR:g} s.")
             raise LostError(f"The server has read nothing for {ASKED_FOR:g} s.") from error
 
-    async def _beat(self) -> None:
+    async def _heartbeat(self) -> None:
         while True:
-            await self._say(requests.Beat())
-            await asyncio.sleep(self.welcome.beat)
+            await self._say(requests.Heartbeat())
+            await asyncio.sleep(self.welcome.heartbeat)
 
     async def _listen(self) -> None:
         try:

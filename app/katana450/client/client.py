@@ -38,9 +38,9 @@ class Client:
         """See ``AsyncClient.tell``."""
         self._wait(self._client.tell(request))
 
-    def look(self, kind: type[A]) -> A:
-        """See ``AsyncClient.look``."""
-        return self._wait(self._client.look(kind))
+    def query(self, kind: type[A]) -> A:
+        """See ``AsyncClient.query``."""
+        return self._wait(self._client.query(kind))
 
     def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
         """See ``AsyncClient.go``."""
@@ -49,6 +49,10 @@ class Client:
     def joints(self, q: npt.ArrayLike) -> answers.State:
         """See ``AsyncClient.joints``."""
         return self._wait(self._client.joints(q))
+
+    def nudge(self, axis: int, by: float) -> answers.State:
+        """See ``AsyncClient.nudge``."""
+        return self._wait(self._client.nudge(axis, by))
 
     def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """See ``AsyncClient.upload``."""

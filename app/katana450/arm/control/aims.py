@@ -1,4 +1,4 @@
-"""How a state comes to another goal, and what it leaves behind by that."""
+"""Transforms of a state: to another goal, another mode, a pause, or a place on a plan."""
 
 from __future__ import annotations
 
@@ -6,10 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.commands import Command, Servo, SetAxes, SetJoint
-from katana450.arm.control.following import Following
-from katana450.arm.control.state import GRIPPER_LIMITS, Finding, JointTarget, Reason, State, Target
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.arm.control.commands import Command, Servo
+from katana450.arm.control.modes import (
+    Following,
+    Intent,
+    JointTarget,
+    Leaving,
+    Positioning,
+    Servoing,
+    Tracking,
+)
+from katana450.arm.control.state import GRIPPER_LIMITS, Finding, Reason, State
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.stream import Stream
@@ -22,96 +30,115 @@ OLDEST = 0.1
 """[s] A sample that says it came earlier than this before its tick was stamped by another clock."""
 
 
-def gone(state: State, target: Target, goal: FloatArray, findings: tuple[Finding, ...]) -> State:
-    """With ``goal`` as near to ``target`` as the arm will go, for the reasons ``findings``."""
+def with_mode(state: State, mode: Intent | Following) -> State:
+    """``state`` in ``mode``; an arm on a plan leaves the plan first."""
+    along = state.following
+    if along is None or isinstance(mode, Following):
+        return replace(state, mode=mode)
+    return replace(state, mode=Leaving(along, mode))
+
+
+def with_goal(
+    state: State,
+    goal: FloatArray,
+    findings: tuple[Finding, ...] = (),
+    mode: Intent | Following | None = None,
+) -> State:
+    """``state`` with ``goal`` (n,) for the reasons ``findings``, in ``mode``.
+
+    Without a mode it is positioning at the goal.
+    """
     kept = tuple(f for f in state.findings if f.reason in GRIPPER_LIMITS)
     pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
-    # What the arm brakes for stays the reason, however often it is told anew meanwhile.
+    # A contact that the arm brakes for stays the reason, however often a goal is given meanwhile.
     met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
-    aimed = replace(
-        state,
-        target=target,
-        goal=goal,
-        findings=pause + met + findings + kept,
-        mode=None,
-    )
-    return leaving(aimed)
+    aimed = replace(state, goal=goal, findings=pause + met + findings + kept)
+    return with_mode(aimed, Positioning(JointTarget(goal)) if mode is None else mode)
 
 
-def without(state: State, reason: Reason) -> State:
+def without_finding(state: State, reason: Reason) -> State:
     """``state`` with no finding of that ``reason``."""
     return replace(state, findings=tuple(f for f in state.findings if f.reason is not reason))
 
 
-def leaving(state: State) -> State:
-    """``state`` that follows a plan no longer than it takes to leave it."""
-    if state.following is None:
-        return state
-    return replace(state, following=replace(state.following, leaving=True))
+def let_go(state: State) -> State:
+    """``state`` after the end of a drag: the goal becomes the target.
 
-
-def turned(state: State, command: SetJoint | SetAxes) -> JointTarget:
-    """Some axes to other angles, the rest to where they were going."""
-    q = np.array(state.goal)
-    for axis, value in (
-        ((command.axis, command.value),) if isinstance(command, SetJoint) else command.values
-    ):
-        q[axis] = value
-    return JointTarget(frozen(q))
+    An arm that waits before a contact stays where it is. The findings stay: they say why the handle
+    springs back.
+    """
+    match state.intent:
+        case Tracking() as tracking:
+            return with_mode(state, replace(tracking, let_go=True))
+        case Positioning():
+            state = replace(state, goal=state.setpoint if state.blocked else state.goal)
+            return with_mode(replace(state, blocked=False), Positioning(JointTarget(state.goal)))
+    goal = state.setpoint if state.blocked else state.goal
+    return replace(state, goal=goal, blocked=False)
 
 
 def paused(state: State) -> State:
     """``state`` that comes to rest on its way and keeps its goal."""
-    told = without(state, Reason.PAUSED).findings
-    return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *told))
+    others = without_finding(state, Reason.PAUSED).findings
+    return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *others))
 
 
 def resumed(state: State) -> State:
-    """``state`` that goes on after a pause."""
-    return without(replace(state, paused=False), Reason.PAUSED)
+    """``state`` that continues after a pause."""
+    return without_finding(replace(state, paused=False), Reason.PAUSED)
 
 
 def streamed(state: State, aimed: State, command: Servo, acceleration: FloatArray) -> State:
-    """``aimed``, which is ``state`` with the newest of a stream as its goal, in that stream.
+    """``aimed``, which is ``state`` with the newest sample of a stream as its goal, in that stream.
 
-    acceleration: (n,) the most of each joint.
+    acceleration: (n,) the maximum of each joint.
     """
     t = state.t if command.t is None else command.t
     if state.servo is None:
-        return replace(aimed, mode=Stream.begun(t, aimed.goal, command.qd))
+        return with_mode(aimed, Servoing(Stream.begun(t, aimed.goal, command.qd)))
     stream = state.servo.followed_by(t, aimed.goal, command.qd, acceleration)
-    return replace(aimed, mode=stream)
+    return with_mode(aimed, Servoing(stream))
 
 
 def stamped(command: Command, t: float) -> Command:
-    """``command`` in the tick at ``t`` [s]: one of a stream came then, unless it says when."""
+    """``command`` in the tick at ``t`` [s]: a sample of a stream came then, unless it says when."""
     if not isinstance(command, Servo) or (command.t is not None and 0.0 <= t - command.t < OLDEST):
         return command
     return replace(command, t=t)
 
 
-def begun(chain: Chain, state: State, plan: Plan) -> State:
-    """``state`` that follows ``plan`` from here, if the arm stands at its start."""
+def follow_plan(chain: Chain, state: State, plan: Plan) -> State:
+    """``state`` that follows ``plan`` from here.
+
+    Where the arm does not stand at the start nothing changes but the finding that says so.
+    """
     off = np.abs(state.setpoint - plan.start)
     if off.max() > AT_START or not state.motion.at_rest:
         axis = int(off.argmax())
-        told = without(state, Reason.NOT_AT_START).findings
+        others = without_finding(state, Reason.NOT_AT_START).findings
         return replace(
-            state, findings=(*told, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
+            state, findings=(*others, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
         )
     return _along(chain, state, Following.begun(plan))
 
 
-def gone_along(chain: Chain, state: State, share: float) -> State:
-    """``state`` that goes on or back on its plan; without one there is nowhere to go."""
-    following = state.following
-    if following is None or following.leaving:
+def go_along(chain: Chain, state: State, fraction: float) -> State:
+    """``state`` that continues or goes back on its plan to ``fraction`` of it, from 0 to 1."""
+    assert isinstance(state.mode, Following)
+    towards = fraction * state.mode.plan.span
+    return _along(chain, state, replace(state.mode, towards=towards))
+
+
+def with_place(state: State, along: Following | None) -> State:
+    """``state`` at the place ``along`` on the plan it follows or is leaving."""
+    if along is None or along is state.following:
         return state
-    return _along(chain, state, replace(following, towards=share * following.plan.span))
+    if isinstance(state.mode, Leaving):
+        return replace(state, mode=replace(state.mode, along=along))
+    return replace(state, mode=along)
 
 
 def _along(chain: Chain, state: State, following: Following) -> State:
-    """With the goal where ``following`` ends."""
+    """``state`` with its goal where ``following`` ends."""
     goal = following.goal
-    state = replace(state, branch=branch_of(chain, goal))
-    return replace(gone(state, JointTarget(goal), goal, ()), following=following)
+    return with_goal(replace(state, branch=branch_of(chain, goal)), goal, (), following)

@@ -63,6 +63,11 @@ class Arm:
     acceleration: FloatArray | None = None
     jerk: FloatArray | None = None
 
+    @property
+    def slides(self) -> tuple[bool, ...]:
+        """(n,) whether each joint is prismatic: none is."""
+        return (False,) * self.chain.n
+
     @cached_property
     def limits(self) -> Limits:
         """Of the joints' motion, gentle where nobody says."""

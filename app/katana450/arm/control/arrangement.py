@@ -1,4 +1,4 @@
-"""What stands around put elsewhere or taken away, and how it and the links are shown."""
+"""Transforms of a state by the commands about objects: where they are, and how they look."""
 
 from __future__ import annotations
 
@@ -6,11 +6,49 @@ from dataclasses import replace
 
 import numpy as np
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control import solid
 from katana450.arm.control.looks import Choice, Look
+from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.state import State
 from katana450.arm.control.thing_commands import Dress, Shift
-from katana450.arm.control.things import Thing, named
+from katana450.arm.control.things import Environment, Thing, furnished_with, named, placed
+
+
+def arranged(
+    surroundings: Environment, pouring: Pouring | None, state: State, command: cmd.Command
+) -> State:
+    """``state`` after a command about objects, the water, or how they are shown."""
+    x = state.x_setpoint
+    match command:
+        case cmd.Place(thing=thing):
+            return replace(state, things=placed(state.things, thing))
+        case cmd.Remove(name=name):
+            return removed(state, name)
+        case cmd.Shift():
+            return shifted(state, command)
+        case cmd.Dress():
+            return dressed(state, command)
+        case cmd.Attach(name=name, to=to):
+            mounted = tuple(
+                surroundings.mounted(each, to, x) if each.name == name else each
+                for each in state.things
+            )
+            return replace(state, things=mounted)
+        case cmd.Furnish(things=things, volume=volume):
+            furnished = replace(state, things=furnished_with(state.things, things))
+            return filled(pouring, furnished, volume)
+        case cmd.Fill(volume=volume):
+            return filled(pouring, state, volume)
+    raise AssertionError(f"The table of transitions has no rule for {command!r}.")
+
+
+def filled(pouring: Pouring | None, state: State, volume: float | None) -> State:
+    """``state`` with ``volume`` [m^3] of water in the cup; None for no water."""
+    if volume is None:
+        return replace(state, poured=None)
+    assert pouring is not None
+    return replace(state, poured=pouring.fill(volume, state.things, state.x_setpoint))
 
 
 def removed(state: State, name: str) -> State:

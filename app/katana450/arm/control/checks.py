@@ -1,4 +1,4 @@
-"""What an arm cannot even be asked."""
+"""Checks of commands against the robot, before they are taken: what it cannot even be asked."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import Arm
+from katana450.arm.control.joints import Joints
 from katana450.arm.control.pouring import CUP, Pouring
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Mount, Thing
@@ -14,18 +15,29 @@ from katana450.errors import InputError
 NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
 
 
+def check_joints(joints: Joints, command: cmd.Command) -> None:
+    """Raise InputError if a robot with ``joints`` and no arm cannot be asked for ``command``."""
+    match command:
+        case cmd.Batch(commands=commands):
+            for each in commands:
+                check_joints(joints, each)
+        case _ if not command.traits.joints_only:
+            raise InputError(joints.refusal)
+        case cmd.AxisCommand():
+            command.targets(np.zeros(joints.n))
+        case cmd.SetJoints(q=q) | cmd.Servo(q=q):
+            joints.check(q)
+
+
 def check(
     arm: Arm, pouring: Pouring | None, surroundings: Environment, command: cmd.Command
 ) -> None:
     """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
     n = arm.chain.n
     match command:
-        case cmd.SetJoint(axis=axis) if axis >= n:
-            raise InputError(f"There is no axis {axis + 1}: this arm has {n}.")
-        case cmd.SetAxes(values=values):
-            for axis, value in values:
-                check(arm, pouring, surroundings, cmd.SetJoint(axis, value))
-        case cmd.Together(commands=commands):
+        case cmd.AxisCommand():
+            command.targets(np.zeros(n))
+        case cmd.Batch(commands=commands):
             for each in commands:
                 check(arm, pouring, surroundings, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):

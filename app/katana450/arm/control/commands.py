@@ -7,10 +7,21 @@ of the right shape; whether the arm can do it is the session's to judge.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from katana450.arm.control.checked import check_finite, vector
+from katana450.arm.control.joint_commands import (
+    JOG_TIME,
+    AxisCommand,
+    Servo,
+    SetAxes,
+    SetJoint,
+    SetJoints,
+    with_axes,
+)
 from katana450.arm.control.thing_commands import (
-    THINGS,
     Attach,
     Dress,
     Fill,
@@ -18,6 +29,10 @@ from katana450.arm.control.thing_commands import (
     Place,
     Remove,
     Shift,
+)
+from katana450.arm.control.traits import (
+    BaseCommand,
+    Traits,
 )
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
@@ -30,22 +45,27 @@ from katana450.maths.planning.plan import Plan
 __all__ = [
     "JOG_TIME",
     "LEAST_SPEED",
-    "THINGS",
     "Attach",
+    "AxisCommand",
+    "BaseCommand",
+    "Batch",
+    "ClearStop",
     "Command",
     "Dress",
+    "EndDrag",
     "Fill",
     "Follow",
     "Furnish",
     "GoAlong",
+    "GoToZero",
+    "Hold",
     "Home",
     "Jog",
     "MoveTool",
+    "Nudge",
     "Pause",
     "Place",
-    "Release",
     "Remove",
-    "Reset",
     "Resume",
     "Servo",
     "SetAxes",
@@ -55,83 +75,22 @@ __all__ = [
     "SetPose",
     "SetReading",
     "SetTool",
-    "Settle",
     "Shift",
     "SpeedScale",
     "Stop",
-    "Stretch",
     "TakeBranch",
-    "Together",
     "TurnTool",
 ]
 
 LEAST_SPEED = 0.01
 """A share below this is a hold, for which there are Pause and Stop."""
 
-JOG_TIME = 0.2
-"""[s] How long a jog goes on by itself."""
-
-
-@dataclass(frozen=True)
-class SetJoint:
-    """Drive one joint to ``value`` [rad]; ``axis`` counts from 0."""
-
-    axis: int
-    value: float
-
-    def __post_init__(self) -> None:
-        if isinstance(self.axis, bool) or not isinstance(self.axis, int) or self.axis < 0:
-            raise InputError(f"An axis is a whole number from 0, not {self.axis!r}.")
-        check_finite(f"The angle of axis {self.axis + 1}", self.value)
-
-
-@dataclass(frozen=True)
-class SetAxes:
-    """Drive some joints, each (axis, value): the value in [rad], the axis counted from 0.
-
-    The others go on to where they were going.
-    """
-
-    values: tuple[tuple[int, float], ...]
-
-    def __post_init__(self) -> None:
-        for axis, value in self.values:
-            SetJoint(axis, value)
-
 
 @dataclass(frozen=True, eq=False)
-class SetJoints:
-    """Drive all joints to ``q``, (n,) [rad]."""
-
-    q: FloatArray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "q", vector("The joint vector", self.q, None))
-
-
-@dataclass(frozen=True, eq=False)
-class Servo:
-    """Keep up with ``q``, (n,) [rad], which is one of a stream; for JOG_TIME after the last.
-
-    qd: (n,) how fast it changes [rad/s]; without it that is seen from the stream. t: when it came
-    [s], on the clock of ``State.t``; None for the tick that takes it.
-    """
-
-    q: FloatArray
-    qd: FloatArray | None = None
-    t: float | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "q", vector("The joint vector", self.q, None))
-        if self.qd is not None:
-            object.__setattr__(self, "qd", vector("The joint rates", self.qd, self.q.size))
-        if self.t is not None:
-            check_finite("The time of the sample", self.t)
-
-
-@dataclass(frozen=True, eq=False)
-class MoveTool:
+class MoveTool(BaseCommand):
     """Bring the tool point to ``position``, (3,) [m] in {S}; pitch and roll stay as wished."""
+
+    traits: ClassVar[Traits] = Traits(stream=True)
 
     position: FloatArray
 
@@ -140,12 +99,14 @@ class MoveTool:
 
 
 @dataclass(frozen=True)
-class TurnTool:
+class TurnTool(BaseCommand):
     """Give the tool a pitch and a roll [rad]; its position stays as wished.
 
     ``pitch`` is the angle of the tool below the horizontal, theta2 + theta3 + theta4, and ``roll``
     the turn about the tool's own axis, theta5: the two rotations a 5-axis arm is free to choose.
     """
+
+    traits: ClassVar[Traits] = Traits(stream=True)
 
     pitch: float
     roll: float
@@ -156,8 +117,10 @@ class TurnTool:
 
 
 @dataclass(frozen=True, eq=False)
-class SetPose:
+class SetPose(BaseCommand):
     """Bring the tool to the pose ``T``, (4, 4) in {S}, as near as five axes can."""
+
+    traits: ClassVar[Traits] = Traits(stream=True)
 
     T: FloatArray
 
@@ -166,8 +129,30 @@ class SetPose:
 
 
 @dataclass(frozen=True)
-class SetGripper:
+class Nudge(AxisCommand):
+    """Drive one joint on by the relative angle ``by`` [rad]; ``axis`` counts from 0.
+
+    The angle counts from the joint's goal, so that several in a row add up. The limits of the joint
+    limit it.
+    """
+
+    traits: ClassVar[Traits] = Traits(joints_only=True)
+
+    axis: int
+    by: float
+
+    def __post_init__(self) -> None:
+        SetJoint(self.axis, self.by)
+
+    def targets(self, goal: FloatArray) -> FloatArray:
+        return frozen(goal + with_axes(np.zeros(goal.size), ((self.axis, self.by),)))
+
+
+@dataclass(frozen=True)
+class SetGripper(BaseCommand):
     """Drive the finger joint to ``angle`` [rad]."""
+
+    traits: ClassVar[Traits] = Traits(stream=True, supersedes=False, passive=True)
 
     angle: float
 
@@ -176,15 +161,19 @@ class SetGripper:
 
 
 @dataclass(frozen=True)
-class SetTool:
+class SetTool(BaseCommand):
     """From now on targets and read-outs are of the tool frame ``name``; nothing moves."""
+
+    traits: ClassVar[Traits] = Traits()
 
     name: str
 
 
 @dataclass(frozen=True)
-class SetReading:
+class SetReading(BaseCommand):
     """From now on ``reading`` says which numbers of a target count; the one there is, is reread."""
+
+    traits: ClassVar[Traits] = Traits()
 
     reading: Reading
 
@@ -195,8 +184,10 @@ class SetReading:
 
 
 @dataclass(frozen=True)
-class TakeBranch:
+class TakeBranch(BaseCommand):
     """Go for the wished pose on ``branch``, however far that is: the same tool, another arm."""
+
+    traits: ClassVar[Traits] = Traits(planned=True)
 
     branch: Branch
 
@@ -207,48 +198,66 @@ class TakeBranch:
 
 
 @dataclass(frozen=True)
-class Settle:
-    """The hand lets go: what the arm can do becomes what is wished."""
+class EndDrag(BaseCommand):
+    """End a drag: the nearest pose that the arm can reach becomes the target."""
+
+    traits: ClassVar[Traits] = Traits(joints_only=True)
 
 
 @dataclass(frozen=True)
-class Home:
+class Home(BaseCommand):
     """Drive to the ready posture."""
 
+    traits: ClassVar[Traits] = Traits(joints_only=True)
+
 
 @dataclass(frozen=True)
-class Stretch:
+class GoToZero(BaseCommand):
     """Drive to the zero posture, the arm stretched along x (paper, Fig. 2)."""
 
-
-@dataclass(frozen=True)
-class Reset:
-    """Forget the target: the arm holds where it is, and the gripper too."""
+    traits: ClassVar[Traits] = Traits(joints_only=True)
 
 
 @dataclass(frozen=True)
-class Stop:
-    """Come to rest as fast as the arm can, and stay until a person says Release."""
+class Hold(BaseCommand):
+    """Come to rest and forget the targets of arm and gripper."""
+
+    traits: ClassVar[Traits] = Traits(joints_only=True)
 
 
 @dataclass(frozen=True)
-class Release:
-    """After a stop: commands count again. Nothing moves by this."""
+class Stop(BaseCommand):
+    """Come to rest as fast as the arm can, and accept no motion until ClearStop."""
+
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True, safety=True)
 
 
 @dataclass(frozen=True)
-class Pause:
+class ClearStop(BaseCommand):
+    """Accept motion again after a stop. Nothing moves by this."""
+
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
+
+
+@dataclass(frozen=True)
+class Pause(BaseCommand):
     """Come to rest on the way, and keep the goal."""
 
+    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
+
 
 @dataclass(frozen=True)
-class Resume:
+class Resume(BaseCommand):
     """Go on to the goal there is."""
+
+    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Follow:
+class Follow(BaseCommand):
     """Follow ``plan`` from its start, where the arm has to stand, to its end."""
+
+    traits: ClassVar[Traits] = Traits()
 
     plan: Plan
 
@@ -258,8 +267,10 @@ class Follow:
 
 
 @dataclass(frozen=True)
-class GoAlong:
+class GoAlong(BaseCommand):
     """Go on or back along the plan that is followed, to ``share`` of it: 0 its start, 1 its end."""
+
+    traits: ClassVar[Traits] = Traits()
 
     share: float
 
@@ -270,8 +281,12 @@ class GoAlong:
 
 
 @dataclass(frozen=True)
-class SpeedScale:
+class SpeedScale(BaseCommand):
     """From now on no joint and no tool is faster than ``value`` of its most, above 0 up to 1."""
+
+    traits: ClassVar[Traits] = Traits(
+        pacing=True, while_stopped=True, supersedes=False, passive=True, joints_only=True
+    )
 
     value: float
 
@@ -282,11 +297,13 @@ class SpeedScale:
 
 
 @dataclass(frozen=True, eq=False)
-class Jog:
+class Jog(BaseCommand):
     """Move at ``rates`` (5,) for JOG_TIME: vx, vy, vz [m/s] along ``frame``, pitch, roll [rad/s].
 
     Sent again and again while a hand holds on; when it does not come the arm comes to rest.
     """
+
+    traits: ClassVar[Traits] = Traits(while_paused=False)
 
     rates: FloatArray
     frame: JogFrame = JogFrame.BASE
@@ -298,19 +315,26 @@ class Jog:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
-    """Several at once, in one tick: all of them, or none when one cannot be."""
+class Batch(BaseCommand):
+    """Several commands in one tick: all of them, or none if one is invalid."""
+
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
 
     commands: tuple[Command, ...]
 
     def __post_init__(self) -> None:
-        if any(isinstance(each, Together) for each in self.commands):
-            raise InputError("Commands that are given together are single ones.")
+        if any(isinstance(each, Batch) for each in self.commands):
+            raise InputError("A batch cannot contain another batch: list its commands singly.")
+
+    @property
+    def parts(self) -> tuple[BaseCommand, ...]:
+        return self.commands
 
 
 Command = (
     SetJoint
     | SetAxes
+    | Nudge
     | SetJoints
     | Servo
     | MoveTool
@@ -320,12 +344,12 @@ Command = (
     | SetTool
     | SetReading
     | TakeBranch
-    | Settle
+    | EndDrag
     | Home
-    | Stretch
-    | Reset
+    | GoToZero
+    | Hold
     | Stop
-    | Release
+    | ClearStop
     | Pause
     | Resume
     | Follow
@@ -337,7 +361,7 @@ Command = (
     | Fill
     | Shift
     | Dress
-    | Together
+    | Batch
     | SpeedScale
     | Jog
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import Finding, Reason, State
 
 
@@ -11,22 +12,33 @@ from katana450.arm.control.state import Finding, Reason, State
 class Entry:
     """One reason, when it began to hold the arm back or slow it, and what the numbers were.
 
-    t: [s] on the clock of the states. began: whether it came; otherwise it is over.
+    t: [s] on the clock of the states. began: whether it came; otherwise it is over. actor: the
+    giver of the newest command then; None before the first one, and where the control loop acted
+    by itself. command: the class of that command.
     """
 
     t: float
     finding: Finding
     began: bool
+    actor: Actor | None = None
+    command: str = ""
 
 
-def news(before: State, after: State) -> tuple[Entry, ...]:
+def news(
+    before: State, after: State, actor: Actor | None = None, command: str = ""
+) -> tuple[Entry, ...]:
     """What ``after`` is held back by that ``before`` was not, and what of that is over.
 
-    A reason that stays is no news, whatever its number does meanwhile.
+    A reason that stays is no news, whatever its number does meanwhile. ``actor``, ``command``:
+    see ``Entry``.
     """
     old, new = ({_key(finding) for finding in state.findings} for state in (before, after))
-    came = tuple(Entry(after.t, f, began=True) for f in after.findings if _key(f) not in old)
-    went = tuple(Entry(after.t, f, began=False) for f in before.findings if _key(f) not in new)
+    came = tuple(
+        Entry(after.t, f, True, actor, command) for f in after.findings if _key(f) not in old
+    )
+    went = tuple(
+        Entry(after.t, f, False, actor, command) for f in before.findings if _key(f) not in new
+    )
     return (*went, *came)
 
 

@@ -19,6 +19,7 @@ from katana450.maths.kinematics.projection import (
 from katana450.maths.kinematics.reading import Reading
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import followed, limit_distances
+from katana450.maths.motion.limiter import Limits
 
 HARDLY = 0.05
 """Share of a jog that does not move the tool to speak of."""
@@ -30,15 +31,24 @@ AT_LIMIT = math.radians(0.5)
 """A joint so near to its limit holds a jog up."""
 
 
-def of_joints(chain: Chain, q: FloatArray) -> tuple[Finding, ...]:
-    """What clamping ``q`` (n,) [rad] to the limits takes away."""
-    findings = []
-    for axis, (angle, lower, upper) in enumerate(zip(q, chain.lower, chain.upper, strict=True)):
-        # A slider at its end is there through degrees and back, and asks for nothing beyond.
-        if angle < lower - tolerances.LIMIT_SLACK or angle > upper + tolerances.LIMIT_SLACK:
-            limit = float(lower if angle < lower else upper)
-            findings.append(Finding(Reason.AXIS_LIMIT, limit, axis))
-    return tuple(findings)
+def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[Finding, ...]:
+    """What clamping ``q`` (n,) [rad or m] to the limits takes away.
+
+    slides: (n,) whether each joint is prismatic.
+    """
+    below, above = (
+        q < limits.lower - tolerances.LIMIT_SLACK,
+        q > limits.upper + tolerances.LIMIT_SLACK,
+    )
+    # A slider at its end is there through degrees and back, and asks for nothing beyond.
+    return tuple(
+        Finding(
+            Reason.SLIDE_LIMIT if slides[axis] else Reason.AXIS_LIMIT,
+            float(limits.lower[axis] if below[axis] else limits.upper[axis]),
+            axis,
+        )
+        for axis in np.flatnonzero(below | above).tolist()
+    )
 
 
 def of_projection(

@@ -47,7 +47,9 @@ class Follower:
         return replace(here, pace=pace)
 
     def braking(self, now: Following, dt: float) -> Following:
-        """``dt`` [s] on when it brakes along the plan."""
+        """``dt`` [s] on when it brakes along the plan; ``now`` itself at rest."""
+        if now.pace.at_rest:
+            return now
         return replace(now, pace=self._limiter(now).stop(now.pace, dt))
 
     def halt(self, now: Following) -> Following:

@@ -15,21 +15,20 @@ from katana450.maths.planning.plan import Plan, Segment
 class Following:
     """Where on a plan the arm is, and where along it it goes.
 
+    It is a mode of the session: the goal is where the plan ends, or another place on it.
+
     Attributes:
         plan: what is followed.
         number: of the segment the arm is on, from 0.
         pace: tau in that segment [s], and its first two derivatives by time, (1,) each.
         towards: tau of the plan to come to rest at [s]: its end, its start for the way back, or any
             in between.
-        leaving: whether something else is to be done; the arm then brakes along the plan until it
-            can leave it without touching anything.
     """
 
     plan: Plan
     number: int
     pace: Motion
     towards: float
-    leaving: bool = False
 
     @staticmethod
     def begun(plan: Plan) -> Following:

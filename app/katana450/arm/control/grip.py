@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from katana450.arm.control.aims import without
+from katana450.arm.control.aims import without_finding
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.things import Environment, Hand, Thing
 from katana450.maths.collision.world import World
@@ -33,7 +33,9 @@ def gripped(surroundings: Environment, world: World | None, state: State) -> Sta
         things = tuple(surroundings.left(t, x) if t.held else t for t in state.things)
         return replace(state, things=things, grip=None)
     if state.gripper_goal >= state.gripper_setpoint:
-        return without(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
+        return (
+            without_finding(state, Reason.LOPSIDED) if state.gripper_goal > state.gripper else state
+        )
     for thing in state.things:
         if thing.can_be_held and not thing.fixed:
             felt = _felt(hand.fingers, world, thing, x)
@@ -61,7 +63,7 @@ def _closed(
     surroundings: Environment, state: State, thing: Thing, felt: dict[str, float], x: FloatArray
 ) -> State:
     """The fingers have closed on ``thing``: they stop there, and hold it if both have."""
-    state = without(without(state, Reason.CONTACT), Reason.LOPSIDED)
+    state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
     far = max(felt, key=lambda finger: felt[finger])
     if felt[far] > CENTRED:

@@ -41,6 +41,11 @@ class Joints:
         return limits_of(self.lower, self.upper, self.speed)
 
     @property
+    def refusal(self) -> str:
+        """Why a command about a tool is refused, in sentences."""
+        return f"Only its joints can be driven. {self.why}"
+
+    @property
     def gripper(self) -> Gripper:
         """Fingers are joints like any other."""
         return NO_GRIPPER

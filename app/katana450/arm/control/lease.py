@@ -105,7 +105,7 @@ class Lease:
             raise LeaseError("You hold the arm already.")
         return self._given(taker, t)
 
-    def give_up(self, person: Person) -> Self:
+    def release(self, person: Person) -> Self:
         """The holder lets go; the arm is free, and those who wait may have it."""
         self._check_holds(person)
         return replace(self, holder=None, heard=-math.inf)

@@ -7,49 +7,44 @@ from enum import Enum
 
 import numpy as np
 
-from katana450.arm.control.following import Following
 from katana450.arm.control.looks import ALL_AS_MADE, Looks
+from katana450.arm.control.modes import (
+    IDLE,
+    Following,
+    Idle,
+    Jogging,
+    JointTarget,
+    Leaving,
+    Mode,
+    PoseTarget,
+    Positioning,
+    Servoing,
+    Target,
+    ToolTarget,
+    Tracking,
+)
 from katana450.arm.control.pouring import Poured
 from katana450.arm.control.things import Thing
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.reading import Reading
-from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Motion
 from katana450.maths.motion.stream import Stream
 
 __all__ = [
-    "Dragging",
+    "ACCEPTED",
     "Finding",
-    "Halt",
-    "Jogging",
     "JointTarget",
-    "Mode",
+    "Outcome",
     "PoseTarget",
     "Reason",
     "State",
     "Status",
+    "StoppingDistance",
     "Target",
     "ToolTarget",
+    "Verdict",
 ]
-
-
-@dataclass(frozen=True, eq=False)
-class JointTarget:
-    """The joints themselves are wished for: ``q`` (n,) [rad]."""
-
-    q: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class PoseTarget:
-    """A full pose ``T`` (4, 4) in {S}: one number more than five axes can follow."""
-
-    T: FloatArray
-
-
-Target = JointTarget | ToolTarget | PoseTarget
 
 
 class Status(Enum):
@@ -60,14 +55,14 @@ class Status(Enum):
     PAUSED = "paused"
     BLOCKED = "blocked"
     HELD = "held"
-    HALTED = "halted"
+    STOPPED = "stopped"
     FAULT = "fault"
 
 
 class Reason(Enum):
     """Why the goal differs from what was wished."""
 
-    HALTED = "halted"
+    STOPPED = "stopped"
     PAUSED = "paused"
     CONTACT = "contact"
     ACROSS_GAP = "across a gap"
@@ -114,41 +109,42 @@ class Finding:
     time: float = 0.0
 
 
+class Verdict(Enum):
+    """How far a command takes effect."""
+
+    ACCEPTED = "accepted"
+    """As it was given."""
+    LIMITED = "limited"
+    """As far as the arm can; the findings say what is in the way."""
+    REFUSED = "refused"
+    """Not at all: nothing has changed."""
+
+
 @dataclass(frozen=True)
-class Halt:
-    """A stop: how far the tool, or else any link, went until it was at rest [m], and how long that
-    took [s]."""
+class Outcome:
+    """What became of one command.
+
+    Attributes:
+        verdict: how far it takes effect.
+        findings: what limits it.
+        why: the reason in words, where the verdict is not ACCEPTED and no finding says it.
+    """
+
+    verdict: Verdict = Verdict.ACCEPTED
+    findings: tuple[Finding, ...] = ()
+    why: str = ""
+
+
+ACCEPTED = Outcome()
+
+
+@dataclass(frozen=True)
+class StoppingDistance:
+    """Distance that the tool, or else any link, travels until it is at rest [m], and the time that
+    takes [s]."""
 
     way: float
     time: float
-
-
-@dataclass(frozen=True, eq=False)
-class Jogging:
-    """Rates (5,) for a while: v of the tool point [m/s], pitch and roll [rad/s].
-
-    frame: whose axes v is along. until: when it ends unless it is renewed [s].
-    """
-
-    rates: FloatArray
-    frame: JogFrame
-    until: float
-
-
-@dataclass(frozen=True, eq=False)
-class Dragging:
-    """A target that is followed along the way of the hand.
-
-    since: how far along that way the goal has been taken. let_go: whether the hand has let go
-    meanwhile, so that the goal becomes the target in the end.
-    """
-
-    since: ToolTarget
-    let_go: bool = False
-
-
-Mode = Jogging | Stream | Dragging
-"""The cause that moves the goal from tick to tick; there is one at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,22 +158,20 @@ class State:
         goal, gripper_goal: where the arm is going: the nearest it can do to the target.
         tool: the tool frame that targets and read-outs are of; empty where there are only joints,
             and then the branch and the reading say nothing.
-        target: what was wished, kept as it was wished.
         branch: the branch that dragging keeps.
         reading: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished, or is not gone to; else empty.
         blocked: whether the arm waits on its way because it would touch something.
-        halted: the stop that holds the arm until a person releases it; None when there is none.
+        stopped: the stop that holds the arm until it is cleared; None when there is none.
         paused: whether the arm waits on its way because a person wants it to.
         speed: the share of every greatest speed that is allowed, above 0 and up to 1.
-        mode: the jog, stream or drag that moves the goal, if one does. A drag is over once the goal
-            is there; until then the findings are those from before.
+        mode: what decides where the goal is. A drag is over once the goal is there; until then
+            the findings are those from before.
         things: what stands around or is held, and can be put elsewhere.
         grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
         poured: the water of the cup; None where there is none.
         looks: how links and things are shown.
-        following: the plan the arm is on and where on it, until it is told to go elsewhere; None
-            when it is on none.
+        outcomes: what became of the commands of this tick, one for each.
     """
 
     t: float
@@ -188,20 +182,19 @@ class State:
     goal: FloatArray
     gripper_goal: float
     tool: str
-    target: Target
     branch: Branch
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
     blocked: bool = False
-    halted: Halt | None = None
+    stopped: StoppingDistance | None = None
     paused: bool = False
     speed: float = 1.0
-    mode: Mode | None = None
-    following: Following | None = None
+    mode: Mode = IDLE
     things: tuple[Thing, ...] = ()
     grip: float | None = None
     poured: Poured | None = None
     looks: Looks = ALL_AS_MADE
+    outcomes: tuple[Outcome, ...] = ()
 
     @staticmethod
     def standing(
@@ -222,7 +215,6 @@ class State:
             goal=q,
             gripper_goal=gripper,
             tool=tool,
-            target=JointTarget(q),
             branch=branch,
             things=things,
         )
@@ -232,8 +224,8 @@ class State:
         """What the findings come to."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
-        if self.halted is not None:
-            return Status.HALTED
+        if self.stopped is not None:
+            return Status.STOPPED
         if self.paused:
             return Status.PAUSED
         if any(finding.reason is Reason.CONTACT for finding in self.findings):
@@ -243,24 +235,44 @@ class State:
         return Status.LIMITED if self.findings else Status.OK
 
     @property
+    def intent(self) -> Idle | Positioning | Tracking | Jogging | Servoing | Following:
+        """The mode, or the one that has superseded the plan which the arm is leaving."""
+        return self.mode.then if isinstance(self.mode, Leaving) else self.mode
+
+    @property
+    def target(self) -> Target:
+        """The target as it was given, or the goal in a mode that has none."""
+        intent = self.intent
+        if isinstance(intent, Positioning | Tracking):
+            return intent.target
+        return JointTarget(self.goal)
+
+    @property
+    def following(self) -> Following | None:
+        """The place on the plan that the arm is on, even if it is about to leave it."""
+        if isinstance(self.mode, Following):
+            return self.mode
+        return self.mode.along if isinstance(self.mode, Leaving) else None
+
+    @property
     def jogging(self) -> Jogging | None:
-        """The jog under way, if one is."""
-        return self.mode if isinstance(self.mode, Jogging) else None
+        """The jog under way."""
+        return self.intent if isinstance(self.intent, Jogging) else None
 
     @property
     def servo(self) -> Stream | None:
-        """The stream that is followed, if one is."""
-        return self.mode if isinstance(self.mode, Stream) else None
+        """The stream that is followed."""
+        return self.intent.stream if isinstance(self.intent, Servoing) else None
 
     @property
     def since(self) -> ToolTarget | None:
         """Target up to which a drag has been followed along its path; None without a drag."""
-        return self.mode.since if isinstance(self.mode, Dragging) else None
+        return self.intent.since if isinstance(self.intent, Tracking) else None
 
     @property
     def moving(self) -> bool:
         """Whether the arm or the gripper is still on its way."""
-        resting = self.blocked or self.paused or self.halted is not None
+        resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
 
     @property

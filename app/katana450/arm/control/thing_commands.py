@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from katana450.arm.control.checked import check_finite, vector
 from katana450.arm.control.looks import AS_MADE, LONGEST_NAME, Trait
 from katana450.arm.control.things import FARTHEST, MOST, Mount, Thing
+from katana450.arm.control.traits import BaseCommand, Traits
 from katana450.errors import InputError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
+SCENE_TRAITS = Traits(while_stopped=True, supersedes=False, passive=True)
+"""Traits of the commands about objects and water."""
+
 
 @dataclass(frozen=True)
-class Place:
+class Place(BaseCommand):
     """Put a thing where it says, in place of one of its name; what is held stays in the hand."""
+
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     thing: Thing
 
@@ -26,8 +33,10 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Fill:
+class Fill(BaseCommand):
     """Fill the cup with ``volume`` [m^3] of water, and wipe up what is elsewhere."""
+
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     volume: float
 
@@ -36,18 +45,22 @@ class Fill:
 
 
 @dataclass(frozen=True)
-class Remove:
+class Remove(BaseCommand):
     """Take the thing of that name away; what is held stays."""
+
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     name: str
 
 
 @dataclass(frozen=True, eq=False)
-class Shift:
+class Shift(BaseCommand):
     """Put the thing of that name elsewhere, or turn it; what is held stays.
 
     position: (3,) [m], R: (3, 3), of its frame in the base; None to keep what it has.
     """
+
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     name: str
     position: FloatArray | None = None
@@ -65,8 +78,12 @@ class Shift:
 
 
 @dataclass(frozen=True)
-class Dress:
+class Dress(BaseCommand):
     """Change one trait of how the link or thing ``name`` is shown; see ``Look.having``."""
+
+    traits: ClassVar[Traits] = Traits(
+        while_stopped=True, supersedes=False, passive=True, joints_only=True
+    )
 
     name: str
     trait: Trait
@@ -81,8 +98,10 @@ class Dress:
 
 
 @dataclass(frozen=True)
-class Attach:
+class Attach(BaseCommand):
     """Fix the thing of that name to the hand, or to the world again; what is held stays."""
+
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     name: str
     to: Mount
@@ -93,9 +112,11 @@ class Attach:
 
 
 @dataclass(frozen=True, eq=False)
-class Furnish:
+class Furnish(BaseCommand):
     """Have these things about and no others, at one go; what is held stays, as the only one of its
     name. ``volume``: of water in the cup [m^3]; None for no water anywhere."""
+
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     things: tuple[Thing, ...]
     volume: float | None = None
@@ -108,7 +129,3 @@ class Furnish:
             raise InputError("What is put somewhere is a thing out of the hand.")
         if self.volume is not None:
             check_finite("The volume", self.volume)
-
-
-THINGS = (Place, Shift, Attach, Furnish, Remove, Fill, Dress)
-"""All of them."""

@@ -17,12 +17,15 @@ from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.event_log import Entry
+from katana450.arm.control.outcome import DROPPED, refused
 from katana450.arm.control.things import same
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.readiness import readable, writable
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.wire import Names, Plans
@@ -50,11 +53,12 @@ ENDING_SECONDS = 2.0
 
 
 @dataclass(frozen=True)
-class Told:
-    """A command, with the front's own number for it."""
+class CommandMessage:
+    """A command with its giver, and the front's own number for it."""
 
     number: int
     command: cmd.Command
+    actor: Actor | None
 
 
 @dataclass(frozen=True)
@@ -64,11 +68,15 @@ class Alive:
 
 @dataclass(frozen=True, eq=False)
 class News:
-    """A snapshot, whose ticket is the front's number; what is new in the ledger; how late it is."""
+    """A snapshot, whose ticket is the front's number; what is new in the ledger; how late it is.
+
+    outcomes: what became of commands since the last, by the front's numbers.
+    """
 
     snapshot: Snapshot
     ledger: tuple[Entry, ...]
     lateness: LoopTiming
+    outcomes: tuple[TicketOutcome, ...] = ()
 
 
 class ArmEnd:
@@ -83,6 +91,8 @@ class ArmEnd:
         self._mailbox = mailbox
         self._silence = silence
         self._numbers: deque[tuple[int, int]] = deque([(mailbox.last_ticket, 0)])
+        self._number_of: dict[int, int] = {}
+        self._refused: list[TicketOutcome] = []
         self._numbering = threading.Lock()
         self._heard = time.monotonic()
         self._names = Names()
@@ -119,24 +129,27 @@ class ArmEnd:
             while True:
                 said = self._pipe.recv()
                 self._heard = time.monotonic()
-                if isinstance(said, Told):
+                if isinstance(said, CommandMessage):
                     self._put(said)
         except GONE:
             self.cut.set()
             # Nobody is left who could say where to go on to.
             self._mailbox.put(cmd.Stop())
 
-    def _put(self, told: Told) -> None:
-        if isinstance(told.command, cmd.Follow):
-            self._names.note(told.number, told.command.plan)
+    def _put(self, message: CommandMessage) -> None:
+        if isinstance(message.command, cmd.Follow):
+            self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:
-                ticket = self._mailbox.put(told.command)
+                ticket = self._mailbox.put(message.command, message.actor)
             except InputError as error:
                 # Checked over there, so only too many at once can be wrong with it.
                 log.warning("A command was dropped: %s", error)
                 ticket = self._mailbox.last_ticket
-            self._numbers.append((ticket, told.number))
+                self._refused.append((message.number, refused(str(error))))
+            else:
+                self._number_of[ticket] = message.number
+            self._numbers.append((ticket, message.number))
 
     def _show(self) -> None:
         board = self._loop.board
@@ -159,7 +172,7 @@ class ArmEnd:
                     reported, board.lateness = now, self._loop.lateness
                 fresh = _newer(board.ledger, last)
                 last = fresh[-1] if fresh else last
-                self._send(News(self._named(snapshot), fresh, board.lateness))
+                self._send(News(self._named(snapshot), fresh, board.lateness, self._outcomes()))
                 seen = snapshot
         except GONE:
             self.cut.set()
@@ -174,11 +187,22 @@ class ArmEnd:
                 self._numbers.popleft()
             return Snapshot(snapshot.state, self._numbers[0][1])
 
+    def _outcomes(self) -> tuple[TicketOutcome, ...]:
+        """Return what is new of the outcomes, by the front's numbers."""
+        told = self._loop.board.take_outcomes()
+        with self._numbering:
+            # Those of other ends, and the stops of this one, have no number here.
+            new = [(self._number_of.pop(ticket, None), outcome) for ticket, outcome in told]
+            named = [(number, outcome) for number, outcome in new if number is not None]
+            named += self._refused
+            self._refused.clear()
+        return tuple(named)
+
     def _watch(self) -> None:
         while not self.cut.wait(self._silence / 4):
             silent = self.unheard
             state = self._loop.board.snapshot.state
-            if silent > self._silence and state.moving and state.halted is None:
+            if silent > self._silence and state.moving and state.stopped is None:
                 log.error("Nothing was heard from the page's server for %.2f s: STOP.", silent)
                 self._mailbox.put(cmd.Stop())
 
@@ -191,7 +215,7 @@ class FrontEnd:
         self._pipe = pipe
         self._check = check
         self._sending = threading.Lock()
-        self._unsent: deque[Told] = deque()
+        self._unsent: deque[CommandMessage] = deque()
         self._number = 0
         self._plans = Plans()
         first = _loaded(pipe.recv_bytes(), self._plans)
@@ -212,10 +236,12 @@ class FrontEnd:
         with self._sending:
             return self._number
 
-    def put(self, command: cmd.Command) -> int:
-        """Send ``command`` to the arm; returns its ticket. Raises InputError for what cannot be.
+    def deliver(self, command: cmd.Command, actor: Actor | None = None) -> int:
+        """Send ``command`` of ``actor`` to the arm; returns its ticket.
 
-        An arm's process that does not answer is given nothing but a stop.
+        Raises InputError for a command that the arm cannot be given.
+
+        Where the arm's process does not answer, only a stop is sent.
         """
         self._check(command)
         age = self.age
@@ -223,8 +249,9 @@ class FrontEnd:
             # The sooner it is stamped, the less of our own delays looks like its motion.
             command = replace(command, t=MonotonicClock().now())
         with self._sending:
-            if isinstance(command, cmd.Stop):
+            if command.traits.safety:
                 # What has not gone yet is dead the moment it comes.
+                self.board.outcomes.note((each.number, DROPPED) for each in self._unsent)
                 self._unsent.clear()
             elif age > UNANSWERED:
                 raise InputError(
@@ -233,7 +260,7 @@ class FrontEnd:
             self._number += 1
             if isinstance(command, cmd.Follow):
                 self._plans.note(self._number, command.plan)
-            self._unsent.append(Told(self._number, command))
+            self._unsent.append(CommandMessage(self._number, command, actor))
             self._flush()
             return self._number
 
@@ -259,7 +286,7 @@ class FrontEnd:
             self._unsent.popleft()
         return not self._unsent
 
-    def _send(self, said: Told | Alive) -> bool:
+    def _send(self, said: CommandMessage | Alive) -> bool:
         try:
             if not writable(self._pipe.fileno()):
                 return False
@@ -283,6 +310,8 @@ class FrontEnd:
                 seen = self.board.snapshot
                 if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
                     self.board.pin(_known(news.snapshot, seen), news.ledger)
+                # After the state: whoever is answered finds one that has the command in it.
+                self.board.outcomes.note(news.outcomes)
         except GONE:
             self.cut.set()
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Protocol
 
 from katana450.arm.control.commands import Command, Stop
-from katana450.arm.control.event_log import news
+from katana450.arm.control.event_log import Entry, news
+from katana450.arm.control.outcome import DROPPED, FAILED
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
-from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.mailbox import Drained, Mailbox, Submission
+from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -59,6 +62,7 @@ class ControlLoop:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
+        self._newest: Submission | None = None
         self.board = StatePublisher(Snapshot(self._state, 0), self.lateness)
         """Where it shows what it does."""
         self.ticks = 0
@@ -71,22 +75,32 @@ class ControlLoop:
 
     def tick(self) -> None:
         """One turn: take the commands, move on, tell the arm, publish what changed."""
-        commands, ticket = self._mailbox.drain()
+        drained = self._mailbox.drain()
+        if drained.submissions:
+            self._newest = drained.submissions[-1]
         before = self._state
         t = self._clock.now()
         try:
-            state = self._session.step(before, commands, t)
+            state = self._session.step(before, drained.commands, t)
             sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
             state = self._session.observe(state, sent.q, sent.gripper)
         except Exception:
             # Whatever went wrong, the loop lives on and the arm holds: a person must see it.
             log.exception("The control loop met an error; the arm holds.")
-            state = self._session.fail(before)
+            state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
         self._state = state
         # An arm at rest wakes nobody: time alone is no news.
-        if commands or _differs(before, state):
-            self.board.pin(Snapshot(state, ticket), news(before, state))
+        if drained.commands or _differs(before, state):
+            self.board.note(_outcomes(drained, state))
+            self.board.pin(Snapshot(state, drained.last), self._entries(before, state))
         self.ticks += 1
+
+    def _entries(self, before: State, after: State) -> tuple[Entry, ...]:
+        """Return what is new in the event log, attributed to the newest command."""
+        if self._newest is None:
+            return news(before, after)
+        command, actor = self._newest
+        return news(before, after, actor, type(command).__name__)
 
     @property
     def running(self) -> bool:
@@ -110,7 +124,7 @@ class ControlLoop:
         while not self._stopping.is_set():
             late = self._clock.now() - due
             self._punctuality.note(late)
-            if late > self._held_up and self._state.moving and self._state.halted is None:
+            if late > self._held_up and self._state.moving and self._state.stopped is None:
                 log.error("The control loop was %.2f s late while the arm moved: STOP.", late)
                 self._mailbox.put(Stop())
             if late > self._period:
@@ -121,6 +135,15 @@ class ControlLoop:
             self._clock.sleep_until(due)
 
 
+def _outcomes(drained: Drained, state: State) -> Iterator[TicketOutcome]:
+    """Yield what became of each ticket of ``drained`` in the tick that ended in ``state``."""
+    for ticket in drained.dropped:
+        yield ticket, DROPPED
+    for tickets, outcome in zip(drained.tickets, state.outcomes, strict=False):
+        for ticket in tickets:
+            yield ticket, outcome
+
+
 def _differs(a: State, b: State) -> bool:
     return (
         a.q is not b.q
@@ -128,7 +151,7 @@ def _differs(a: State, b: State) -> bool:
         or a.setpoint is not b.setpoint
         or a.gripper_setpoint != b.gripper_setpoint
         or a.goal is not b.goal
-        or a.target is not b.target
+        or a.mode is not b.mode
         or a.findings != b.findings
         or a.things is not b.things
         or a.poured is not b.poured

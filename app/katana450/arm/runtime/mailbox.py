@@ -4,86 +4,109 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Protocol
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command
 from katana450.errors import InputError
 
 CAPACITY = 256
 """Commands that may wait for one tick: far more than people make in 10 ms, few enough to do."""
 
-STREAMS = (
-    cmd.SetJoint,
-    cmd.SetJoints,
-    cmd.Servo,
-    cmd.MoveTool,
-    cmd.TurnTool,
-    cmd.SetPose,
-    cmd.SetGripper,
-)
-"""Commands of which the last one is enough when several of a kind follow each other."""
+
+class Submission(NamedTuple):
+    """A command and its giver; None where the process of the arm acts by itself."""
+
+    command: Command
+    actor: Actor | None
 
 
 class CommandSink(Protocol):
-    """Takes commands, here or at the end of a pipe."""
+    """Takes commands, here or at the end of a pipe.
+
+    In the process that people speak to, ``CommandGate.submit`` alone puts commands into one.
+    """
 
     @property
     def last_ticket(self) -> int:
         """The ticket of the newest command."""
         ...
 
-    def put(self, command: Command) -> int:
-        """Leave ``command`` for the next tick; returns its ticket. Raises InputError."""
+    def deliver(self, command: Command, actor: Actor | None) -> int:
+        """Leave ``command`` of ``actor`` for the next tick; returns its ticket.
+
+        Raises InputError.
+        """
         ...
+
+
+@dataclass(frozen=True)
+class Drained:
+    """Content of the mailbox when a tick empties it.
+
+    Attributes:
+        submissions: what waited, oldest first.
+        tickets: of each submission, with those of the commands of its stream that it replaced.
+        dropped: tickets of the commands that waited when a stop came.
+        last: the last ticket that was given.
+    """
+
+    submissions: list[Submission]
+    tickets: list[list[int]]
+    dropped: list[int]
+    last: int
+
+    @property
+    def commands(self) -> list[Command]:
+        """The commands of the submissions, oldest first."""
+        return [each.command for each in self.submissions]
 
 
 class Mailbox:
     """Commands in the order they came, each checked at the door.
 
-    A ticket is the number of commands put in so far; ``drain`` hands out the last one, so that a
-    sender can tell from the loop's next snapshot whether what it said has been taken.
+    A ticket is the number of commands put in so far; ``drain`` hands them out, so that the loop can
+    tell a sender what became of its command.
     """
 
     def __init__(self, check: Callable[[Command], None]) -> None:
         """``check`` raises an InputError for a command that must not enter."""
         self._check = check
         self._lock = threading.Lock()
-        self._waiting: list[Command] = []
+        self._waiting: list[Submission] = []
+        self._of_waiting: list[list[int]] = []
+        self._dropped: list[int] = []
         self._tickets = 0
 
-    def put(self, command: Command) -> int:
+    def put(self, command: Command, actor: Actor | None = None) -> int:
         """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
         self._check(command)
         with self._lock:
-            if isinstance(command, cmd.Stop):
+            replaced = []
+            if command.traits.safety:
                 # Never refused, and what waits before it is dead the moment it comes.
-                self._waiting = [command]
-            elif self._waiting and _supersedes(command, self._waiting[-1]):
-                self._waiting[-1] = command
+                self._dropped += [ticket for each in self._of_waiting for ticket in each]
+                self._waiting, self._of_waiting = [], []
+            elif self._waiting and command.replaces(self._waiting[-1].command):
+                self._waiting.pop()
+                replaced = self._of_waiting.pop()
             elif len(self._waiting) >= CAPACITY:
                 raise InputError(f"{CAPACITY} commands are waiting already: send them slower.")
-            else:
-                self._waiting.append(command)
             self._tickets += 1
+            self._waiting.append(Submission(command, actor))
+            self._of_waiting.append([*replaced, self._tickets])
             return self._tickets
 
-    def drain(self) -> tuple[list[Command], int]:
-        """Everything that waits, oldest first, and the last ticket given."""
+    def drain(self) -> Drained:
+        """Hand out everything that waits."""
         with self._lock:
-            waiting, self._waiting = self._waiting, []
-            return waiting, self._tickets
+            drained = Drained(self._waiting, self._of_waiting, self._dropped, self._tickets)
+            self._waiting, self._of_waiting, self._dropped = [], [], []
+            return drained
 
     @property
     def last_ticket(self) -> int:
         """The ticket of the newest command."""
         with self._lock:
             return self._tickets
-
-
-def _supersedes(new: Command, old: Command) -> bool:
-    if not isinstance(new, STREAMS) or type(new) is not type(old):
-        return False
-    return not (isinstance(new, cmd.SetJoint) and isinstance(old, cmd.SetJoint)) or (
-        new.axis == old.axis
-    )

@@ -8,9 +8,11 @@ import time
 from collections.abc import Callable
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.control.tool_targets import with_branch
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.errors import KatanaError
@@ -19,12 +21,6 @@ log = logging.getLogger(__name__)
 
 REST_SECONDS = 5.0
 """[s] In which an arm that is to set out from rest has come to it."""
-
-PASSIVE = (cmd.SpeedScale, cmd.SetGripper, *cmd.THINGS)
-"""Commands that leave a way under work as it is."""
-
-WAITING = (cmd.Pause, cmd.Resume)
-"""Commands that decide when the arm moves, not where."""
 
 
 class PlanningWorker:
@@ -52,17 +48,17 @@ class PlanningWorker:
         """Whether a way is under work, or found and not begun yet."""
         return self._work is not None or self._board.snapshot.ticket < self.last_ticket
 
-    def put(self, command: cmd.Command) -> int:
-        """See ``CommandSink``; the command that follows a way found later has no ticket."""
-        said = command.commands if isinstance(command, cmd.Together) else (command,)
-        if not all(isinstance(each, PASSIVE) for each in said):
+    def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
+        """Implement ``CommandSink``; a command that follows a path found later has no ticket."""
+        traits = [each.traits for each in command.parts]
+        if not all(each.passive for each in traits):
             self.cancel()
-        if not all(isinstance(each, PASSIVE + WAITING) for each in said):
+        if any(each.supersedes for each in traits):
             self.redirected()
         if isinstance(command, cmd.TakeBranch):
-            self._set_out(command)
+            self._set_out(command, actor)
             return self.last_ticket
-        return self._arm.put(command)
+        return self._arm.deliver(command, actor)
 
     def cancel(self) -> None:
         """Give up the way under work."""
@@ -71,22 +67,25 @@ class PlanningWorker:
                 self._work.set()
                 self._work = None
 
-    def _set_out(self, command: cmd.TakeBranch) -> None:
+    def _set_out(self, command: cmd.TakeBranch, actor: Actor | None) -> None:
         cancelled = threading.Event()
         with self._lock:
             self._work = cancelled
         threading.Thread(
-            target=self._find, args=(command, cancelled), name="navigator", daemon=True
+            target=self._find, args=(command, actor, cancelled), name="navigator", daemon=True
         ).start()
 
-    def _find(self, command: cmd.TakeBranch, cancelled: threading.Event) -> None:
+    def _find(
+        self, command: cmd.TakeBranch, actor: Actor | None, cancelled: threading.Event
+    ) -> None:
         try:
-            state = self._at_rest(cancelled)
-            goal = self._session.taken(state, command.branch).goal
+            state = self._at_rest(actor, cancelled)
+            arm = self._session.require_arm()
+            goal = with_branch(arm, state, command.branch).goal
             if (goal != state.setpoint).any():
                 world = self._session.world_at(state)
-                plan = plan_to(self._session.arm, world, state, goal)
-                self._unless(cancelled, cmd.Follow(plan))
+                plan = plan_to(arm, world, state, goal)
+                self._unless(cancelled, cmd.Follow(plan), actor)
         except KatanaError as error:
             self.tell(str(error))
         except Exception:
@@ -97,10 +96,10 @@ class PlanningWorker:
                 if self._work is cancelled:
                     self._work = None
 
-    def _at_rest(self, cancelled: threading.Event) -> State:
+    def _at_rest(self, actor: Actor | None, cancelled: threading.Event) -> State:
         """The state of an arm that stands, which it is made to."""
         if self._board.snapshot.state.moving:
-            self._unless(cancelled, cmd.Reset())
+            self._unless(cancelled, cmd.Hold(), actor)
         end = time.monotonic() + REST_SECONDS
         snapshot = self._board.snapshot
         while snapshot.state.moving or snapshot.ticket < self._arm.last_ticket:
@@ -109,7 +108,9 @@ class PlanningWorker:
             snapshot = self._board.wait_for_change(snapshot, 0.1)
         return snapshot.state
 
-    def _unless(self, cancelled: threading.Event, command: cmd.Command) -> None:
+    def _unless(
+        self, cancelled: threading.Event, command: cmd.Command, actor: Actor | None
+    ) -> None:
         with self._lock:
             if not cancelled.is_set():
-                self._arm.put(command)
+                self._arm.deliver(command, actor)

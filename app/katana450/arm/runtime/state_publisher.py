@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.state import State
 from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.outcomes import Outcomes, TicketOutcome
 
 KEPT = 500
 """Entries of the ledger that are kept."""
@@ -30,6 +31,9 @@ class StatePublisher:
         self._snapshot = first
         self._ledger: deque[Entry] = deque(maxlen=KEPT)
         self._pinned = threading.Condition()
+        self._untold: deque[TicketOutcome] = deque(maxlen=KEPT)
+        self.outcomes = Outcomes()
+        """What became of commands, by their tickets."""
         self.lateness = lateness
         """How well the loop keeps its period."""
 
@@ -49,6 +53,20 @@ class StatePublisher:
             self._ledger.extend(news)
             self._snapshot = snapshot
             self._pinned.notify_all()
+
+    def note(self, told: Iterable[TicketOutcome]) -> None:
+        """Record what became of commands; to be called before ``pin``."""
+        told = tuple(told)
+        self.outcomes.note(told)
+        with self._pinned:
+            self._untold.extend(told)
+
+    def take_outcomes(self) -> tuple[TicketOutcome, ...]:
+        """Hand out the outcomes that were noted since this was last called."""
+        with self._pinned:
+            told = tuple(self._untold)
+            self._untold.clear()
+            return told
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
         """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""

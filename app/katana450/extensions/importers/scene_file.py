@@ -13,8 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.importers.meshes import Mesh, read_mesh
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import MOST_BYTES, Up
 from katana450.extensions.programs.source import LARGEST, Problem, ScriptError
 from katana450.extensions.scene.scene import MeshFile, Scene
@@ -116,11 +117,10 @@ def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, byt
     for mesh in stored.meshes:
         # Two files of one name are told apart by what is in them.
         stem = re.sub(r"[^A-Za-z0-9_-]+", "_", mesh.name).strip("_") or "mesh"
-        path = f"{FOLDER}/{stem}.{mesh.format.value}"
+        path = f"{FOLDER}/{stem}.{mesh.format}"
         if path in contents:
-            path = f"{FOLDER}/{stem}_{mesh.key[:8]}.{mesh.format.value}"
-        up = None if mesh.up is None else mesh.up.value
-        files[mesh.key] = MeshFile(path, mesh.unit, up, mesh.sha256)
+            path = f"{FOLDER}/{stem}_{mesh.key[:8]}.{mesh.format}"
+        files[mesh.key] = MeshFile(path, mesh.unit, mesh.up, mesh.sha256)
         contents[path] = mesh.file
     return {SCENE: written(stored.scene, files, T_palm_tool).encode()} | contents
 

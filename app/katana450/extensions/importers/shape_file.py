@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-import katana450
+from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.gltf_file import read_gltf
 from katana450.extensions.importers.obj_file import read_obj
 from katana450.extensions.importers.ply_file import read_ply
 from katana450.extensions.importers.stl_file import read_stl
-from katana450.extensions.importers.surface import Colours, Reading, Surface
+from katana450.extensions.importers.surface import Reading, Surface
 from katana450.extensions.importers.vrml_file import read_wrl
 from katana450.maths.collision.outer import Outer
 from katana450.maths.geometry.arrays import FloatArray, IntArray, frozen
@@ -165,7 +165,8 @@ def read_shape_guarded(
     try:
         done = subprocess.run(
             [sys.executable, "-m", "katana450.extensions.importers.reading", *words],
-            cwd=Path(katana450.__file__).parents[1],
+            # The folder that holds the package.
+            cwd=Path(__file__).resolve().parents[3],
             env=environment,
             input=data,
             capture_output=True,

@@ -6,9 +6,9 @@ import re
 
 import numpy as np
 
+from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
 from katana450.extensions.importers.surface import (
-    Colours,
     Reading,
     check_triangles,
     doubles,

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
 from katana450.extensions.importers.polygons import cut
 from katana450.maths.geometry.arrays import FloatArray, IntArray
-
-Colours = npt.NDArray[np.uint8]
 
 GREY = (204, 204, 204, 255)
 """What has no colour beside something that has: VRML97's own default."""

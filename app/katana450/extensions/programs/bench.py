@@ -10,6 +10,7 @@ import numpy as np
 
 from katana450.arm.control.arm import Arm
 from katana450.arm.control.commands import Command
+from katana450.arm.control.modes import IDLE
 from katana450.arm.control.plans import path_to, plan_along
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -65,7 +66,7 @@ class PlanContext:
     @property
     def arm(self) -> Arm:
         """The arm."""
-        return self.session.arm
+        return self.session.require_arm()
 
     @property
     def ready(self) -> FloatArray:
@@ -244,9 +245,7 @@ class Bench:
     def standing(self, q: FloatArray) -> State:
         """The arm at rest at ``q`` (5,) [rad]."""
         q, branch = frozen(q), branch_of(self.rig.arm.chain, q)
-        return replace(
-            self.state, q=q, goal=q, motion=Motion.rest(q), branch=branch, following=None
-        )
+        return replace(self.state, q=q, goal=q, motion=Motion.rest(q), branch=branch, mode=IDLE)
 
     def joints_at(self, place: Place) -> FloatArray:
         """(5,) the joints that have the arm at ``place`` [rad]; InputError why none do."""

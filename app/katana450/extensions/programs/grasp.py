@@ -17,6 +17,7 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.order import Grip, Use
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.step import Step
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import JOINED, MARGIN
@@ -116,3 +117,7 @@ def _nearest(bench: Bench, middle: FloatArray, pitch: float) -> tuple[float, Flo
 
     world, fingers = bench.world, bench.state.gripper_setpoint
     return bench.first(np.arange(SHORTEST, LONGEST_BACK + STEP, STEP).tolist(), roomy)
+
+
+STEPS: dict[str, type[Step]] = {"grasp": Grasp}
+"""Steps of this module, by their names in a script."""

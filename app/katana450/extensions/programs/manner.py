@@ -13,6 +13,7 @@ from katana450.extensions.programs.bench import Bench
 from katana450.extensions.programs.order import Grip, Pace, Use, Wait
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.step import Step
 
 LONGEST_WAIT = 3600.0
 """[s]"""
@@ -85,3 +86,7 @@ class Speed:
 
     def lay(self, bench: Bench) -> None:
         bench.note(f"speed {self.value:g}", Pace(self.value), bench.state)
+
+
+STEPS: dict[str, type[Step]] = {"gripper": Gripper, "wait": Pause, "tool": Tool, "speed": Speed}
+"""Steps of this module, by their names in a script."""

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import Following
 from katana450.arm.control.state import Reason, State
 from katana450.arm.control.things import Thing
 from katana450.errors import InputError
@@ -43,8 +44,8 @@ class Go:
         return (cmd.Follow(self.plan),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
-        following = state.following
-        if following is None or following.leaving or not np.array_equal(state.goal, self.plan.end):
+        following = state.mode
+        if not isinstance(following, Following) or not np.array_equal(state.goal, self.plan.end):
             if any(finding.reason is Reason.NOT_AT_START for finding in state.findings):
                 raise InputError("The arm does not stand where the step begins; run it again.")
             raise InputError("The arm was told to go elsewhere.")

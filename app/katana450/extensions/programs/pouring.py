@@ -18,6 +18,7 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.order import Pace, Wait
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.step import Step
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import ToolLine
@@ -103,3 +104,7 @@ def _lip(bench: Bench, q: FloatArray) -> FloatArray:
     downhill /= np.linalg.norm(downhill)
     rim = T[:3, 3] + cup.height * up + cup.size[0] * downhill
     return bench.point(rim, in_base=True)
+
+
+STEPS: dict[str, type[Step]] = {"pour": Pour}
+"""Steps of this module, by their names in a script."""

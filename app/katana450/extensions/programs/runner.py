@@ -65,7 +65,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     if run.phase is not Phase.RUNNING:
         return run, ()
     dt, run = t - run.t, replace(run, t=t)
-    if state.halted is not None:
+    if state.stopped is not None:
         return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
     if any(finding.reason is Reason.INTERNAL for finding in state.findings):
         return replace(run, phase=Phase.FAILED, why="The arm's controller met an error."), ()
@@ -82,7 +82,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         done = task.order.done(state, run.waited)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
-        return replace(run, phase=Phase.FAILED, why=why), (cmd.Reset(),)
+        return replace(run, phase=Phase.FAILED, why=why), (cmd.Hold(),)
     if not done:
         return run, ()
     if run.number + 1 == len(program.tasks):
@@ -99,11 +99,11 @@ def _met(state: State) -> str:
     return " and ".join(met[0]) if met and met[0] else "something"
 
 
-def halted(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:
+def stopped(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:
     """Ended by a person: the arm comes to rest where it is."""
     if run.phase is not Phase.RUNNING:
         return run, ()
-    return replace(run, phase=Phase.STOPPED, why=why), (cmd.Reset(), cmd.Resume())
+    return replace(run, phase=Phase.STOPPED, why=why), (cmd.Hold(), cmd.Resume())
 
 
 def ended(run: Run, phase: Phase, why: str) -> Run:

@@ -12,7 +12,7 @@ from katana450.extensions.programs.carry import APPROACHES, UP, before, carry
 from katana450.extensions.programs.order import Grip
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
-from katana450.extensions.programs.step import nothing
+from katana450.extensions.programs.step import Step, nothing
 from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import MARGIN
 
@@ -50,3 +50,7 @@ class SetDown:
         except InputError as error:
             raise InputError(f"There is no room to draw back: {error}") from error
         bench.taken = None
+
+
+STEPS: dict[str, type[Step]] = {"set_down": SetDown}
+"""Steps of this module, by their names in a script."""

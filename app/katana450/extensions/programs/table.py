@@ -19,6 +19,7 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.order import Filling, Putting
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.step import Step
 from katana450.maths.geometry import se3
 from katana450.maths.water.units import ML
 
@@ -85,3 +86,7 @@ def _overlap(one: Thing, other: Thing) -> bool:
     """Whether two things on the table are in each other, taken for round."""
     apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
     return apart < girth(one) + girth(other)
+
+
+STEPS: dict[str, type[Step]] = {"fill": Fill, "put": Put}
+"""Steps of this module, by their names in a script."""

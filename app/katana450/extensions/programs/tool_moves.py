@@ -15,6 +15,7 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
 from katana450.extensions.programs.setting import Setting
 from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.step import Step
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.tool import ToolTarget
@@ -220,3 +221,13 @@ class Screw:
         v = np.cross(bench.point(self.point, in_base=self.in_base), omega) + self.climb * axis
         branch = bench.branches(None)[0]
         bench.lead([ToolScrew(bench.chain, branch, bench.q, np.append(omega, v))], "screw")
+
+
+STEPS: dict[str, type[Step]] = {
+    "line": Line,
+    "lines": Lines,
+    "arc": Arc,
+    "circle": Circle,
+    "screw": Screw,
+}
+"""Steps of this module, by their names in a script."""

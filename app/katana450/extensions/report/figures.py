@@ -14,8 +14,8 @@ import numpy as np
 
 from katana450.arm.control.arm import Arm
 from katana450.errors import ConfigurationError, installing
+from katana450.extensions.programs.simulation import Trace
 from katana450.extensions.report.measures import Along
-from katana450.extensions.report.trace import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import tool_speed
 
@@ -81,7 +81,7 @@ def path_figure(paths: Sequence[Along]) -> bytes:
         errors = 1e3 * errors / 10.0**power
         panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
         panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
-        _equal(space, 1e3 * np.concatenate([path.desired for path in paths]))
+        equal_axes(space, 1e3 * np.concatenate([path.desired for path in paths]))
         space.set_xlabel("x (mm)")
         space.set_ylabel("y (mm)")
         space.set_zlabel("z (mm)", labelpad=9.0)
@@ -163,7 +163,7 @@ def speeds_figure(arm: Arm, trace: Trace) -> bytes:
         return _png(plt, figure)
 
 
-def _equal(space: Any, points: FloatArray) -> None:
+def equal_axes(space: Any, points: FloatArray) -> None:
     """The same millimetre on all three axes, with room around."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = 0.5 * (low + high), 0.55 * float((high - low).max())

@@ -17,7 +17,7 @@ from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
-from katana450.extensions.report.trace import Trace
+from katana450.extensions.programs.simulation import Trace
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

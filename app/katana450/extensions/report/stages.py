@@ -14,17 +14,17 @@ from katana450.arm.robot.robot import Robot
 from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.simulation import Trace
 from katana450.extensions.render.camera import Camera
 from katana450.extensions.render.line import tube
 from katana450.extensions.render.picture import picture
-from katana450.extensions.render.png import png
 from katana450.extensions.render.scene import Item
 from katana450.extensions.render.stage import Stage
-from katana450.extensions.report.trace import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
 from katana450.maths.planning.tool_path import ToolPath
+from katana450.png import png
 from katana450.server.view.room import LIGHT
 from katana450.server.view.traces import DESIRED, PLACES, coloured
 

@@ -99,7 +99,11 @@ class Scaling:
 
     def tau_after(self, t: float) -> float:
         """tau [s] ``t`` [s] after the start at full speed, from 0 to `duration`."""
-        return gone_after(t, self.span, self.acceleration, self.jerk)
+        return self.motion_after(t)[0]
+
+    def motion_after(self, t: float) -> tuple[float, float, float]:
+        """tau [s] ``t`` [s] after the start at full speed, tau' [1] and tau'' [1/s]."""
+        return motion_after(t, self.span, self.acceleration, self.jerk)
 
     @cached_property
     def _pieces(self) -> list[list[float]]:
@@ -162,23 +166,26 @@ def rest_to_rest(way: float, a: float, j: float) -> float:
     return float(4.0 * (way / (2.0 * j)) ** (1.0 / 3.0))
 
 
-def gone_after(t: float, way: float, a: float, j: float) -> float:
-    """How much of ``way`` is behind ``t`` [s] after the start of the motion of `rest_to_rest`."""
+def motion_after(t: float, way: float, a: float, j: float) -> tuple[float, float, float]:
+    """The motion of `rest_to_rest` ``t`` [s] after its start: place, speed and acceleration."""
     total = rest_to_rest(way, a, j)
     t = min(max(t, 0.0), total)
     if t > 0.5 * total:
-        return way - gone_after(total - t, way, a, j)
+        left, speed, acceleration = motion_after(total - t, way, a, j)
+        return way - left, speed, -acceleration
     # The jerk lasts for `ramp`, and the speed grows until `up`.
     ramp = min(a / j, 1.0 / math.sqrt(j), math.cbrt(way / (2.0 * j)))
     up = min(1.0 / (j * ramp) + ramp, 0.5 * total)
-    speed = j * ramp * (up - ramp)
     if t <= ramp:
-        return j * t**3 / 6.0
+        return j * t**3 / 6.0, 0.5 * j * t**2, j * t
     if t <= up - ramp:
         since = t - ramp
-        return j * ramp * (ramp**2 / 6.0 + 0.5 * ramp * since + 0.5 * since**2)
+        place = j * ramp * (ramp**2 / 6.0 + 0.5 * ramp * since + 0.5 * since**2)
+        return place, j * ramp * (0.5 * ramp + since), j * ramp
+    speed = j * ramp * (up - ramp)
     left = max(up - t, 0.0)
-    return speed * (t - 0.5 * up) + j * left**3 / 6.0
+    place = speed * (t - 0.5 * up) + j * left**3 / 6.0
+    return place, speed - 0.5 * j * left**2, j * left
 
 
 def _inverted(w: float, w1: float, w2: float) -> tuple[float, float, float]:

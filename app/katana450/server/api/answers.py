@@ -26,29 +26,31 @@ class Answer(
 class Welcome(Answer, frozen=True, kw_only=True):
     """The first thing said: who you are here, and what you may do.
 
-    ``name`` is as others see it. ``role``: viewer, operator or admin. ``beat``: signs of life are
+    ``name`` is as others see it. ``role``: viewer, operator or admin. ``heartbeat``: heartbeats are
     to come so many seconds apart from whoever holds the arm.
     """
 
     name: str
     number: int
     role: str
-    beat: float
+    heartbeat: float
     api: int = VERSION
 
 
 class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is accepted. ``ticket``: of one that moves the arm; it is heeded in
-    states whose ticket is no smaller. ``rotation_misfit``: of one with a pose, the largest entry of
-    R^T R - I of its rotation; the nearest rotation is used, and more than 1e-3 is refused."""
+    """The request of that id is done. A command of the arm has a ``ticket``: it is in every state
+    whose ticket is no smaller. Its ``outcome``: accepted, limited by the ``findings``, or unknown
+    if the arm's process has not told within 1 s. ``rotation_misfit``, of a pose: the largest entry
+    of R^T R - I; the nearest rotation is used, and more than 1e-3 is refused."""
 
     ticket: int | None = None
+    outcome: str | None = None
+    findings: tuple[Finding, ...] = ()
     rotation_misfit: float | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):
-    """Nothing has changed; ``why`` says the reason and what to do. ``retry``: too much was asked
-    at once, and after so many seconds there is time again."""
+    """Nothing has changed; ``why`` says why and what to do. ``retry`` [s]: ask again then."""
 
     why: str
     retry: float | None = None
@@ -150,7 +152,7 @@ class State(Answer, frozen=True, kw_only=True):
         branch: shoulder and elbow. reading: which numbers of a target count.
         Where there are only joints, tool to roll, tool_speed, margins, branch and reading are null;
             see ``arm``.
-        status: ok, limited, paused, blocked, held, halted or fault. why: in words; else empty.
+        status: ok, limited, paused, blocked, held, stopped or fault. why: in words; else empty.
         speed: share of full speed. holder: name of who holds the arm.
         stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
             newer than the request is stopped, then confirmed.
@@ -226,10 +228,12 @@ class Arm(Answer, frozen=True, kw_only=True):
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True):
-    """One line of the ledger: a reason that began or ended, and who drove then."""
+    """A reason that began or ended, with the newest command then: whose, which, on what grounds."""
 
     when: str
     who: str | None
+    command: str
+    grounds: str | None
     began: bool
     finding: Finding
 
@@ -349,8 +353,8 @@ class Links(Answer, frozen=True, kw_only=True):
 
 
 class Mesh(Answer, frozen=True, kw_only=True):
-    """A file that was uploaded and can now be placed. ``key``: for ``place``. ``name``: of the
-    file, and of no thing there is. ``said``: what was read. ``size``: along x, y, z [m]."""
+    """An uploaded file. ``key``: for ``place``. ``name``: its own, and of no thing there is.
+    ``said``: what was read. ``size``: along x, y, z [m]."""
 
     key: str
     name: str

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
@@ -89,8 +91,41 @@ class Order(Enum):
     """Run one step, then wait."""
     PAUSE = "pause"
     RESUME = "resume"
-    HALT = "halt"
+    END = "end"
     """Come to rest and end it."""
+
+
+def tag_of(name: str) -> str:
+    """Return the tag of the message class ``name``: ``ClearStop`` is ``clear_stop``."""
+    return re.sub(r"(?<=.)([A-Z])", r"_\1", name).lower()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequestTraits:
+    """Traits of one class of requests. The default commands the arm.
+
+    Attributes:
+        free: costs nothing of the budget, however much else was asked.
+        question: changes nothing.
+        answered: is answered without an ``id`` too.
+        stream: one of many in a row, answered at once, before the arm's process has taken it.
+        for_program: is given to the program that runs, if the sender is its owner.
+        safety: is never too frequent.
+    """
+
+    free: bool = False
+    question: bool = False
+    answered: bool = False
+    stream: bool = False
+    for_program: bool = False
+    safety: bool = False
+
+
+COMMAND = RequestTraits()
+"""Traits of a request for one command of the arm, which costs what it takes."""
+
+LEASE = RequestTraits(free=True)
+"""Traits of a request about who holds the arm."""
 
 
 class Request(
@@ -99,8 +134,13 @@ class Request(
     forbid_unknown_fields=True,
     kw_only=True,
     tag_field="do",
-    tag=str.lower,
+    tag=tag_of,
 ):
-    """Any of them; ``do`` is the name of the class in small letters."""
+    """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it.
+
+    Each class declares ``traits``.
+    """
+
+    traits: ClassVar[RequestTraits]
 
     id: Id = None

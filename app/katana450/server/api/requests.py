@@ -7,19 +7,16 @@ shoulder or in the base frame on the table.
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
 
 from katana450.errors import InputError
 from katana450.maths.kinematics.reading import Reading
-from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import (
+    COMMAND,
     FASTEST,
-    FASTEST_ANGULAR,
-    FASTEST_LINEAR,
     LARGEST,
     LEAST_SHARE,
     MOST_JOINTS,
@@ -29,14 +26,33 @@ from katana450.server.api.fields import (
     Form,
     Frame,
     Id,
-    Matrix4,
     Mount,
     Name,
     Order,
     Press,
-    Rates,
     Request,
-    Vector3,
+    RequestTraits,
+)
+from katana450.server.api.lease_requests import (
+    Acquire,
+    Ask,
+    Give,
+    ReleaseLease,
+    Take,
+    Withdraw,
+)
+from katana450.server.api.motion_requests import (
+    EndDrag,
+    GoToZero,
+    Gripper,
+    Home,
+    Jog,
+    Joint,
+    Joints,
+    Pose,
+    Position,
+    Servo,
+    Turn,
 )
 from katana450.server.api.scene_requests import (
     Attach,
@@ -57,14 +73,17 @@ __all__ = [
     "AnyRequest",
     "Ask",
     "Attach",
-    "Beat",
     "Branch",
+    "ClearStop",
+    "EndDrag",
     "Fill",
     "Form",
     "Frame",
     "Get",
     "Give",
+    "GoToZero",
     "Gripper",
+    "Heartbeat",
     "Hello",
     "Hold",
     "Home",
@@ -72,29 +91,27 @@ __all__ = [
     "Joint",
     "Joints",
     "Load",
-    "Look",
     "Mount",
     "Named",
+    "Nudge",
     "Order",
     "Pause",
     "Place",
     "Pose",
     "Position",
     "Program",
+    "Query",
     "Read",
-    "Release",
+    "ReleaseLease",
     "Remove",
     "Request",
-    "Reset",
     "Resume",
     "Servo",
     "Set",
     "Setting",
-    "Settle",
     "Speed",
     "Steer",
     "Stop",
-    "Stretch",
     "Take",
     "Tool",
     "Turn",
@@ -108,15 +125,19 @@ __all__ = [
 class Hello(Request, frozen=True, kw_only=True):
     """The first line on the TCP port: who speaks, and a link's token where one is asked for."""
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     name: Name
     token: Annotated[str, Meta(max_length=400)] = ""
 
 
-class Beat(Request, frozen=True, kw_only=True):
-    """A sign of life; the number comes back, which gives the round trip.
+class Heartbeat(Request, frozen=True, kw_only=True):
+    """A heartbeat; the number comes back, which gives the round trip.
 
     Whoever holds the arm gives ten a second. Without them a moving arm is stopped.
     """
+
+    traits: ClassVar[RequestTraits] = RequestTraits(free=True, answered=True)
 
     n: int = 0
 
@@ -125,117 +146,32 @@ class Stop(Request, frozen=True, kw_only=True):
     """STOP: the arm comes to rest as fast as it can. Everybody may, at any time.
 
     Who says it again, for want of an answer, gives the same ``press``: it counts once, so that a
-    late one does not undo the reset that came in between.
+    late one does not undo the ``clear_stop`` that came in between.
     """
+
+    traits: ClassVar[RequestTraits] = RequestTraits(free=True, safety=True)
 
     press: Press = None
 
 
-class Reset(Request, frozen=True):
-    """End a stop. Nothing moves by it; old targets are gone."""
+class ClearStop(Request, frozen=True):
+    """Accept motion again after a stop. Nothing moves by it; old targets are gone."""
 
-
-class Acquire(Request, frozen=True):
-    """Have the arm if nobody has it. A command by whoever holds nothing asks for this by itself."""
-
-
-class Take(Request, frozen=True):
-    """Have it even so: for admins."""
-
-
-class Ask(Request, frozen=True):
-    """Ask whoever has it."""
-
-
-class Withdraw(Request, frozen=True):
-    """Ask no more."""
-
-
-class Release(Request, frozen=True):
-    """Give it up."""
-
-
-class Give(Request, frozen=True, kw_only=True):
-    """Give it to the window or program of that number."""
-
-    to: int
-
-
-class Jog(Request, frozen=True, kw_only=True):
-    """Move for 0.2 s: (x, y, z) [m/s], pitch and roll [rad/s], along the axes of a frame.
-
-    To be said again while the motion shall last.
-    """
-
-    rates: Rates
-    frame: JogFrame = JogFrame.BASE
-
-    def __post_init__(self) -> None:
-        limits = (FASTEST_LINEAR,) * 3 + (FASTEST_ANGULAR,) * 2
-        for rate, limit in zip(self.rates, limits, strict=True):
-            if not math.isfinite(rate) or abs(rate) > limit:
-                raise ValueError(f"{rate} is no rate between {-limit:g} and {limit:g}")
+    traits: ClassVar[RequestTraits] = RequestTraits(free=True)
 
 
 class Speed(Request, frozen=True, kw_only=True):
     """How fast the arm is at most, as a share of full speed."""
 
+    traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
+
     value: Annotated[float, Meta(ge=SLOWEST, le=FASTEST)]
-
-
-class Joint(Request, frozen=True, kw_only=True):
-    """Drive one joint; ``axis`` counts from 1. What slides is told in m."""
-
-    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
-    value: float
-
-
-class Joints(Request, frozen=True, kw_only=True):
-    """Drive all joints to ``q``; they arrive together, on a straight line in joint space."""
-
-    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
-
-
-class Servo(Request, frozen=True, kw_only=True):
-    """One of a stream of joint angles, followed under the limits of speed, acceleration and jerk.
-
-    ``qd`` says how fast they change; without it that is seen from the stream, less exactly. When no
-    other comes for 0.2 s the arm comes to rest.
-    """
-
-    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
-    qd: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)] | None = None
-
-
-class Pose(Request, frozen=True, kw_only=True):
-    """Bring the tool to a pose, as near as five axes can; what gives way is the ``reading``'s."""
-
-    T: Matrix4
-    frame: Frame = Frame.SHOULDER
-
-
-class Position(Request, frozen=True, kw_only=True):
-    """Bring the tool point somewhere; pitch and roll stay as wished."""
-
-    p: Vector3
-    frame: Frame = Frame.SHOULDER
-
-
-class Turn(Request, frozen=True, kw_only=True):
-    """Give the tool a pitch (positive downwards) and a roll; its point stays as wished."""
-
-    pitch: float
-    roll: float
-
-
-class Gripper(Request, frozen=True, kw_only=True):
-    """Drive the finger joint; the arm's description says between which angles."""
-
-    angle: float
 
 
 class Tool(Request, frozen=True, kw_only=True):
     """From now on targets and read-outs are of this tool frame. Nothing moves."""
+
+    traits: ClassVar[RequestTraits] = COMMAND
 
     name: Name
 
@@ -243,30 +179,36 @@ class Tool(Request, frozen=True, kw_only=True):
 class Read(Request, frozen=True, kw_only=True):
     """From now on this says which numbers of a target count when not all can be had."""
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     reading: Reading
 
 
 class Branch(Request, frozen=True, kw_only=True):
     """Go to the wished pose with another shoulder or elbow."""
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     shoulder: Literal["front", "back"]
     elbow: Literal["up", "down"]
 
 
-class Settle(Request, frozen=True):
-    """What the arm can do becomes what is wished."""
+class Nudge(Request, frozen=True, kw_only=True):
+    """Drive one joint on by a relative angle; ``axis`` counts from 1. What slides moves by m.
 
+    The angle counts from where the joint is going. Beyond the joint's range it is limited.
+    """
 
-class Home(Request, frozen=True):
-    """Drive to the ready posture."""
+    traits: ClassVar[RequestTraits] = COMMAND
 
-
-class Stretch(Request, frozen=True):
-    """Drive to the zero posture, the arm stretched along x."""
+    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    by: float
 
 
 class Hold(Request, frozen=True):
     """Come to rest and forget the target."""
+
+    traits: ClassVar[RequestTraits] = COMMAND
 
 
 class Pause(Request, frozen=True):
@@ -276,9 +218,13 @@ class Pause(Request, frozen=True):
     program that started it. A program that is planned meanwhile starts paused.
     """
 
+    traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
+
 
 class Resume(Request, frozen=True):
     """Go on."""
+
+    traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
 
 class Program(Request, frozen=True, kw_only=True):
@@ -290,20 +236,24 @@ class Program(Request, frozen=True, kw_only=True):
     same.
     """
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     text: Annotated[str, Meta(max_length=LARGEST)]
     more: bool = False
     speed: Annotated[float, Meta(ge=LEAST_SHARE, le=1.0)] = 1.0
 
 
 class Steer(Request, frozen=True, kw_only=True):
-    """Run, step, pause, resume or halt the program that is planned.
+    """Run, step, pause, resume or end the program that is planned.
 
     It drives by itself, under its own name; its owner has to stay connected. While it is being
     planned, ``run`` and ``step`` take effect afterwards, unless the arm is told to move, hold or
-    stop in between; ``pause`` makes it start paused, and ``halt`` cancels the planning. A program
+    stop in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program
     that is to run from another posture or scene than it was planned for is planned anew first. An
     arm that is paused when a program begins stays paused until ``resume``.
     """
+
+    traits: ClassVar[RequestTraits] = COMMAND
 
     order: Order
 
@@ -314,32 +264,37 @@ class Watch(Request, frozen=True, kw_only=True):
     ``fields``: of the VRML world, whose values each state is to bring.
     """
 
+    traits: ClassVar[RequestTraits] = RequestTraits(question=True)
+
     hz: Annotated[float, Meta(ge=0.0, le=MOST_STATES)]
     fields: tuple[Named, ...] = ()
 
 
-class Look(Request, frozen=True, kw_only=True):
+class Query(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
     the things around it, the VRML world, where its links are."""
+
+    traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
 
     at: Literal["state", "arm", "ledger", "branches", "loop", "things", "world", "links"] = "state"
 
 
 AnyRequest = (
     Hello
-    | Beat
+    | Heartbeat
     | Stop
-    | Reset
+    | ClearStop
     | Acquire
     | Take
     | Ask
     | Withdraw
-    | Release
+    | ReleaseLease
     | Give
     | Jog
     | Speed
     | Joint
     | Joints
+    | Nudge
     | Servo
     | Pose
     | Position
@@ -348,9 +303,9 @@ AnyRequest = (
     | Tool
     | Read
     | Branch
-    | Settle
+    | EndDrag
     | Home
-    | Stretch
+    | GoToZero
     | Hold
     | Pause
     | Resume
@@ -364,7 +319,7 @@ AnyRequest = (
     | Program
     | Steer
     | Watch
-    | Look
+    | Query
 )
 
 _decoder: msgspec.json.Decoder[AnyRequest] = msgspec.json.Decoder(AnyRequest)

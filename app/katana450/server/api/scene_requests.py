@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
 
 from katana450.server.api.fields import (
+    COMMAND,
     FieldValue,
     Form,
     Frame,
@@ -17,6 +18,7 @@ from katana450.server.api.fields import (
     Name,
     NodeName,
     Request,
+    RequestTraits,
 )
 
 
@@ -31,6 +33,8 @@ class Place(Request, frozen=True, kw_only=True):
     they stand on the table or on another thing. ``colour``: as "#94a3b8", or "own" for that of the
     file. ``hidden``: it is not drawn, and counts for contacts even so.
     """
+
+    traits: ClassVar[RequestTraits] = COMMAND
 
     name: Name
     T: Matrix4 | None = None
@@ -52,6 +56,8 @@ class Attach(Request, frozen=True, kw_only=True):
     is.
     """
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     name: Name
     to: Mount
     T: Matrix4 | None = None
@@ -63,17 +69,23 @@ class Load(Request, frozen=True, kw_only=True):
     The arm stays where it is.
     """
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     scene: Key
 
 
 class Remove(Request, frozen=True, kw_only=True):
     """Take a thing away."""
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     name: Name
 
 
 class Fill(Request, frozen=True, kw_only=True):
     """Fill the cup with so many ml of water, and wipe up what is elsewhere."""
+
+    traits: ClassVar[RequestTraits] = COMMAND
 
     ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
@@ -100,6 +112,8 @@ class Set(Request, frozen=True, kw_only=True):
     choice as it is made.
     """
 
+    traits: ClassVar[RequestTraits] = COMMAND
+
     node: NodeName
     field: NodeName
     value: FieldValue
@@ -108,6 +122,8 @@ class Set(Request, frozen=True, kw_only=True):
 
 class Get(Request, frozen=True, kw_only=True):
     """Tell what a field of the VRML world is now, as VR Source does, and ``more`` of them."""
+
+    traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
 
     node: NodeName
     field: NodeName

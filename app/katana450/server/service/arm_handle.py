@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
+from concurrent.futures import Future
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
-from katana450.arm.control.joint_session import JointSession
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -28,25 +26,22 @@ from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
-from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.api.fields import Rates
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.nodes import Nodes
 
 
-class Motion:
-    """One arm."""
+class ArmHandle:
+    """One arm. Reads are for everybody; ``deliver`` is for ``CommandGate`` alone."""
 
     def __init__(
         self,
         robot: Robot,
-        session: Session | JointSession,
+        session: Session,
         link: FrontEnd,
         navigator: PlanningWorker | None,
         nodes: Nodes,
-        let_go: Callable[[], None],
     ) -> None:
         """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
-        has a name in its VRML world. ``let_go`` takes the handles of the view out of every hand."""
+        has a name in its VRML world."""
         self.robot = robot
         self.nodes = nodes
         self._session = session
@@ -54,7 +49,6 @@ class Motion:
         self._board = link.board
         self._navigator = navigator
         self._sink: CommandSink = link if navigator is None else navigator
-        self._let_go = let_go
         self._loads = loads_of(robot)
         self._measured: (
             tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
@@ -83,15 +77,13 @@ class Motion:
     @property
     def rig(self) -> PlanContext:
         """What programs are planned for. Raises InputError where there are only joints."""
-        if isinstance(self._session, JointSession):
-            self._session.refuse()
         return PlanContext(self._session, self.arm.T_base_shoulder)
 
     @property
     def arm(self) -> MountedArm:
         """The arm. Raises InputError with the reason where there are only joints."""
         if self.robot.arm is None:
-            raise InputError(f"Only its joints can be driven. {self.robot.why}")
+            raise InputError(self.robot.joint_group.refusal)
         return self.robot.arm
 
     @property
@@ -111,8 +103,6 @@ class Motion:
 
     def _posture(self) -> tuple[Margins, FloatArray | None]:
         """Worked out once for everybody who asks, and anew when something has changed."""
-        if isinstance(self._session, JointSession):
-            self._session.refuse()
         state = self.state
         world, x = self._session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
@@ -126,9 +116,16 @@ class Motion:
         """The branches there are to choose from. Raises InputError where there are none."""
         return self._session.choices(self.state)
 
-    def put(self, command: cmd.Command) -> int:
-        """Any command; its ticket. Raises InputError for one that cannot be."""
-        return self._sink.put(command)
+    def deliver(self, command: cmd.Command, actor: Actor) -> int:
+        """Send ``command`` of ``actor``, which may give it; return its ticket.
+
+        Raises InputError for a command that the arm cannot be given.
+        """
+        return self._sink.deliver(command, actor)
+
+    def outcome(self, ticket: int) -> Future[Outcome]:
+        """Return what became of the command of ``ticket``, once the arm's process has told."""
+        return self._board.outcomes.of(ticket)
 
     @property
     def state(self) -> State:
@@ -158,35 +155,3 @@ class Motion:
     def age(self) -> float:
         """Time since the arm's process last proved that its control loop runs [s]."""
         return self._link.age
-
-    def stop(self) -> int:
-        """Rest as fast as the arm can, and obey nothing until it is released; its ticket."""
-        ticket = self._sink.put(cmd.Stop())
-        self._let_go()
-        return ticket
-
-    def release(self) -> None:
-        """After a stop: obey again. Nothing moves by this. Raises InputError when it cannot be."""
-        self._sink.put(cmd.Release())
-
-    def hold(self) -> None:
-        """Come to rest and forget every target; no hand holds a handle any more."""
-        self._let_go()
-        self._put(cmd.Reset())
-
-    def jog(self, rates: Rates, frame: JogFrame) -> None:
-        """Go with these rates for a moment. Raises InputError where there are only joints."""
-        if isinstance(self._session, JointSession):
-            self._session.refuse()
-        self._put(cmd.Jog(np.array(rates), frame))
-
-    def limit(self, share: float) -> None:
-        """No motion is faster than this share of the most."""
-        self._put(cmd.SpeedScale(share))
-
-    def _put(self, command: cmd.Command) -> None:
-        try:
-            self._sink.put(command)
-        except InputError:
-            # The mailbox is full: what is asked again and again is, and a stop always has room.
-            return

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import nullcontext
 
 import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import Verdict
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
@@ -20,36 +22,26 @@ from katana450.server.service.interfaces import Arm
 from katana450.server.service.object_requests import ObjectRequests
 
 BARE: dict[type[requests.AnyRequest], cmd.Command] = {
-    requests.Settle: cmd.Settle(),
+    requests.EndDrag: cmd.EndDrag(),
     requests.Home: cmd.Home(),
-    requests.Stretch: cmd.Stretch(),
-    requests.Hold: cmd.Reset(),
+    requests.GoToZero: cmd.GoToZero(),
+    requests.Hold: cmd.Hold(),
     requests.Pause: cmd.Pause(),
     requests.Resume: cmd.Resume(),
 }
 """What says all there is to say by its name."""
 
-FREE = (
-    requests.Stop,
-    requests.Reset,
-    requests.Beat,
-    requests.Acquire,
-    requests.Take,
-    requests.Ask,
-    requests.Withdraw,
-    requests.Give,
-    requests.Release,
-)
-"""Requests that cost nothing, however much else was asked: STOP, signs of life, and who drives."""
 
-QUESTIONS = (requests.Look, requests.Get, requests.Watch)
-"""Requests that change nothing."""
+ACCEPTED, UNKNOWN = Verdict.ACCEPTED.value, "unknown"
+"""Outcomes in answers that do not come from the arm's process."""
+
+OUTCOME_SECONDS = 1.0
+"""[s] Time in which the arm's process tells the outcome of a command; a tick takes 10 ms."""
 
 
 def driver_key(hub: Hub, window: Window) -> str:
     """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
-    actor = hub.performer.actor(window)
-    return window.person.key if hub.lease.holder == actor.person else ""
+    return window.person.key if hub.performer.drives(window) else ""
 
 
 class Dispatcher:
@@ -62,11 +54,13 @@ class Dispatcher:
     def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life.
 
-        What it costs is taken from ``budget``; raises BusyError when that is used up. FREE requests
-        cost nothing, nor does what steers the arm for whoever holds it.
+        The outcome of a command may be still to come, see ``is_pending``.
+
+        What it costs is taken from ``budget``; raises BusyError when that is used up. A request
+        that is ``free`` costs nothing, nor does what steers the arm for whoever holds it.
         """
-        question, driver = isinstance(request, QUESTIONS), driver_key(self._hub, window)
-        free = isinstance(request, FREE) or (driver and not question)
+        question, driver = request.traits.question, driver_key(self._hub, window)
+        free = request.traits.free or (driver and not question)
         with nullcontext() if free else budget.charged(driver, question=question):
             return msgspec.structs.replace(self._done(window, request), id=request.id)
 
@@ -74,31 +68,56 @@ class Dispatcher:
         hub = self._hub
         hub.beat(window)
         match request:
-            case requests.Beat(n=n):
+            case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
-            case requests.Look(at=at):
-                return self.look(at)
+            case requests.Query(at=at):
+                return self.query(at)
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.Named(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
-        if isinstance(request, requests.Pause | requests.Resume | requests.Speed):
-            window = hub.performer.actor(window)
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
-            return answers.Done()
-        return answers.Done(ticket=hub.move(window, command), rotation_misfit=_misfit(request))
+            return answers.Done(outcome=ACCEPTED if request.traits.stream else None)
+        # A stream is not held up by its answers, and what is planned first has no ticket yet.
+        at_once = request.traits.stream or command.traits.planned
+        return answers.Done(
+            ticket=hub.move(window, command),
+            outcome=ACCEPTED if at_once else None,
+            rotation_misfit=_misfit(request),
+        )
+
+    @staticmethod
+    def is_pending(answer: answers.Answer) -> bool:
+        """Return whether ``answer`` is that of a command whose outcome is still to come."""
+        if not isinstance(answer, answers.Done):
+            return False
+        return answer.ticket is not None and answer.outcome is None
+
+    async def concluded(self, pending: answers.Answer) -> answers.Answer:
+        """Return ``pending`` with what became of its command, once the arm's process has told.
+
+        A command that the session refuses becomes ``answers.Refused``.
+        """
+        assert isinstance(pending, answers.Done)
+        assert pending.ticket is not None
+        try:
+            async with asyncio.timeout(OUTCOME_SECONDS):
+                outcome = await asyncio.wrap_future(self._hub.present().outcome(pending.ticket))
+        except TimeoutError:
+            return msgspec.structs.replace(pending, outcome=UNKNOWN)
+        return serialize.concluded(pending, outcome)
 
     def _arrange(self, window: Window, request: requests.AnyRequest) -> None:
         """What is about who drives, and how."""
         hub = self._hub
         match request:
             case requests.Stop(press=press):
-                hub.stop(window.person.name, press)
-            case requests.Reset():
-                hub.reset(window)
+                hub.stop(window.actor, press)
+            case requests.ClearStop():
+                hub.clear_stop(window)
             case requests.Acquire():
                 hub.acquire(window)
             case requests.Take():
@@ -107,8 +126,8 @@ class Dispatcher:
                 hub.request(window)
             case requests.Withdraw():
                 hub.withdraw(window)
-            case requests.Release():
-                hub.give_up(window)
+            case requests.ReleaseLease():
+                hub.release_lease(window)
             case requests.Give(to=number):
                 hub.hand_over(window, number)
             case requests.Jog(rates=rates, frame=frame):
@@ -129,6 +148,8 @@ class Dispatcher:
                 return cmd.SetJoint(axis - 1, value)
             case requests.Joints(q=q):
                 return cmd.SetJoints(np.array(q))
+            case requests.Nudge(axis=axis, by=by):
+                return cmd.Nudge(axis - 1, by)
             case requests.Servo(q=q, qd=qd):
                 return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
             case requests.Pose(T=T, frame=frame):
@@ -159,7 +180,7 @@ class Dispatcher:
             return np.eye(4)
         return se3.inverse(self._hub.present().arm.T_base_shoulder)
 
-    def look(self, at: str) -> answers.Answer:
+    def query(self, at: str) -> answers.Answer:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
         match at:

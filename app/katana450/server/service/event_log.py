@@ -1,4 +1,4 @@
-"""Why the arm did not do what was wished, and who drove it then: for programs, and for the log."""
+"""Why the arm did not reach its target, and whose command it was: for programs and the log."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.state import Reason
 from katana450.arm.runtime.state_publisher import KEPT
@@ -17,7 +18,7 @@ from katana450.server.view.texts import told
 log = logging.getLogger(__name__)
 
 UNITS = {
-    Reason.HALTED: "m",
+    Reason.STOPPED: "m",
     Reason.CONTACT: "m",
     Reason.ACROSS_GAP: "rad",
     Reason.OUT_OF_REACH: "m",
@@ -37,11 +38,16 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Line:
-    """An entry of the ledger. who: drove then, or stopped the arm, if anybody did. when: in UTC."""
+    """An entry of the ledger. when: in UTC."""
 
     entry: Entry
-    who: str | None
     when: datetime
+
+    @property
+    def who(self) -> str | None:
+        """Name of the participant whose command it was; None where the server acted itself."""
+        actor = self.entry.actor
+        return None if actor is None or actor.channel is CommandChannel.SERVER else actor.name
 
 
 class Journal:
@@ -53,13 +59,13 @@ class Journal:
         # Entries are on the loop's clock; people have another.
         self._epoch = time.time() - time.perf_counter()
 
-    def follow(self, ledger: Sequence[Entry], who: str | None) -> None:
-        """Take down what ``ledger`` has that it had not before; ``who`` had a hand in it."""
+    def follow(self, ledger: Sequence[Entry]) -> None:
+        """Take down what ``ledger`` has that it had not before."""
         for entry in _newer(ledger, self._seen):
             when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
-            self._lines.append(Line(entry, who, when))
+            self._lines.append(Line(entry, when))
             if entry.began:
-                log.info("%s%s", "" if who is None else f"{who}: ", told(entry.finding))
+                log.info("%s%s", _credit(entry), told(entry.finding))
         if ledger:
             self._seen = ledger[-1]
 
@@ -67,6 +73,14 @@ class Journal:
     def lines(self) -> tuple[Line, ...]:
         """The oldest first."""
         return tuple(self._lines)
+
+
+def _credit(entry: Entry) -> str:
+    """Return who did what on what grounds, as the beginning of a log line."""
+    actor = entry.actor
+    if actor is None or actor.grounds is None:
+        return ""
+    return f"{actor.name} ({actor.channel.value}, {actor.grounds.value}), {entry.command}: "
 
 
 def _newer(ledger: Sequence[Entry], seen: Entry | None) -> list[Entry]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Future
 from typing import Protocol
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.state import State
+from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -18,13 +20,11 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.api.fields import Rates
-from katana450.server.service.vrml_nodes import Nodes
+from katana450.server.service.nodes import Nodes
 
 
 class Arm(Protocol):
-    """What the gateway asks of the arm; ``Motion`` is one."""
+    """What the gateway asks of the arm; ``ArmHandle`` is one."""
 
     @property
     def robot(self) -> Robot: ...
@@ -76,17 +76,9 @@ class Arm(Protocol):
 
     def beat(self) -> None: ...
 
-    def stop(self) -> int: ...
+    def deliver(self, command: cmd.Command, actor: Actor) -> int: ...
 
-    def release(self) -> None: ...
-
-    def hold(self) -> None: ...
-
-    def jog(self, rates: Rates, frame: JogFrame) -> None: ...
-
-    def limit(self, share: float) -> None: ...
-
-    def put(self, command: cmd.Command) -> int: ...
+    def outcome(self, ticket: int) -> Future[Outcome]: ...
 
     def choices(self) -> tuple[Choice, ...]: ...
 

@@ -11,7 +11,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.lease import Role
+from katana450.arm.control.actor import SERVER, Actor, CommandChannel
+from katana450.arm.control.lease import Person, Role
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import runner
 from katana450.extensions.programs.program import Program
@@ -19,6 +20,7 @@ from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.source import LARGEST
 from katana450.server.api import answers
 from katana450.server.api.fields import Order
+from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.heartbeats import Heartbeat
 from katana450.server.service.program_planning import Planning
 from katana450.server.web.authenticator import Identity
@@ -48,7 +50,6 @@ class ProgramRunner:
         self._parts: dict[str, str] = {}
         self._planning: Planning | None = None
         self._owner: Window | None = None
-        self._hand: Window | None = None
         self._then: Order | None = None
         self._seen = 0.0
         self._self: Window | None = None
@@ -73,37 +74,39 @@ class ProgramRunner:
 
     def owns(self, window: Window) -> bool:
         """Whether ``window`` is the page or API program that the present program is of."""
-        return self._owner is not None and self._owner.person.key == window.person.key
+        return self._is_owner(window.person)
 
-    def actor(self, window: Window) -> Window:
-        """The window in whose name ``window`` pauses, resumes and slows down the arm.
-
-        For the owner of the program that runs it is the program's own, which holds the arm.
-        """
+    def drives(self, window: Window) -> bool:
+        """Return whether ``window`` holds the lease, or owns the program that does."""
         joined = self._self
-        return joined if joined is not None and self.owns(window) else window
+        return self._hub.lease.holder == (
+            joined.person if joined is not None and self.owns(window) else window.person
+        )
 
-    def touch(self, window: Window) -> None:
-        """``window`` touches the panel of programs. Raises LeaseError if it must not."""
-        self._check_may_drive(window)
+    def check_may_touch(self, actor: Actor) -> None:
+        """Raise LeaseError where ``actor`` must not touch the panel of programs; in any thread."""
+        self._check_may_drive(actor.person)
         if self.running:
-            self._check_owns(window)
-        self._hand = window
+            self._check_owns(actor.person)
 
-    def plan(self, text: str, then: Order | None) -> None:
-        """Plan ``text`` for who touched the panel last, and do ``then`` once it is planned."""
-        if self._hand is None:
-            raise LeaseError("Open the front page to run programs.")
+    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
+        """Plan ``text`` for ``actor`` at the panel, and do ``then`` once it is planned."""
+        window = self._window_of(actor)
         if then is not None:
-            self._check_not_stopped()
-        self.script(self._hand, text, more=False, speed=1.0)
+            self._hub.gate.check_not_stopped()
+        self.script(window, text, more=False, speed=1.0)
         self._then = then
 
-    def order(self, order: Order) -> None:
-        """`steer` for the window that touched the panel last."""
-        if self._hand is None:
+    def order(self, order: Order, actor: Actor) -> None:
+        """`steer` for ``actor`` at the panel."""
+        self.steer(self._window_of(actor), order)
+
+    def _window_of(self, actor: Actor) -> Window:
+        self._hub.gate.check_current(actor)
+        window = self._hub.window(actor.key)
+        if window is None:
             raise LeaseError("Open the front page to run programs.")
-        self.steer(self._hand, order)
+        return window
 
     def script(self, window: Window, text: str, *, more: bool, speed: float) -> None:
         """Take a part of a script; after the last it is planned, from where the arm stands then.
@@ -122,7 +125,7 @@ class ProgramRunner:
         arm = self._hub.present()
         if arm.state.moving:
             raise LeaseError("The arm moves: a program is planned from where it stands.")
-        self._check_may_drive(window)
+        self._check_may_drive(window.person)
         before = self._planning
         if before is not None and before.fits(text, speed, arm.state):
             before.refused, before.note = None, ""
@@ -145,15 +148,15 @@ class ProgramRunner:
         self._seen = self._hub.clock()
 
     def steer(self, window: Window, order: Order) -> None:
-        """Run, step, pause, resume or halt it. Raises LeaseError with the reason why not.
+        """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
 
         While it is planned, RUN and STEP are done as soon as it is, PAUSE and RESUME decide whether
-        it then starts paused, and HALT cancels the planning.
+        it then starts paused, and END cancels the planning.
         """
-        self._check_may_drive(window)
+        self._check_may_drive(window.person)
         planning = self._planning
         if planning is not None and planning.busy:
-            self._check_owns(window)
+            self._check_owns(window.person)
             self._steer_planning(planning, window, order)
             return
         if order in (Order.RUN, Order.STEP) and not self.running:
@@ -161,7 +164,7 @@ class ProgramRunner:
             return
         if not self.running or self._run is None:
             raise LeaseError("No program runs.")
-        self._check_owns(window)
+        self._check_owns(window.person)
         match order:
             case Order.RUN | Order.RESUME:
                 self._tell(cmd.Resume())
@@ -170,19 +173,19 @@ class ProgramRunner:
                 self._tell(*commands)
             case Order.PAUSE:
                 self._tell(cmd.Pause())
-            case Order.HALT:
+            case Order.END:
                 self._end(f"{window.person.name} ended it.")
 
     def _steer_planning(self, planning: Planning, window: Window, order: Order) -> None:
         match order:
             case Order.RUN | Order.STEP:
-                self._check_not_stopped()
+                self._hub.gate.check_not_stopped()
                 self._then, planning.note = order, ""
             case Order.PAUSE:
                 self._hub.move(window, cmd.Pause())
             case Order.RESUME:
                 self._hub.move(window, cmd.Resume())
-            case Order.HALT:
+            case Order.END:
                 self._then = None
                 planning.cancel(f"{window.person.name} cancelled the planning.")
 
@@ -287,7 +290,7 @@ class ProgramRunner:
         arm = hub.present()
         changed = planning.changed_to(arm.state)
         if changed:
-            self._check_not_stopped()
+            self._hub.gate.check_not_stopped()
             if arm.state.moving:
                 raise LeaseError("The arm moves: a program is planned from where it stands.")
             if hub.lease.holder != window.person:
@@ -296,21 +299,25 @@ class ProgramRunner:
             self._plan(window, planning.text, planning.speed, changed)
             self._then = order
             return
-        if hub.lease.holder == window.person:
-            hub.give_up(window)
         planning.refused, planning.note = None, ""
         program = planning.program
         visitor = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
-        joined = hub.join(visitor, "program", lambda _notice: None, _Here(hub.clock))
+        here = _Here(hub.clock)
+        joined = hub.join(visitor, "program", lambda _notice: None, here, CommandChannel.PROGRAM)
         try:
-            hub.acquire(joined)
+            if hub.lease.holder == window.person:
+                # In one step: nobody takes the lease in between.
+                hub.hand_over(window, joined.number)
+            else:
+                hub.acquire(joined)
             # What was wanted before is over; a pause lasts until somebody resumes. This also finds
             # out whether the arm is stopped.
-            hub.move(joined, cmd.Reset())
+            hub.move(joined, cmd.Hold())
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise
         self._self, self._owner, self._seen = joined, window, hub.clock()
+        hub.gate.program = RunningProgram(joined.person, window.person.key)
         self._speed = self._commanded = arm.state.speed
         self._allowed = 1.0
         self._run = Run(self._seen, single=order is Order.STEP)
@@ -330,7 +337,7 @@ class ProgramRunner:
 
     def _end(self, why: str) -> None:
         assert self._run is not None
-        self._run, commands = runner.halted(self._run, why)
+        self._run, commands = runner.stopped(self._run, why)
         # A stopped arm takes no commands, nor does one that does not answer.
         with suppress(LeaseError, InputError):
             self._tell(*commands)
@@ -341,12 +348,13 @@ class ProgramRunner:
         assert self._self is not None
         assert self._run is not None
         joined, self._self = self._self, None
+        self._hub.gate.program = None
         self._run = runner.ended(self._run, phase, why)
-        if self._hub.arm is not None:
-            # A program's speed is its own.
-            self._hub.arm.limit(self._speed)
+        # A program's speed is its own.
+        with suppress(InputError):
+            self._hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
         if self._hub.lease.holder == joined.person:
-            self._hub.give_up(joined)
+            self._hub.release_lease(joined)
         self._hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
@@ -371,16 +379,14 @@ class ProgramRunner:
             self._seen = max(self._seen, window.heartbeat.newest)
         return t - self._seen > self._owner_silence
 
-    def _check_not_stopped(self) -> None:
-        """A run that is asked for during a stop must not begin after the reset."""
-        if self._hub.stopped is not None:
-            raise LeaseError("The arm is stopped: reset it first.")
-
-    def _check_may_drive(self, window: Window) -> None:
-        if not window.person.role.may_drive:
+    def _check_may_drive(self, person: Person) -> None:
+        if not person.role.may_drive:
             raise LeaseError("You may watch, not drive.")
 
-    def _check_owns(self, window: Window) -> None:
+    def _is_owner(self, person: Person) -> bool:
+        return self._owner is not None and self._owner.person.key == person.key
+
+    def _check_owns(self, person: Person) -> None:
         owner = self._owner
-        if owner is not None and not self.owns(window) and not window.person.role.may_take:
+        if owner is not None and not self._is_owner(person) and not person.role.may_take:
             raise LeaseError(f"The program is {owner.person.name}'s.")

@@ -40,8 +40,17 @@ def finding(found: control.Finding) -> answers.Finding:
         unit=unit,
         axis=None if found.axis is None else found.axis + 1,
         parts=found.parts,
-        seconds=found.time if found.reason is control.Reason.HALTED else None,
+        seconds=found.time if found.reason is control.Reason.STOPPED else None,
     )
+
+
+def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | answers.Refused:
+    """Return ``done`` with the outcome of its command, or the refusal that this is."""
+    if outcome.verdict is control.Verdict.REFUSED:
+        why = outcome.why or "; ".join(told(each) for each in outcome.findings) + "."
+        return answers.Refused(id=done.id, why=why)
+    findings = tuple(finding(each) for each in outcome.findings)
+    return msgspec.structs.replace(done, outcome=outcome.verdict.value, findings=findings)
 
 
 def state(hub: Hub) -> answers.State:
@@ -198,9 +207,13 @@ def ledger(lines: Sequence[Line]) -> answers.Ledger:
 
 def line(line: Line) -> answers.Line:
     """One of the journal's."""
+    actor = line.entry.actor
+    grounds = None if actor is None or actor.grounds is None else actor.grounds.value
     return answers.Line(
         when=line.when.isoformat(timespec="milliseconds"),
         who=line.who,
+        command=line.entry.command,
+        grounds=grounds,
         began=line.entry.began,
         finding=finding(line.entry.finding),
     )

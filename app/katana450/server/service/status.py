@@ -47,7 +47,7 @@ def health(hub: Hub) -> str | None:
 def _line(state: State, program: Progress | None, *, waits: bool) -> _Line:
     """``waits``: whether the program runs as soon as it is planned."""
     line = _Line(mood(state), headline(state), sentence(state))
-    first = state.status in (Status.FAULT, Status.HALTED, Status.BLOCKED)
+    first = state.status in (Status.FAULT, Status.STOPPED, Status.BLOCKED)
     if program is None or first:
         return line
     step = f"Step {program.step} of {program.steps}"
@@ -78,7 +78,7 @@ def _orders(hub: Hub, window: Window) -> list[Order]:
         return []
     pause = [Order.RESUME if hub.arm.state.paused else Order.PAUSE] if hub.stopped is None else []
     if program.status == Stage.PLANNING.value:
-        return [*(pause if performer.waits else []), Order.HALT]
+        return [*(pause if performer.waits else []), Order.END]
     return pause if program.status in RUNS else []
 
 
@@ -95,7 +95,7 @@ def common(hub: Hub) -> dict[str, Any]:
         now = _Line("lost", "No word from the arm", f"What is shown is {age:.1f} s old.")
     if stopped is not None and not stopped.confirmed:
         why = f"The arm has not confirmed it. {now.why}".rstrip()
-        now = _Line("stopping", "Stop requested", why)
+        now = _Line("stopped", "Stop requested", why)
     return {
         **now._asdict(),
         "stop": None if stopped is None else stopped.stage,
@@ -111,11 +111,11 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     person, lease = window.person, hub.lease
     mine = lease.holder == person
     age = hub.age(window)
-    resets = hub.may_reset(window)
+    clears = hub.may_clear_stop(window)
     other = lease.holder.name if lease.holder is not None else "whoever may drive"
-    until = "Reset" if resets else f"{other} resets it"
+    until = "Clear stop is pressed" if clears else f"{other} clears the stop"
     return {
-        "resets": resets,
+        "may_clear_stop": clears,
         "until": "" if hub.stopped is None else f"Nothing moves until {until}.",
         "name": person.name,
         "role": person.role.value,

@@ -1,4 +1,4 @@
-"""The programs' panel and whoever runs them: across the threads of viser and of the gateway."""
+"""Requests of the programs' panel, carried from viser's threads to the gateway's."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future
 
+from katana450.arm.control.actor import Actor
 from katana450.errors import LeaseError
 from katana450.extensions.programs.program import Program
 from katana450.server.api import answers
@@ -40,13 +41,13 @@ class Steering:
         """The arm is told something else: a program that waits for its plan does not run."""
         self._performer.redirected()
 
-    def plan(self, text: str, then: Order | None) -> None:
+    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
         """Plan a script, and do ``then``. Raises KatanaError with the reason why not."""
-        self._do(lambda: self._performer.plan(text, then))
+        self._do(lambda: self._performer.plan(text, then, actor))
 
-    def steer(self, order: Order) -> None:
-        """Tell the program that runs. Raises LeaseError with the reason why not."""
-        self._do(lambda: self._performer.order(order))
+    def steer(self, order: Order, actor: Actor) -> None:
+        """Steer the program that runs. Raises LeaseError with the reason why not."""
+        self._do(lambda: self._performer.order(order, actor))
 
     def _do(self, act: Callable[[], None]) -> None:
         loop, future = self._loop(), Future[None]()

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import viser
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import State
-from katana450.errors import InputError, KatanaError
+from katana450.errors import KatanaError, LeaseError
 
 WORTH_SENDING = 2e-6
 """[deg, mm] Rounding on the way to radians and back is less."""
@@ -42,16 +43,45 @@ ORDERS: dict[str, cmd.Command] = {
 }
 
 
-def listener(put: Callable[[cmd.Command], int]) -> Listen:
-    """One that gives commands to ``put``, and tells a person what that refuses."""
+class GestureGate(Protocol):
+    """Path of a person's gestures to the arm; ``viser_bridge.gestures.Gestures`` is one."""
+
+    def actor(self, client_id: int | None, /) -> Actor:
+        """Return the giver of the gesture that viser just told of. Raises LeaseError."""
+        ...
+
+    def submit(self, command: cmd.Command, actor: Actor, /) -> int:
+        """Give ``command`` to the arm; return its ticket. Raises LeaseError and InputError."""
+        ...
+
+    def is_current(self, actor: Actor, /) -> bool:
+        """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
+        ...
+
+
+class NoGestures:
+    """A `GestureGate` that refuses everything, for a scene that drives no arm."""
+
+    def actor(self, _client_id: int | None) -> Actor:
+        raise LeaseError("This scene shows an arm and drives none.")
+
+    def submit(self, _command: cmd.Command, _actor: Actor) -> int:
+        raise LeaseError("This scene shows an arm and drives none.")
+
+    def is_current(self, _actor: Actor) -> bool:
+        return False
+
+
+def listener(gestures: GestureGate) -> Listen:
+    """Return one that submits commands, and shows the person why one is refused."""
 
     def listen(handle: Clickable, say: Callable[[], cmd.Command]) -> None:
         async def changed(event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:
-                put(say())
-            except InputError as error:
+                gestures.submit(say(), gestures.actor(event.client_id))
+            except KatanaError as error:
                 refuse(event, error)
 
         if isinstance(handle, viser.GuiInputHandle):

@@ -44,10 +44,6 @@ class Follower(ABC):
     def show(self, snapshot: Snapshot) -> None:
         """Send every browser what has changed."""
 
-    @abstractmethod
-    def let_go(self) -> None:
-        """Take the handles out of every hand: what is dragged on with them moves nothing."""
-
     def _run(self) -> None:
         try:
             self._follow()

@@ -9,17 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 import viser
 
-from katana450.arm.control.commands import Command, MoveTool, Settle, TurnTool
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands import Command, EndDrag, MoveTool, TurnTool
 from katana450.arm.control.state import State, ToolTarget
 from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.errors import KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
+from katana450.server.view.controls import GestureGate
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
 
@@ -34,6 +38,10 @@ DISTANCE_WORTH_SENDING = 1e-6
 
 TURN_WORTH_SENDING = 1e-7
 """Of each number of a quaternion."""
+
+
+PARTS = ("move", "pitch", "roll")
+"""What of the handle can be held."""
 
 
 @dataclass
@@ -62,14 +70,14 @@ class Gizmo:
         self,
         server: viser.ViserServer,
         arm: MountedArm,
-        put: Callable[[Command], None],
+        gestures: GestureGate,
         current: Callable[[], State],
     ) -> None:
-        """``put`` takes a command; ``current`` is the newest state."""
+        """``current``: the newest state."""
         self._arm = arm
-        self._put = put
+        self._gestures = gestures
         self._current = current
-        self._held: set[str] = set()
+        self._held: dict[str, Actor] = {}
         self._turns: dict[str, _Turn] = {}
         self._aim = _Aim((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
         bounds = ((-WORKSPACE, WORKSPACE),) * 3
@@ -103,11 +111,6 @@ class Gizmo:
             depth_test=False,
         )
 
-    def let_go(self) -> None:
-        """Forget every drag under way; nothing of it counts any more."""
-        self._held.clear()
-        self._turns.clear()
-
     def aim(self, state: State, T: FloatArray) -> None:
         """Take in where the goal of ``state`` is, ``T`` (4, 4) in the base frame."""
         chain = self._arm.chain_to(state.tool)
@@ -120,42 +123,52 @@ class Gizmo:
     def follow(self) -> None:
         """Go where the goal is, but for what is held."""
         aim = self._aim
-        if not self._held and _apart(self._move.position, aim.point) > DISTANCE_WORTH_SENDING:
+        apart = _apart(self._move.position, aim.point) > DISTANCE_WORTH_SENDING
+        if apart and not any(map(self._holds, PARTS)):
             place(self._move, aim.point)
-        if "pitch" not in self._held:
+        if not self._holds("pitch"):
             _turn(self._pitch, aim.pitched)
-        if "roll" not in self._held:
+        if not self._holds("roll"):
             _turn(self._roll, aim.rolled)
 
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
+        actor = self._gestures.actor(event.client_id)
         if event.phase == "start":
-            self._held.add("move")
+            self._held["move"] = actor
             return
-        if "move" not in self._held:
+        if self._held.get("move") != actor:
             return
         if event.phase == "end":
-            self._held.discard("move")
+            del self._held["move"]
         p = np.asarray(event.target.position, dtype=float) - self._arm.T_base_shoulder[:3, 3]
-        self._put(MoveTool(p @ self._arm.T_base_shoulder[:3, :3]))
-        self._settle(event)
+        self._submit(event, actor, MoveTool(p @ self._arm.T_base_shoulder[:3, :3]))
 
-    def _settle(self, event: viser.TransformControlsEvent) -> None:
-        if event.phase == "end":
-            self._put(Settle())
+    def _submit(self, event: viser.TransformControlsEvent, actor: Actor, command: Command) -> None:
+        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        with suppress(KatanaError):
+            self._gestures.submit(command, actor)
+            if event.phase == "end":
+                self._gestures.submit(EndDrag(), actor)
+
+    def _holds(self, part: str) -> bool:
+        actor = self._held.get(part)
+        return actor is not None and self._gestures.is_current(actor)
 
     async def _pitched(self, event: viser.TransformControlsEvent) -> None:
-        turn = self._turning(event, "pitch")
+        actor = self._gestures.actor(event.client_id)
+        turn = self._turning(event, actor, "pitch")
         if turn is not None:
-            self._put(TurnTool(turn.pitch + turn.turned, turn.roll))
-            self._settle(event)
+            self._submit(event, actor, TurnTool(turn.pitch + turn.turned, turn.roll))
 
     async def _rolled(self, event: viser.TransformControlsEvent) -> None:
-        turn = self._turning(event, "roll")
+        actor = self._gestures.actor(event.client_id)
+        turn = self._turning(event, actor, "roll")
         if turn is not None:
-            self._put(TurnTool(turn.pitch, turn.roll + turn.turned))
-            self._settle(event)
+            self._submit(event, actor, TurnTool(turn.pitch, turn.roll + turn.turned))
 
-    def _turning(self, event: viser.TransformControlsEvent, ring: str) -> _Turn | None:
+    def _turning(
+        self, event: viser.TransformControlsEvent, actor: Actor, ring: str
+    ) -> _Turn | None:
         """Follow one ring's drag; the turn is counted on past half a circle."""
         R = so3.from_quaternion(np.asarray(event.target.wxyz, dtype=float))
         if event.phase == "start":
@@ -167,10 +180,10 @@ class Gizmo:
                 chain = self._arm.chain_to(state.tool)
                 pitch, roll = pitch_and_roll(chain, state.goal)
             self._turns[ring] = _Turn(R, pitch, roll)
-            self._held.add(ring)
+            self._held[ring] = actor
             return None
         turn = self._turns.get(ring)
-        if turn is None or ring not in self._held:
+        if turn is None or self._held.get(ring) != actor:
             return None
         D = turn.R_start.T @ R
         angle = (
@@ -180,8 +193,8 @@ class Gizmo:
         )
         turn.turned += math.remainder(angle - turn.turned, math.tau)
         if event.phase == "end":
-            self._held.discard(ring)
-            self._turns.pop(ring, None)
+            del self._held[ring]
+            del self._turns[ring]
         return turn
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from katana450.server.view.cameras import Preset
-from katana450.server.view.reachability import Cut, ReachabilityCloud
+from katana450.server.view.layer import ViewLayer
 from katana450.server.view.room import THEMES
 
 PERSONAL = ("View", "Theme")
@@ -20,14 +20,14 @@ PERSONAL = ("View", "Theme")
 class Shows:
     """What the controls call.
 
-    ellipsoid, handles: show or hide them. look_from: turns one browser's camera. reachability: the
-    map, if one was given.
+    ellipsoid, handles: show or hide them. look_from: turns one browser's camera. layers: what
+    extensions show.
     """
 
     ellipsoid: Callable[[bool], None]
     handles: Callable[[bool], None]
     look_from: Callable[[viser.ClientHandle, Preset], None]
-    reachability: ReachabilityCloud | None
+    layers: tuple[ViewLayer, ...]
 
 
 def add_views(gui: viser.GuiApi, shows: Shows) -> None:
@@ -60,22 +60,8 @@ def add_shows(gui: viser.GuiApi, shows: Shows) -> None:
         hint="Arrows by which cup, basin and objects can be put elsewhere on the table",
     )
     handles.on_update(lambda _: shows.handles(handles.value))
-    cloud = shows.reachability
-    if cloud is not None:
-        names = tuple(cut.value for cut in Cut)
-        cuts = gui.add_dropdown(
-            "Reachability",
-            names,
-            initial_value=Cut.HIDDEN.value,
-            hint="Where the tool can be: the map given with --workspace",
-        )
-        legend = gui.add_html(cloud.legend, visible=False)
-
-        @cuts.on_update
-        def _(_: viser.GuiEvent[Any]) -> None:
-            cut = Cut(cuts.value)
-            legend.visible = cut is not Cut.HIDDEN
-            cloud.show(cut)
+    for layer in shows.layers:
+        layer.add_controls(gui)
 
 
 def add_themes(gui: viser.GuiApi) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from html import escape
 
 import viser
@@ -12,14 +11,21 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.joints import Joints
 from katana450.arm.control.state import State
-from katana450.server.view.controls import Listen, add_motion, ends, listener, set_slider
+from katana450.server.view.controls import (
+    GestureGate,
+    Listen,
+    add_motion,
+    ends,
+    listener,
+    set_slider,
+)
 from katana450.server.view.follower import READOUT_INTERVAL
 from katana450.server.view.ledger import LedgerList
 from katana450.server.view.looks import add_themes
 from katana450.server.view.readout import style
 from katana450.server.view.texts import headline, mood, sentence, signed
 
-GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Reset()}
+GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
 
 STEPS = 400
 """Of a slider from end to end, at least."""
@@ -32,25 +38,25 @@ class MachinePanel:
         self,
         gui: viser.GuiApi,
         joints: Joints,
-        put: Callable[[cmd.Command], int],
+        gestures: GestureGate,
         state: State,
     ) -> None:
-        """``put`` takes a command; ``state`` is what the panel shows first."""
+        """``state``: what the panel shows first."""
         self._gui = gui
         self._joints = joints
         self._told_at = -math.inf
         self._told = ""
-        listen: Listen = listener(put)
+        listen: Listen = listener(gestures)
         self._readout = gui.add_html(page(joints, state))
         gui.add_html(f"<div class='k450'><p><b>Joints only.</b> {escape(joints.why)}</p></div>")
         with gui.add_folder("Joints"):
             self._sliders = [self._slider(axis, state, listen) for axis in range(joints.n)]
-        gestures = gui.add_button_group(
+        drive = gui.add_button_group(
             "Drive",
             tuple(GESTURES),
             hint="Home: every joint to zero, or the limit next to it. Hold: stop here.",
         )
-        listen(gestures, lambda: GESTURES[gestures.value])
+        listen(drive, lambda: GESTURES[drive.value])
         self._speed = add_motion(gui, listen, state)
         gui.add_html(style())
         with gui.add_folder("Show", expand_by_default=False):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import viser
 
 from katana450.arm.robot.camera import camera
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.server.view.controls import GestureGate
 from katana450.server.view.follower import Follower
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel
@@ -26,13 +27,14 @@ class MachineView(Follower):
         server: viser.ViserServer,
         robot: Robot,
         board: StatePublisher,
-        sink: CommandSink,
+        gestures: GestureGate,
+        last_ticket: Callable[[], int],
         frame_rate: float,
     ) -> None:
-        """``sink`` takes what people do. ``frame_rate``: most updates a second [Hz]."""
+        """``last_ticket``: of the newest command. ``frame_rate``: most updates a second [Hz]."""
         super().__init__(server, board, frame_rate)
         self._robot = robot
-        self._sink = sink
+        self._last_ticket = last_ticket
         furnish(server)
         server.gui.set_panel_label(title(robot.name))
         look = camera(robot)
@@ -40,11 +42,9 @@ class MachineView(Follower):
         server.initial_camera.look_at = look.target
         self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
-        self._panel = MachinePanel(server.gui, robot.joint_group, sink.put, board.snapshot.state)
+        joints = robot.joint_group
+        self._panel = MachinePanel(server.gui, joints, gestures, board.snapshot.state)
         self.show(board.snapshot)
-
-    def let_go(self) -> None:
-        return
 
     def show(self, snapshot: Snapshot) -> None:
         state = snapshot.state
@@ -55,6 +55,6 @@ class MachineView(Follower):
                 state,
                 time.perf_counter(),
                 self._board.ledger,
-                caught_up=snapshot.ticket == self._sink.last_ticket,
+                caught_up=snapshot.ticket == self._last_ticket(),
             )
         self._server.flush()

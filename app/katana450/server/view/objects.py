@@ -16,10 +16,10 @@ from katana450.arm.control.solid import FAINTEST, Look
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_mounted
 from katana450.arm.control.things import LEAST_SCALE, MOST_SCALE, Environment, Mount, Thing, named
-from katana450.errors import InputError
+from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import frozen
-from katana450.server.view.controls import refuse, set_value
+from katana450.server.view.controls import GestureGate, refuse, set_value
 from katana450.server.view.things import COLOUR
 
 NOTHING = "nothing yet"
@@ -35,13 +35,13 @@ class ObjectsPanel:
     def __init__(
         self,
         server: viser.ViserServer,
-        put: Callable[[cmd.Command], int],
+        gestures: GestureGate,
         state: Callable[[], State],
         surroundings: Environment,
     ) -> None:
         """``state``: the newest. ``surroundings``: what objects stand on and are fixed to."""
         self._surroundings = surroundings
-        self._put = put
+        self._gestures = gestures
         self._state = state
         self._things = state().things
         self._shown: Thing | None = None
@@ -156,8 +156,8 @@ class ObjectsPanel:
                 thing = self._chosen()
                 if thing is None:
                     raise InputError("There is no object: add one first.")
-                self._put(say(thing))
-            except InputError as error:
+                self._gestures.submit(say(thing), self._gestures.actor(event.client_id))
+            except KatanaError as error:
                 self._show(self._chosen(), anew=True)
                 refuse(event, error)
 

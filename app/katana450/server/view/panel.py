@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from html import escape
 
 import numpy as np
@@ -19,7 +18,14 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.reading import Reading
 from katana450.server.view import readout
 from katana450.server.view.branches import BranchList, Find
-from katana450.server.view.controls import add_motion, ends, listener, set_slider, set_value
+from katana450.server.view.controls import (
+    GestureGate,
+    add_motion,
+    ends,
+    listener,
+    set_slider,
+    set_value,
+)
 from katana450.server.view.follower import READOUT_INTERVAL
 from katana450.server.view.ledger import LedgerList
 from katana450.server.view.looks import Shows, add_shows, add_views
@@ -38,8 +44,8 @@ FARTHEST = 1000.0
 
 GESTURES: dict[str, cmd.Command] = {
     "Home": cmd.Home(),
-    "Stretch": cmd.Stretch(),
-    "Hold": cmd.Reset(),
+    "Go to zero": cmd.GoToZero(),
+    "Hold": cmd.Hold(),
 }
 
 
@@ -50,14 +56,14 @@ class Panel:
         self,
         server: viser.ViserServer,
         robot: Robot,
-        put: Callable[[cmd.Command], int],
+        gestures: GestureGate,
         find: Find,
         shows: Shows,
         state: State,
     ) -> None:
-        """``put`` takes a command; ``state`` is what the panel shows first."""
+        """``state``: what the panel shows first."""
         self._arm = robot.require_arm()
-        self._on_person = listener(put)
+        self._on_person = listener(gestures)
         self._gui = server.gui
         self._told_at = -math.inf
         self._told = ""
@@ -71,7 +77,7 @@ class Panel:
         self._gestures = self._gui.add_button_group(
             "Drive",
             tuple(GESTURES),
-            hint="Home: to the ready posture. Stretch: every joint to zero, the arm along x. "
+            hint="Home: to the ready posture. Go to zero: every joint to zero, the arm along x. "
             "Hold: stop here and forget the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])

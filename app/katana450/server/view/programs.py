@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from html import escape
 from typing import Any, Protocol
 
 import viser
 
+from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
@@ -20,7 +22,7 @@ from katana450.extensions.programs.taught import taught
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress as Told
 from katana450.server.api.fields import Order
-from katana450.server.view.controls import refuse
+from katana450.server.view.controls import GestureGate, refuse
 from katana450.server.view.preview import Preview
 
 STEERING = ("Script", "Program", "Look at", "Teach", "Name")
@@ -38,19 +40,19 @@ ORDERS = {
     "Run": Order.RUN,
     "Step": Order.STEP,
     "Wait": Order.PAUSE,
-    "End": Order.HALT,
+    "End": Order.END,
 }
 
 
 class Steering(Protocol):
     """What the panel asks of whoever runs programs. Each raises KatanaError with the reason."""
 
-    def plan(self, text: str, then: Order | None) -> None:
-        """Plan a script, and then run it, for who touched the panel last."""
+    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
+        """Plan a script for ``actor``, and then run it."""
         ...
 
-    def steer(self, order: Order) -> None:
-        """Tell the one that runs."""
+    def steer(self, order: Order, actor: Actor) -> None:
+        """Steer the one that runs."""
         ...
 
     @property
@@ -73,11 +75,13 @@ class ProgramsPanel:
         robot: Robot,
         steering: Steering,
         scripts: Scripts,
+        gestures: GestureGate,
         state: Callable[[], State],
     ) -> None:
         """``state``: the newest."""
         self._steering = steering
         self._scripts = scripts
+        self._gestures = gestures
         self._state = state
         self._taught: list[FloatArray] = []
         self._drawn: Program | None = None
@@ -157,27 +161,27 @@ class ProgramsPanel:
         if span > 0.0:
             self._look.max = shown_seconds(span)
 
-    def _order(self, _client: viser.ClientHandle | None = None) -> None:
+    def _order(self, actor: Actor, _client: viser.ClientHandle | None = None) -> None:
         said = self._orders.value
         told = self._steering.told
         status = "" if told is None else told.status
         if said in ("Wait", "End") or (said != "Preview" and status in RUNS):
-            self._steering.steer(ORDERS[said])
+            self._steering.steer(ORDERS[said], actor)
             return
         text = self._scripts.text(self._choice.value)
         if said != "Preview" and status == "planning" and text == self._text:
             # A preview is on its way already: it is run once it is planned.
-            self._steering.steer(ORDERS[said])
+            self._steering.steer(ORDERS[said], actor)
             return
         with self._asking:
             self._wanted = said == "Preview"
-            self._steering.plan(text, ORDERS.get(said))
+            self._steering.plan(text, ORDERS.get(said), actor)
             self._text = text
             # A plan that is kept is drawn anew.
             self._drawn = None
             self._draw(None)
 
-    def _on_teach(self, client: viser.ClientHandle | None = None) -> None:
+    def _on_teach(self, _actor: Actor, client: viser.ClientHandle | None = None) -> None:
         match self._teach.value:
             case "Add pose":
                 if len(self._taught) >= MOST_TAUGHT:
@@ -204,15 +208,16 @@ class ProgramsPanel:
         self._choice.value = name  # type: ignore[misc]  # viser declares it read-only
 
     def _guarded(
-        self, act: Callable[[viser.ClientHandle | None], None]
-    ) -> Callable[[viser.GuiEvent[Any]], None]:
-        """``act``, and what is wrong told in the window of whoever asked."""
+        self, act: Callable[[Actor, viser.ClientHandle | None], None]
+    ) -> Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]:
+        """``act`` in a thread, and what is wrong told in the window of whoever asked."""
 
-        def acted(event: viser.GuiEvent[Any]) -> None:
+        async def acted(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:
-                act(event.client)
+                actor = self._gestures.actor(event.client_id)
+                await asyncio.to_thread(act, actor, event.client)
             except KatanaError as error:
                 refuse(event, error)
 

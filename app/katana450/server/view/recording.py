@@ -6,12 +6,12 @@ import html
 import secrets
 from collections.abc import Iterable
 
-from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.importers.meshes import Meshes
+from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.traces import Traces
 from katana450.server.viser_bridge.viser_server import close_server, open_server
@@ -49,7 +49,7 @@ def recorded(
     # Nobody is let in: the server is there for what it would send.
     server = open_server(secrets.token_hex())
     try:
-        scenery = Scenery(server, robot, session, load_props(), _ignore, Meshes())
+        scenery = Scenery(server, robot, session, load_props(), NoGestures(), Meshes())
         traces = Traces(server, robot.require_arm())
         recording = server.get_scene_serializer()
         for number, state in enumerate(states):
@@ -61,7 +61,3 @@ def recorded(
         return recording.as_html().replace(TITLE, head, 1)
     finally:
         close_server(server)
-
-
-def _ignore(command: Command) -> None:
-    """Nobody drives a recording."""

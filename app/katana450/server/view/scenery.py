@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import viser
 
-from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.importers.meshes import Meshes
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.conduit import Conduits
+from katana450.server.view.controls import GestureGate
 from katana450.server.view.room import furnish
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.things import ThingNodes
@@ -30,17 +28,17 @@ class Scenery:
         robot: Robot,
         session: Session,
         props: Props,
-        put: Callable[[Command], None],
+        gestures: GestureGate,
         meshes: Meshes,
     ) -> None:
-        """``session``: knows where things are. ``put``: takes what is done with their handles.
+        """``session``: knows where things are. ``gestures``: takes those with their handles.
         ``meshes``: those that things are of."""
         self._server = server
         self._robot = robot
         self._session = session
         furnish(server)
         Workcell(server, props)
-        self.things = ThingNodes(server, props, session.surroundings, put, meshes)
+        self.things = ThingNodes(server, props, session.surroundings, gestures, meshes)
         self.arm = ArmNodes(server, robot)
         self._conduits = Conduits(server, robot.require_arm(), self.arm)
         # Made when there is water.

@@ -70,9 +70,9 @@ def _lopsided(finding: Finding) -> str:
 
 
 REASONS: dict[Reason, Callable[[Finding], str]] = {
-    Reason.HALTED: lambda f: (
+    Reason.STOPPED: lambda f: (
         f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
-        "Reset in the bar, then say afresh where to go"
+        "press Clear stop in the bar, then say afresh where to go"
     ),
     Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
     Reason.CONTACT: _contact,
@@ -110,7 +110,7 @@ STATUS: dict[Status, str] = {
     Status.HELD: "Held at the edge",
     Status.BLOCKED: "Contact ahead",
     Status.PAUSED: "Paused",
-    Status.HALTED: "Stopped",
+    Status.STOPPED: "Stopped",
     Status.FAULT: "Fault",
 }
 

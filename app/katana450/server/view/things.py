@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -10,19 +10,20 @@ import numpy as np
 import trimesh
 import viser
 
-from katana450.arm.control.commands import Command, Place
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands import Place
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.control.things import Environment, Form, Thing
+from katana450.arm.robot.creases import Drawn, drawn, glb
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.visual import Visual
-from katana450.errors import InputError
-from katana450.extensions.importers.creases import Drawn, drawn, glb
-from katana450.extensions.importers.meshes import Meshes
+from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.controls import refuse
+from katana450.server.view.controls import GestureGate, refuse
 from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place, turn
@@ -48,14 +49,14 @@ class ThingNodes:
         server: viser.ViserServer,
         props: Props,
         surroundings: Environment,
-        put: Callable[[Command], None],
+        gestures: GestureGate,
         meshes: Meshes,
     ) -> None:
         """``meshes``: those that things are of."""
         self._server = server
         self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
         self._surroundings = surroundings
-        self._put = put
+        self._gestures = gestures
         self._meshes = meshes
         self._frames: dict[str, viser.FrameHandle] = {}
         self._shapes: dict[str, _Shape] = {}
@@ -63,7 +64,7 @@ class ThingNodes:
         self._made = 0
         self._things: dict[str, Thing] = {}
         self._seen: tuple[Thing, ...] = ()
-        self._dragged: str | None = None
+        self._dragged: tuple[str, Actor] | None = None
         self._wanted = False
 
     def show_handles(self, visible: bool) -> None:
@@ -74,10 +75,6 @@ class ThingNodes:
             wanted = visible and thing is not None and not thing.carried
             if handle.visible != wanted:
                 handle.visible = wanted
-
-    def let_go(self) -> None:
-        """Take the handles out of every hand."""
-        self._dragged = None
 
     def follow(self, state: State) -> None:
         """Put everything where ``state`` has it."""
@@ -111,7 +108,7 @@ class ThingNodes:
         w, i, j, k = so3.to_quaternion(T[:3, :3]).tolist()
         place(self._frames[thing.name], (px, py, pz))
         turn(self._frames[thing.name], (w, i, j, k))
-        if self._dragged != thing.name:
+        if not self._holds(thing.name):
             place(self._handles[thing.name], (px, py, pz))
 
     def _add(self, name: str) -> None:
@@ -149,10 +146,10 @@ class ThingNodes:
         return handle
 
     def _moved(self, name: str, event: viser.TransformControlsEvent) -> None:
-        thing = self._things.get(name)
+        thing, actor = self._things.get(name), self._gestures.actor(event.client_id)
         if event.phase == "start":
-            self._dragged = name
-        if thing is None or thing.carried or self._dragged != name:
+            self._dragged = name, actor
+        if thing is None or thing.carried or self._dragged != (name, actor):
             return
         if event.phase == "end":
             self._dragged = None
@@ -169,7 +166,13 @@ class ThingNodes:
                 place(self._handles[name], (px, py, pz))
                 refuse(event, error)
             return
-        self._put(Place(moved))
+        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        with suppress(KatanaError):
+            self._gestures.submit(Place(moved), actor)
+
+    def _holds(self, name: str) -> bool:
+        dragged = self._dragged
+        return dragged is not None and dragged[0] == name and self._gestures.is_current(dragged[1])
 
 
 class _Shape:

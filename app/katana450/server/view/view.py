@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 import viser
 
-from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.errors import InputError
-from katana450.extensions.export.reachability_file import StoredMap
-from katana450.extensions.importers.meshes import Meshes
 from katana450.extensions.programs.script_files import Scripts
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras, Preset
+from katana450.server.view.controls import GestureGate
 from katana450.server.view.ellipsoid import Ellipsoid
 from katana450.server.view.follower import Follower
 from katana450.server.view.gizmo import Gizmo
+from katana450.server.view.layer import ViewLayer
 from katana450.server.view.looks import Shows
 from katana450.server.view.objects import ObjectsPanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
 from katana450.server.view.programs import ProgramsPanel, Steering
-from katana450.server.view.reachability import ReachabilityCloud
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.texts import title
@@ -43,7 +41,7 @@ GHOST_COLOURS: dict[Status, Colour] = {
     Status.HELD: (234, 88, 12),
     Status.BLOCKED: (255, 153, 0),
     Status.PAUSED: (120, 130, 145),
-    Status.HALTED: (230, 45, 45),
+    Status.STOPPED: (230, 45, 45),
     Status.FAULT: (230, 45, 45),
 }
 
@@ -57,83 +55,69 @@ GHOST_FROM = np.deg2rad(0.2)
 class ViewOptions:
     """What is shown besides the arm.
 
-    workspace: a map of it. programs: who runs them, and which there are. meshes: those that things
-    are of.
+    layers: what extensions show. programs: who runs them, and which there are. meshes: those that
+    things are of.
     """
 
-    workspace: StoredMap | None = None
+    layers: tuple[ViewLayer, ...] = ()
     programs: tuple[Steering, Scripts] | None = None
     meshes: Meshes = field(default_factory=Meshes)
 
 
 class View(Follower):
-    """Shows each new snapshot to every browser; hands what people do to the mailbox."""
+    """Shows each new snapshot to every browser; submits what people do."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         robot: Robot,
         board: StatePublisher,
-        mailbox: CommandSink,
+        gestures: GestureGate,
+        last_ticket: Callable[[], int],
         session: Session,
         frame_rate: float,
         besides: ViewOptions | None = None,
     ) -> None:
-        """``session``: knows the branches, and where things are. ``frame_rate``: most updates a
-        second [Hz].
+        """``last_ticket``: of the newest command. ``session``: knows the branches, and where things
+        are. ``frame_rate``: most updates a second [Hz].
 
-        Raises ConfigurationError for the map of another arm.
+        Raises KatanaError where a layer cannot be shown.
         """
         super().__init__(server, board, frame_rate)
         besides = ViewOptions() if besides is None else besides
         server.gui.set_panel_label(title(robot.name))
         self._robot, self._arm = robot, robot.require_arm()
-        self._mailbox = mailbox
+        self._last_ticket = last_ticket
         props = load_props()
-        self._scenery = Scenery(server, robot, session, props, self._put_dragged, besides.meshes)
+        self._scenery = Scenery(server, robot, session, props, gestures, besides.meshes)
         state = board.snapshot.state
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._traces = Traces(server, self._arm)
-        self._gizmo = Gizmo(server, self._arm, self._put_dragged, lambda: board.snapshot.state)
+        self._gizmo = Gizmo(server, self._arm, gestures, lambda: board.snapshot.state)
         self._ellipsoid = Ellipsoid(server, self._arm)
-        cloud = (
-            None
-            if besides.workspace is None
-            else ReachabilityCloud(server, robot, besides.workspace)
-        )
+        for layer in besides.layers:
+            layer.attach(server, robot)
         self._cameras = Cameras(server, self._arm)
         shows = Shows(
-            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, cloud
+            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, besides.layers
         )
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
-        self._panel = Panel(server, robot, mailbox.put, session.choices, shows, state)
+        self._panel = Panel(server, robot, gestures, session.choices, shows, state)
         self._objects = ObjectsPanel(
-            server, mailbox.put, lambda: board.snapshot.state, session.surroundings
+            server, gestures, lambda: board.snapshot.state, session.surroundings
         )
         self._programs: ProgramsPanel | None = None
         if besides.programs is not None:
             steering, scripts = besides.programs
             self._programs = ProgramsPanel(
-                server, robot, steering, scripts, lambda: board.snapshot.state
+                server, robot, steering, scripts, gestures, lambda: board.snapshot.state
             )
         self.show(board.snapshot)
-
-    def let_go(self) -> None:
-        """Take the handle out of every hand: what is dragged on with it moves nothing."""
-        self._gizmo.let_go()
-        self._scenery.things.let_go()
-
-    def _put_dragged(self, command: Command) -> None:
-        try:
-            self._mailbox.put(command)
-        except InputError:
-            # A drag sends twenty a second; the next one tells the same more truly.
-            return
 
     def _show_ellipsoid(self, visible: bool) -> None:
         self._ellipsoid.show(visible, self._board.snapshot.state)
@@ -152,7 +136,7 @@ class View(Follower):
             self._ellipsoid.follow(state)
             self._traces.follow(state)
             self._cameras.follow(state)
-            caught_up = snapshot.ticket == self._mailbox.last_ticket
+            caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(state, time.perf_counter(), self._board.ledger, caught_up=caught_up)
             self._objects.follow(state, caught_up=caught_up)
             if self._programs is not None:

@@ -11,7 +11,7 @@ import asyncio
 import secrets
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 from weakref import WeakValueDictionary
@@ -34,22 +34,37 @@ HATCH_HEADER = "X-Katana450-Hatch"
 
 
 class FrameSlot:
-    """Where the frames for one browser come out: in the gateway's thread, one when one is wanted.
+    """The passage between the gateway's and viser's end of one browser's connection.
+
+    Frames come out in the gateway's thread, one when one is wanted.
 
     A frame that is made says what is so by then, and one that waits grows old; so none is made
     before. It is given from hand to hand, since a socket in between would cost a crowd as much as
     all the rest of its way.
     """
 
-    def __init__(self) -> None:
-        """In the loop of whoever takes the frames."""
+    def __init__(self, key: str = "", refused: Callable[[str], None] = lambda _: None) -> None:
+        """Called in the loop of the taker of the frames.
+
+        ``key``: of the window that the browser shows, empty for none. ``refused``: called in that
+        loop with the reason why a gesture was refused.
+        """
         self.name = secrets.token_hex(16)
+        self.key = key
+        self.stamps: deque[int] = deque()
+        """Revocations at the receipt of each message on its way to viser, oldest first."""
+        self._refused = refused
         self._frames: deque[bytes] = deque()
         self._taker = asyncio.get_running_loop()
         self._giver: asyncio.AbstractEventLoop | None = None
         self._came = asyncio.Event()
         self._wanted = asyncio.Event()
         _hatches[self.name] = self
+
+    def refuse(self, why: str) -> None:
+        """Say why a gesture was refused; in any thread."""
+        with suppress(RuntimeError):  # the loop may have ended
+            self._taker.call_soon_threadsafe(self._refused, why)
 
     async def take(self) -> bytes:
         """The next frame; in the taker's loop."""
@@ -78,6 +93,11 @@ def _signal(loop: asyncio.AbstractEventLoop, event: asyncio.Event) -> None:
 
 
 _hatches: WeakValueDictionary[str, FrameSlot] = WeakValueDictionary()
+
+
+def slot_of(headers: Mapping[str, str]) -> FrameSlot | None:
+    """Return the slot that a connection's ``headers`` name; None without one."""
+    return _hatches.get(headers.get(HATCH_HEADER, ""))
 
 
 class _Packed(NamedTuple):
@@ -130,7 +150,7 @@ class Packer:
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
     """Send a browser the windows of a buffer, as viser's own producer of this name does."""
     packer = buffer.__dict__.setdefault("packer", Packer())
-    hatch = _hatches.get(line.request.headers.get(HATCH_HEADER, ""))
+    hatch = slot_of(line.request.headers)
     send = line.send
     if hatch is not None:
         hatch.open()

@@ -1,22 +1,20 @@
 """Every message of a browser to viser is decoded here, and passes or does not.
 
 The shape of each message that our page can send is defined in
-``katana450.server.viser_bridge.guard``. Here is the rest: how large, how often, from whom.
+``katana450.server.viser_bridge.guard``. Here is the rest: how large, how often. Who may command is
+decided by `CommandGate`.
 """
 
 from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Any
 
 import msgspec
 from viser import _messages as wire
 
-from katana450.errors import LeaseError
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -37,8 +35,6 @@ NO_MESSAGE = 25.0
 SEEN = "Seen"
 """What our script says of frames on the screen, on the same line; not for viser."""
 
-DRAGGING = (wire.TransformControlsUpdateMessage, wire.TransformControlsDragEndMessage)
-
 TOLD = 20
 """Bad messages of one browser that are logged one by one; a flood must not fill the log."""
 
@@ -58,42 +54,20 @@ class Verdict:
 
     Attributes:
         ruling: what becomes of it.
-        corrections: viser messages for the sender alone, which put its window right again.
-        refusal: why its person may not move the arm just now; no fault of theirs.
         seen: how many frames are on the screen, where the message was about that.
     """
 
     ruling: Ruling
-    corrections: tuple[Any, ...] = ()
-    refusal: str | None = None
     seen: int | None = None
 
 
 class Firewall:
     """In front of viser, for one connection."""
 
-    def __init__(
-        self,
-        guard: Guard,
-        who: str,
-        drags: set[str],
-        drive: Callable[[], None],
-        steer: Callable[[], None],
-        pace: Callable[[], None],
-        t: float,
-    ) -> None:
-        """``drive`` raises a LeaseError when its person must not move the arm at this moment,
-        ``steer`` when they must not tell a program what to do, ``pace`` when they must not pause,
-        resume or slow down what moves.
-
-        ``who``: for the log. ``drags``: the gizmos it holds; whoever empties it ends the drags.
-        """
+    def __init__(self, guard: Guard, who: str, t: float) -> None:
+        """``who``: for the log. ``t``: now [s]."""
         self._guard = guard
         self._who = who
-        self._drags = drags
-        self._drive = drive
-        self._steer = steer
-        self._pace = pace
         self._flood = TokenBucket(RATE, BURST, t)
         self._patience = TokenBucket(FORGIVEN, PATIENCE, t)
         self.dropped: Counter[str] = Counter()
@@ -116,29 +90,7 @@ class Firewall:
         objection = self._guard.objection(message)
         if objection is not None:
             return self._drop(type(message).__name__, objection, t)
-        if not self._guard.drives(message):
-            return Verdict(Ruling.PASS)
-        if isinstance(message, DRAGGING) and message.name not in self._drags:
-            # Its beginning was refused, or it was ended here while the hand went on.
-            return Verdict(Ruling.DROP, tuple(self._guard.correction(message)))
-        try:
-            self._check_may(message)
-        except LeaseError as refusal:
-            corrections = tuple(self._guard.correction(message))
-            return Verdict(Ruling.DROP, corrections, refusal=str(refusal))
-        if isinstance(message, wire.TransformControlsDragStartMessage):
-            self._drags.add(message.name)
-        elif isinstance(message, wire.TransformControlsDragEndMessage):
-            self._drags.discard(message.name)
         return Verdict(Ruling.PASS)
-
-    def _check_may(self, message: Any) -> None:
-        if self._guard.steers(message):
-            self._steer()
-        elif self._guard.paces(message):
-            self._pace()
-        else:
-            self._drive()
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> Verdict:
         self.dropped[kind] += 1

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from contextlib import suppress
-from typing import Any
 
-import msgspec
 import viser
-import zstandard
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from katana450.errors import LeaseError
 from katana450.server.service.hub import Hub, key_of
 from katana450.server.viser_bridge.flow import Flow
 from katana450.server.viser_bridge.frames import HATCH_HEADER, FrameSlot
@@ -76,12 +71,12 @@ class Proxy:
         page = browser.query_params.get("page", "")
         # Without our page around it viser can be looked at, and no more.
         key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
-        hatch = FrameSlot()
+        line = _Line(self._hub, self._guard, browser, key)
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
                 subprotocols=[SUBPROTOCOL],
-                additional_headers={KEY_HEADER: self._key, HATCH_HEADER: hatch.name},
+                additional_headers={KEY_HEADER: self._key, HATCH_HEADER: line.slot.name},
                 user_agent_header=None,
                 compression=None,
                 max_size=None,
@@ -89,9 +84,8 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                line = _Line(self._hub, self._guard, browser, upstream, hatch, key)
                 if not await self._door.while_welcome(
-                    lambda: self._door.visitor(browser.cookies), line.run()
+                    lambda: self._door.visitor(browser.cookies), line.run(upstream)
                 ):
                     await browser.close(NOT_YOU, "Your link is no good any more.")
         except OSError as error:
@@ -104,36 +98,22 @@ class Proxy:
 class _Line:
     """Between one browser and viser."""
 
-    def __init__(
-        self,
-        hub: Hub,
-        guard: Guard,
-        browser: WebSocket,
-        upstream: ClientConnection,
-        hatch: FrameSlot,
-        key: str,
-    ) -> None:
+    def __init__(self, hub: Hub, guard: Guard, browser: WebSocket, key: str) -> None:
         self._hub = hub
-        self._hatch = hatch
+        self._guard = guard
+        self.slot = FrameSlot(key, self._refuse)
         self._browser = browser
-        self._upstream = upstream
         self._key = key
         self._flow = Flow()
         self._room = asyncio.Event()
-        self._sending = asyncio.Lock()
-        self._drags: set[str] = set()
         self._told_at = float("-inf")
         self._due = float("-inf")
         self._unwelcome = False
-        window = hub.window(key)
-        who = window.person.name if window is not None else "a window without our page"
-        may = self._drive, self._steer, self._pace
-        self._firewall = Firewall(guard, who, self._drags, *may, hub.clock())
 
-    async def run(self) -> None:
-        """Until either side closes."""
-        self._hub.show(self._key, self._flow, self._drags)
-        ways = (self._down(), self._up(), self._upstream.wait_closed())
+    async def run(self, upstream: ClientConnection) -> None:
+        """Until either side closes; ``upstream``: viser's."""
+        self._hub.show(self._key, self._flow)
+        ways = (self._down(), self._up(upstream), upstream.wait_closed())
         tasks = [asyncio.create_task(way) for way in ways]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -145,7 +125,7 @@ class _Line:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             # A farewell would wait behind pictures that nobody fetches any more.
-            self._upstream.transport.abort()
+            upstream.transport.abort()
             self._hub.hide(self._flow)
         # Only now, or a picture could come after it.
         if self._unwelcome:
@@ -155,7 +135,7 @@ class _Line:
     async def _down(self) -> None:
         """Pictures, as fast as the browser sees them."""
         while True:
-            await self._send(await self._hatch.take())
+            await self._send(await self.slot.take())
             await asyncio.sleep(self._pause(self._hub.clock()))
             await self._wait_for_room()
 
@@ -175,8 +155,11 @@ class _Line:
         self._due = max(self._due + share, t)
         return self._due - t
 
-    async def _up(self) -> None:
+    async def _up(self, upstream: ClientConnection) -> None:
         """What the firewall lets pass."""
+        window = self._hub.window(self._key)
+        who = window.person.name if window is not None else "a window without our page"
+        firewall = Firewall(self._guard, who, self._hub.clock())
         while True:
             # One message a turn of the loop, as in a conversation.
             await asyncio.sleep(0)
@@ -184,60 +167,29 @@ class _Line:
             if message["type"] == "websocket.disconnect":
                 return
             data = message.get("bytes")
-            verdict = self._firewall.judge(data, self._hub.clock())
+            verdict = firewall.judge(data, self._hub.clock())
             if verdict.ruling is Ruling.PASS and data is not None:
-                await self._upstream.send(data)
-            elif verdict.ruling is Ruling.CLOSE or not await self._answer(verdict):
+                self.slot.stamps.append(self._hub.gate.revocations)
+                await upstream.send(data)
+            elif verdict.ruling is Ruling.CLOSE or not self._note(verdict):
                 log.warning("Closed a browser that sent too much that no page sends.")
                 self._unwelcome = True
                 return
 
-    async def _answer(self, verdict: Verdict) -> bool:
-        """To a message that stays here; False for one that lies."""
-        if verdict.seen is not None:
-            self._room.set()
-            return self._flow.seen(verdict.seen, self._hub.clock())
-        if verdict.corrections:
-            await self._send(_frame(verdict.corrections))
-        window = self._hub.window(self._key)
-        t = self._hub.clock()
-        if verdict.refusal and window is not None and t - self._told_at >= REFUSALS_EVERY:
+    def _note(self, verdict: Verdict) -> bool:
+        """Take in which frames are on the screen; False for a browser that lies about it."""
+        if verdict.seen is None:
+            return True
+        self._room.set()
+        return self._flow.seen(verdict.seen, self._hub.clock())
+
+    def _refuse(self, why: str) -> None:
+        """Show in the browser's window why its gesture was refused."""
+        window, t = self._hub.window(self._key), self._hub.clock()
+        if window is not None and t - self._told_at >= REFUSALS_EVERY:
             self._told_at = t
-            window.tell({"is": "refused", "why": verdict.refusal})
-        return True
+            window.tell({"is": "refused", "why": why})
 
     async def _send(self, frame: bytes) -> None:
-        async with self._sending:
-            await self._browser.send_bytes(frame)
-            self._flow.sent(len(frame), self._hub.clock())
-
-    def _drive(self) -> None:
-        if not self._key:
-            raise LeaseError("Open the front page to drive the arm.")
-        self._hub.drive(self._key)
-
-    def _pace(self) -> None:
-        window = self._hub.window(self._key)
-        if window is None:
-            raise LeaseError("Open the front page to drive the arm.")
-        self._hub.drive(self._hub.performer.actor(window).person.key)
-
-    def _steer(self) -> None:
-        window = self._hub.window(self._key)
-        if window is None:
-            raise LeaseError("Open the front page to run programs.")
-        self._hub.performer.touch(window)
-
-
-def _frame(messages: tuple[Any, ...]) -> bytes:
-    """As viser sends them: two sizes, and compressed msgpack."""
-    packed = msgspec.msgpack.encode(
-        {
-            "messages": [message.as_serializable_dict([]) for message in messages],
-            "timestampSec": time.perf_counter(),
-            "binaryBufferLengths": (),
-        }
-    )
-    compressed = zstandard.ZstdCompressor(level=1).compress(packed)
-    sizes = len(packed).to_bytes(8, "little") + len(compressed).to_bytes(8, "little")
-    return sizes + compressed
+        await self._browser.send_bytes(frame)
+        self._flow.sent(len(frame), self._hub.clock())

@@ -16,7 +16,7 @@ import viser
 import zstandard
 
 from katana450.errors import ConfigurationError
-from katana450.extensions.render.png import png
+from katana450.png import png
 from katana450.server.view.room import THEMES, gradient
 
 INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"

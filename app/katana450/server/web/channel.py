@@ -16,7 +16,7 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from katana450.errors import InputError, LeaseError
-from katana450.server.api import requests
+from katana450.server.api import answers, requests
 from katana450.server.api.fields import Id
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
@@ -38,10 +38,6 @@ NONSENSE = 1008
 
 FAREWELL = 1.0
 """[s] That who is sent away has for being told so: who reads nothing cannot be told."""
-
-
-ANSWERED = (requests.Beat, requests.Look, requests.Get)
-"""Requests that are answered without an id too."""
 
 
 class GoneError(Exception):
@@ -103,6 +99,7 @@ class Channel(ABC):
         self._bad = bad
         self._notices: deque[Any] = deque(maxlen=NOTICES)
         self._news = asyncio.Event()
+        self._concluding: set[asyncio.Task[None]] = set()
 
     def tell(self, notice: Any) -> None:
         """Send ``notice``, anything that is JSON, as soon as the line allows."""
@@ -116,7 +113,18 @@ class Channel(ABC):
     def answer(self, window: Window, request: requests.AnyRequest) -> None:
         """Do it and tell the answer, if the request has an id or is a question."""
         answer = self._desk.do(window, request, self.budget)
-        if request.id is not None or isinstance(request, ANSWERED):
+        told = request.id is not None or request.traits.answered
+        if self._desk.is_pending(answer):
+            task = asyncio.ensure_future(self._conclude(answer, told=told))
+            self._concluding.add(task)
+            task.add_done_callback(self._concluding.discard)
+        elif told:
+            self.tell(answer)
+
+    async def _conclude(self, pending: answers.Answer, *, told: bool) -> None:
+        """Tell what became of a command, or only that it is refused."""
+        answer = await self._desk.concluded(pending)
+        if told or isinstance(answer, answers.Refused):
             self.tell(answer)
 
     async def run(self, window: Window) -> None:
@@ -125,9 +133,9 @@ class Channel(ABC):
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for task in tasks:
+            for task in (*tasks, *self._concluding):
                 task.cancel()
-            for ended in await asyncio.gather(*tasks, return_exceptions=True):
+            for ended in await asyncio.gather(*tasks, *self._concluding, return_exceptions=True):
                 if isinstance(ended, Exception) and not isinstance(ended, GoneError):
                     log.error("A conversation met an error.", exc_info=ended)
 
@@ -146,7 +154,7 @@ class Channel(ABC):
                 self.refuse(str(error), requests.id_of(text))
                 continue
             # A hand that hammers on STOP is never too fast.
-            if not self._often.take(self.hub.clock()) and not isinstance(request, requests.Stop):
+            if not self._often.take(self.hub.clock()) and not request.traits.safety:
                 log.warning("%s asks too much at once and is sent away.", window.person.name)
                 await self._send_away(TOO_MUCH, "Too many requests.")
                 return

@@ -51,8 +51,8 @@ class ControlSocket(Channel):
     def answer(self, window: Window, request: requests.AnyRequest) -> None:
         super().answer(window, request)
         if isinstance(request, requests.Stop):
-            self.tell({"is": "stopping"})
-        if not isinstance(request, requests.Beat | requests.Jog):
+            self.tell({"is": "stopped"})
+        if not isinstance(request, requests.Heartbeat | requests.Jog):
             self.wake()
 
     def unasked(self) -> tuple[Any, float | None]:

@@ -6,7 +6,8 @@ import asyncio
 import logging
 import math
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
+from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -14,18 +15,18 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import LOST_AFTER
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests, schema
 from katana450.server.api.fields import ROOT, Id
 from katana450.server.service.budget import FIXED_HTTP, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
-from katana450.server.service.hub import Hub, Window
+from katana450.server.service.hub import Hub, Window, visiting
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
 from katana450.server.web.authenticator import Authenticator, Identity
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
-from katana450.server.web.uploads import Uploads
 
 log = logging.getLogger(__name__)
 
@@ -45,15 +46,41 @@ LONGEST_PAUSE = 0.5
 """[s] Before too frequent a request is refused."""
 
 
+class RouteContext(NamedTuple):
+    """What a route of an extension can use.
+
+    Attributes:
+        hub: The arm and who drives it.
+        door: Knows people by their cookies and links.
+        visitor: Returns who sends a request, or raises the HTTPException that refuses it.
+    """
+
+    hub: Hub
+    door: Authenticator
+    visitor: Callable[[Request], Identity]
+
+
+RouteProvider = Callable[[RouteContext], list[BaseRoute]]
+"""Returns routes of an extension."""
+
+
 class Api:
     """Its routes."""
 
-    def __init__(self, hub: Hub, door: Authenticator, budgets: Budgets) -> None:
+    def __init__(
+        self,
+        hub: Hub,
+        door: Authenticator,
+        budgets: Budgets,
+        provided: Sequence[RouteProvider] = (),
+    ) -> None:
+        """``provided``: routes of the extensions."""
         self._hub = hub
         self._budgets = budgets
         self._door = door
         self._desk = Dispatcher(hub)
-        self._uploads = Uploads(hub, door, self._visitor)
+        context = RouteContext(hub, door, self._visitor)
+        self._provided = [route for provider in provided for route in provider(context)]
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
     def routes(self) -> list[BaseRoute]:
@@ -69,7 +96,7 @@ class Api:
             *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
             Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
             Route(f"{ROOT}/do", self._do, methods=["POST"]),
-            *self._uploads.routes(),
+            *self._provided,
             Route(f"{ROOT}/openapi.json", described),
             WebSocketRoute(f"{ROOT}/socket", socket),
         ]
@@ -84,7 +111,7 @@ class Api:
                 self._hub.beat(window)
             try:
                 with self._budget(request).charged(driver, fixed=FIXED_HTTP):
-                    return as_json(self._desk.look(at))
+                    return as_json(self._desk.query(at))
             except LeaseError as error:
                 raise HTTPException(TOO_SOON, str(error)) from error
             except BusyError as error:
@@ -95,7 +122,7 @@ class Api:
         return read
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.stop(self._visitor(request).name or "Somebody")
+        self._hub.stop(visiting(self._visitor(request), CommandChannel.API))
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
@@ -112,7 +139,10 @@ class Api:
             if isinstance(asked, requests.Hello | requests.Watch):
                 raise InputError("That is for a connection that lasts: the socket or the TCP port.")
             window = self._window(request, visitor)
-            return as_json(self._desk.do(window, asked, self._budget(request)))
+            answer = self._desk.do(window, asked, self._budget(request))
+            if self._desk.is_pending(answer):
+                answer = await self._desk.concluded(answer)
+            return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
         except BusyError as error:
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
@@ -140,7 +170,7 @@ class Api:
         if known is None:
             session, _, page = key.partition("/")
             visitor = Identity(session, visitor.name, visitor.role)
-            window = self._hub.join(visitor, page, lambda _notice: None)
+            window = self._hub.join(visitor, page, lambda _notice: None, channel=CommandChannel.API)
             assert window.person.key == key
         else:
             window, timer = known

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import BEAT
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
@@ -111,7 +112,7 @@ class Program(Channel):
         self._window, person = window, window.person
         self.tell(
             answers.Welcome(
-                name=person.name, number=window.number, role=person.role.value, beat=BEAT
+                name=person.name, number=window.number, role=person.role.value, heartbeat=BEAT
             )
         )
 
@@ -226,7 +227,8 @@ async def _serve(
         await line.close(NOT_YOU, "A token is asked for; `katana450 access give` makes one.")
         return
     program = Program(hub, line, budget)
-    window = hub.join(found, secrets.token_hex(16), program.tell, line.arrival)
+    page = secrets.token_hex(16)
+    window = hub.join(found, page, program.tell, line.arrival, CommandChannel.API)
     program.greet(window)
     try:
         if not await door.while_welcome(visitor, program.run(window)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 import msgspec
@@ -14,10 +15,11 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.server.api.fields import LONGEST_PRESS
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
-from katana450.server.service.hub import Hub
+from katana450.server.service.hub import Hub, visiting
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web import control_socket, security, static_files
@@ -25,7 +27,7 @@ from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
 from katana450.server.web.authenticator import Address, Authenticator, Identity
 from katana450.server.web.bodies import body_of
-from katana450.server.web.http_api import Api
+from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -48,8 +50,9 @@ def application(
     proxy: Proxy,
     address: Address,
     acceptor: Acceptor,
+    provided: Sequence[RouteProvider] = (),
 ) -> ASGIApp:
-    """Everything that answers at the port."""
+    """Everything that answers at the port; ``provided``: routes of the extensions."""
     static = static_files.load()
     index = static.pop("index.html")
     viser = viser_page.load()
@@ -93,7 +96,7 @@ def application(
         """The same as the button, for a page whose socket is gone."""
         visitor = _known(door, request)
         press = request.query_params.get("press", "")[:LONGEST_PRESS]
-        hub.stop(visitor.name or "Somebody", press or None)
+        hub.stop(visiting(visitor, CommandChannel.PAGE), press or None)
         return Response(status_code=204)
 
     async def health(_request: Request) -> Response:
@@ -112,7 +115,7 @@ def application(
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
-        *Api(hub, door, budgets).routes(),
+        *Api(hub, door, budgets, provided).routes(),
     ]
     admission = Admission(Starlette(routes=routes), door, acceptor)
     return security.SecurityMiddleware(admission, address)

@@ -10,6 +10,7 @@ import ssl
 import threading
 import time
 from asyncio import BaseTransport, Transport
+from collections.abc import Sequence
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Any, cast
@@ -19,13 +20,14 @@ import viser
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import ConfigurationError
-from katana450.extensions.importers.meshes import Meshes
-from katana450.server.service.arm_handle import Motion
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival, keep_alive
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.steering import Steering
+from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import LARGEST
 from katana450.server.viser_bridge.proxy import Proxy
@@ -34,6 +36,7 @@ from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator, public_origin
 from katana450.server.web.channel import ARRIVAL
+from katana450.server.web.http_api import RouteProvider
 from katana450.server.web.listen import reaches_beyond
 from katana450.server.web.program_socket import Lines
 from katana450.server.web.routes import application
@@ -64,9 +67,11 @@ class Gateway:
         listening: socket.socket,
         lines: socket.socket | None = None,
         meshes: Meshes | None = None,
+        routes: Sequence[RouteProvider] = (),
     ) -> None:
         """``listening``: the port; ``lines``: that for programs which speak JSON lines.
-        ``meshes``: those that things are of, where uploaded ones are kept too.
+        ``meshes``: those that things are of, where uploaded ones are kept too. ``routes``: of the
+        extensions.
 
         Raises ConfigurationError when it must not be served there as ``settings`` say.
         """
@@ -89,9 +94,11 @@ class Gateway:
             )
             self.steering = Steering(self._hub.performer, lambda: self._loop)
             door = Authenticator(access, self.port, self.address)
-            proxy = Proxy(self._hub, door, Guard(self.viser), self.viser.get_port(), key)
+            guard = Guard(self.viser)
+            self.gestures = Gestures(self.viser, guard, self._hub)
+            proxy = Proxy(self._hub, door, guard, self.viser.get_port(), key)
             acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
-            app = application(self._hub, door, budgets, proxy, self.address, acceptor)
+            app = application(self._hub, door, budgets, proxy, self.address, acceptor, routes)
             self._lines = Lines(self._hub, door, budgets)
         except BaseException:
             self._listening.close()
@@ -123,9 +130,9 @@ class Gateway:
         if not self._started.wait(START_SECONDS) or not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
-    def attach(self, arm: Motion) -> None:
+    def attach(self, arm: ArmHandle) -> None:
         """From now on the arm can be driven."""
-        self._hub.arm = arm
+        self._hub.gate.arm = arm
 
     def announce(self, why: str) -> None:
         """Tell everybody why something that was asked is not done. For any thread."""

@@ -1,0 +1,65 @@
+"""The participant behind a command: identity, channel, and the grounds on which it may command."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from katana450.arm.control.lease import Person, Role
+
+
+class CommandChannel(Enum):
+    """Where a command was given."""
+
+    PAGE = "page"
+    """The control socket of a page: bar, jog keys, instruments."""
+    SCENE = "scene"
+    """viser: handles, panels and ghosts."""
+    API = "api"
+    """A program of somebody, by WebSocket, TCP or HTTP."""
+    PROGRAM = "program"
+    """A script that the server runs."""
+    SERVER = "server"
+    """The server itself: watchdogs, and the hold at a change of driver."""
+
+
+class Grounds(Enum):
+    """Why a command was accepted."""
+
+    LEASE = "holds the lease"
+    FREE_LEASE = "took the free lease"
+    PROGRAM_OWNER = "owns the program that holds the lease"
+    SAFETY = "anybody may stop the arm"
+    SERVER = "protection by the server"
+
+
+@dataclass(frozen=True)
+class Actor:
+    """A participant as the giver of a command.
+
+    Attributes:
+        person: the identity, to which the lease is given.
+        channel: where the command was given.
+        seen: number of revocations (``CommandGate.revocations``) when the gesture was received;
+            None for a command that is handled on receipt.
+        grounds: why the command was accepted; None until ``CommandGate`` has accepted it.
+    """
+
+    person: Person
+    channel: CommandChannel
+    seen: int | None = None
+    grounds: Grounds | None = None
+
+    @property
+    def key(self) -> str:
+        """Identity, unique among participants; not shown to people."""
+        return self.person.key
+
+    @property
+    def name(self) -> str:
+        """Display name."""
+        return self.person.name
+
+
+SERVER = Actor(Person("", "the server", Role.VIEWER), CommandChannel.SERVER)
+"""The server itself. It may stop, hold and slow down the arm, and cannot hold the lease."""

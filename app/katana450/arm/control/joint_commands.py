@@ -1,0 +1,119 @@
+"""The commands that give the joints their angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from katana450.arm.control.checked import check_finite, vector
+from katana450.arm.control.traits import BaseCommand, Traits
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+JOG_TIME = 0.2
+"""[s] Time that a jog, or a sample of a joint stream, is followed without another."""
+
+
+class AxisCommand(BaseCommand):
+    """Base of the commands that give single joints another target."""
+
+    def targets(self, goal: FloatArray) -> FloatArray:
+        """Return the joint targets (n,) [rad], from the goal (n,) [rad] that the joints have now.
+
+        Raises InputError for an axis that there is not.
+        """
+        raise NotImplementedError
+
+
+def with_axes(goal: FloatArray, values: tuple[tuple[int, float], ...]) -> FloatArray:
+    """Return ``goal`` (n,) with some axes at other values, each (axis from 0, value [rad]).
+
+    Raises InputError for an axis that there is not.
+    """
+    q = np.array(goal)
+    for axis, value in values:
+        if axis >= q.size:
+            raise InputError(f"There is no axis {axis + 1}, only {q.size}.")
+        q[axis] = value
+    return frozen(q)
+
+
+def check_axis(axis: object) -> None:
+    """Raise InputError unless ``axis`` is a whole number from 0."""
+    if isinstance(axis, bool) or not isinstance(axis, int) or axis < 0:
+        raise InputError(f"An axis is a whole number from 0, not {axis!r}.")
+
+
+@dataclass(frozen=True)
+class SetJoint(AxisCommand):
+    """Drive one joint to ``value`` [rad]; ``axis`` counts from 0."""
+
+    traits: ClassVar[Traits] = Traits(stream=True, joints_only=True)
+
+    axis: int
+    value: float
+
+    def __post_init__(self) -> None:
+        check_axis(self.axis)
+        check_finite(f"The angle of axis {self.axis + 1}", self.value)
+
+    def targets(self, goal: FloatArray) -> FloatArray:
+        return with_axes(goal, ((self.axis, self.value),))
+
+    def replaces(self, waiting: BaseCommand) -> bool:
+        return isinstance(waiting, SetJoint) and waiting.axis == self.axis
+
+
+@dataclass(frozen=True)
+class SetAxes(AxisCommand):
+    """Drive some joints, each (axis, value): the value in [rad], the axis counted from 0.
+
+    The others go on to where they were going.
+    """
+
+    traits: ClassVar[Traits] = Traits(joints_only=True)
+
+    values: tuple[tuple[int, float], ...]
+
+    def __post_init__(self) -> None:
+        for axis, value in self.values:
+            SetJoint(axis, value)
+
+    def targets(self, goal: FloatArray) -> FloatArray:
+        return with_axes(goal, self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class SetJoints(BaseCommand):
+    """Drive all joints to ``q``, (n,) [rad]."""
+
+    traits: ClassVar[Traits] = Traits(stream=True, joints_only=True)
+
+    q: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", vector("The joint vector", self.q, None))
+
+
+@dataclass(frozen=True, eq=False)
+class Servo(BaseCommand):
+    """Keep up with ``q``, (n,) [rad], which is one of a stream; for JOG_TIME after the last.
+
+    qd: (n,) how fast it changes [rad/s]; without it that is seen from the stream. t: when it came
+    [s], on the clock of ``State.t``; None for the tick that takes it.
+    """
+
+    traits: ClassVar[Traits] = Traits(stream=True, joints_only=True)
+
+    q: FloatArray
+    qd: FloatArray | None = None
+    t: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", vector("The joint vector", self.q, None))
+        if self.qd is not None:
+            object.__setattr__(self, "qd", vector("The joint rates", self.qd, self.q.size))
+        if self.t is not None:
+            check_finite("The time of the sample", self.t)

@@ -1,0 +1,118 @@
+"""The mode of a session: the one cause that decides where the goal of the arm is.
+
+A session is in exactly one mode. Each mode holds only the fields that it needs, so nothing of a
+mode can outlast it. The effect of each command in each mode is in ``transitions``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from katana450.arm.control.following import Following
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.stream import Stream
+
+__all__ = [
+    "IDLE",
+    "MODES",
+    "Following",
+    "Idle",
+    "Intent",
+    "Jogging",
+    "JointTarget",
+    "Leaving",
+    "Mode",
+    "PoseTarget",
+    "Positioning",
+    "Servoing",
+    "Target",
+    "ToolTarget",
+    "Tracking",
+]
+
+
+@dataclass(frozen=True, eq=False)
+class JointTarget:
+    """Joint angles ``q`` (n,) [rad or m]."""
+
+    q: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTarget:
+    """A full pose ``T`` (4, 4) in {S}: one number more than five axes can follow."""
+
+    T: FloatArray
+
+
+Target = JointTarget | ToolTarget | PoseTarget
+
+
+@dataclass(frozen=True)
+class Idle:
+    """No target: the arm rests at its goal, or brakes towards it."""
+
+
+IDLE = Idle()
+
+
+@dataclass(frozen=True, eq=False)
+class Positioning:
+    """Travel to a fixed goal, and rest there: the nearest that the arm can do to ``target``."""
+
+    target: Target
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """A drag: the goal is taken along the path of the hand to ``target``, as far as a tick allows.
+
+    since: how far along that path the goal has been taken. let_go: whether the hand has let go
+    meanwhile, so that the goal becomes the target at the end of the path.
+    """
+
+    target: ToolTarget
+    since: ToolTarget
+    let_go: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Jogging:
+    """Motion at rates (5,) for a while: v of the tool point [m/s], pitch and roll [rad/s].
+
+    frame: the axes that v is along. until: when it ends unless it is renewed [s].
+    """
+
+    rates: FloatArray
+    frame: JogFrame
+    until: float
+
+
+@dataclass(frozen=True, eq=False)
+class Servoing:
+    """A stream of joint angles is followed, for JOG_TIME after its newest sample."""
+
+    stream: Stream
+
+
+Intent = Idle | Positioning | Tracking | Jogging | Servoing
+"""A mode that can begin while the arm is still on a plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leaving:
+    """The arm brakes along its plan until it can leave it without touching anything.
+
+    along: the place on the plan. then: the mode that has superseded the plan.
+    """
+
+    along: Following
+    then: Intent
+
+
+Mode = Idle | Positioning | Tracking | Jogging | Servoing | Following | Leaving
+
+MODES = (Idle, Positioning, Tracking, Jogging, Servoing, Following)
+"""The columns of the table of transitions; a plan being left counts as the mode that follows it."""

@@ -1,0 +1,104 @@
+"""Outcome of a command: whether the session accepted, limited or refused it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import ACCEPTED, Outcome, Reason, State, Verdict
+from katana450.arm.control.things import MOST, named
+from katana450.arm.control.transitions import Effect, effect_of
+
+EFFECTS = (Reason.STOPPED, Reason.PAUSED)
+"""Reasons that are what a command asks for, and limit nothing."""
+
+
+def refused(why: str) -> Outcome:
+    """Return the outcome of a command that takes no effect, for the reason ``why``."""
+    return Outcome(Verdict.REFUSED, why=why)
+
+
+DROPPED = refused("The arm was stopped before it took effect. Clear the stop, then send it again.")
+"""Outcome of a command that waited when a stop came."""
+
+FAILED = refused("An internal error stopped it: the arm holds. See the log of the server.")
+"""Outcome of a command in a tick that failed."""
+
+
+def take_all(
+    take: Callable[[State, cmd.Command], State], state: State, command: cmd.Command
+) -> tuple[State, Outcome]:
+    """Return ``take(state, command)`` and its outcome; ``state`` itself if it is refused.
+
+    The parts of a batch are taken one after another.
+    """
+    if not isinstance(command, cmd.Batch):
+        why = refusal(state, command)
+        if why:
+            return state, refused(why)
+        after = take(state, command)
+        return after, outcome(state, after)
+    outcomes = []
+    for part in command.commands:
+        state, part_outcome = take_all(take, state, part)
+        outcomes.append(part_outcome)
+    return state, _merged(outcomes)
+
+
+def refusal(state: State, command: cmd.Command) -> str:
+    """Return why ``command`` takes no effect in ``state``; an empty text if it does."""
+    if effect_of(command, state) is Effect.REFUSED:
+        return _why_refused(state, command)
+    match command:
+        case cmd.Place(thing=thing):
+            known = named(state.things, thing.name)
+            if known is None and len(state.things) >= MOST:
+                return f"There are {MOST} things already: remove one first."
+            return _held(state, thing.name)
+        case cmd.Remove(name=name) | cmd.Shift(name=name) | cmd.Attach(name=name):
+            if named(state.things, name) is None:
+                return f"There is no {name!r}."
+            return _held(state, name)
+    return ""
+
+
+def _why_refused(state: State, command: cmd.Command) -> str:
+    if state.stopped is not None and not command.traits.while_stopped:
+        return "The arm is stopped: clear the stop first."
+    if state.paused and not command.traits.while_paused:
+        return "The arm is paused: resume first."
+    match command:
+        case cmd.GoAlong():
+            return "The arm follows no plan that it could go along."
+        case cmd.EndDrag():
+            return "There is no drag to end: the arm does something else by now."
+    return f"{type(command).__name__} is not possible in this mode."
+
+
+def outcome(before: State, after: State) -> Outcome:
+    """Return the outcome of a command that took ``before`` to ``after``."""
+    found = tuple(
+        each
+        for each in after.findings
+        if each.reason not in EFFECTS and not any(each is known for known in before.findings)
+    )
+    if any(each.reason is Reason.NOT_AT_START for each in found):
+        return Outcome(Verdict.REFUSED, found)
+    return Outcome(Verdict.LIMITED, found) if found else ACCEPTED
+
+
+def _held(state: State, name: str) -> str:
+    thing = named(state.things, name)
+    if thing is None or not thing.held:
+        return ""
+    return f"The gripper holds {name!r}: open it first."
+
+
+def _merged(parts: list[Outcome]) -> Outcome:
+    """Return the outcome of a batch of ``parts``: refused if all are."""
+    findings = tuple(found for part in parts for found in part.findings)
+    why = next((part.why for part in parts if part.why), "")
+    verdicts = {part.verdict for part in parts}
+    if len(verdicts) == 1:
+        return Outcome(verdicts.pop(), findings, why)
+    return Outcome(Verdict.LIMITED, findings, why) if verdicts else ACCEPTED

@@ -1,0 +1,107 @@
+"""Transforms of the state of an arm towards targets of its tool: poses, drags, branches, jogs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.arm.control.aims import with_goal, with_mode
+from katana450.arm.control.arm import Arm
+from katana450.arm.control.choices import choice, wish, wish_on
+from katana450.arm.control.findings import of_jog, of_projection, of_tracked
+from katana450.arm.control.modes import (
+    IDLE,
+    Jogging,
+    JointTarget,
+    PoseTarget,
+    Positioning,
+    Target,
+    ToolTarget,
+    Tracking,
+)
+from katana450.arm.control.motion_stepper import wished_twist
+from katana450.arm.control.state import Reason, State
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import Branch, branch_of
+from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.tracker import track
+
+STILL = frozen(np.zeros(5))
+"""The rates of a jog that ends."""
+
+
+def with_pose_target(arm: Arm, state: State, target: PoseTarget) -> State:
+    """``state`` with the nearest that ``arm`` can do to ``target`` on its branch as the goal."""
+    chain = arm.chain_to(state.tool)
+    best = project(chain, target.T, reading=state.reading, branch=state.branch, q_hint=state.goal)
+    findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
+    return with_goal(state, best.q, findings, Positioning(target))
+
+
+def dragged(arm: Arm, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
+    """``state`` that tracks ``target`` from now on, along the path of the hand."""
+    since = wish(arm, state) if state.since is None else state.since
+    return with_mode(state, Tracking(target, since, let_go))
+
+
+def tracked(arm: Arm, state: State, tracking: Tracking) -> State:
+    """``state`` with its goal taken on towards the target of a drag, as far as one tick allows."""
+    chain = arm.chain_to(state.tool)
+    found = track(
+        chain,
+        state.goal,
+        tracking.target,
+        branch=state.branch,
+        reading=state.reading,
+        since=tracking.since,
+    )
+    if found.since is not None:
+        return with_mode(replace(state, goal=found.best.q), replace(tracking, since=found.since))
+    target = JointTarget(found.best.q) if tracking.let_go else tracking.target
+    findings = of_tracked(chain, found, state.reading)
+    return with_goal(state, found.best.q, findings, Positioning(target))
+
+
+def reread(arm: Arm, state: State) -> State:
+    """``state`` with its pose or tool target projected anew, in the reading there is now."""
+    match state.intent:
+        case Positioning(target=PoseTarget() as target):
+            return with_pose_target(arm, state, target)
+        case Positioning(target=ToolTarget() as target):
+            return dragged(arm, state, target)
+        case Tracking() as tracking:
+            return dragged(arm, state, tracking.target, let_go=tracking.let_go)
+    return state
+
+
+def with_branch(arm: Arm, state: State, branch: Branch) -> State:
+    """``state`` that goes to ``branch`` with the tool at its target."""
+    best = choice(arm, state, branch)
+    target: Target = JointTarget(best.q)
+    if isinstance(state.target, PoseTarget):
+        target = state.target
+    elif isinstance(state.target, ToolTarget):
+        target = wish_on(arm, state, branch)
+    findings = of_projection(
+        arm.chain_to(state.tool),
+        best,
+        state.reading,
+        yaw_was_wished=isinstance(target, PoseTarget),
+    )
+    return with_goal(replace(state, branch=branch), best.q, findings, Positioning(target))
+
+
+def jogged(arm: Arm, state: State, jogging: Jogging, rest: FloatArray) -> State:
+    """``state`` after a tick of a jog: the goal is ``rest`` (n,), where it would come to rest.
+
+    So the arm does come to rest there when the jog is not renewed.
+    """
+    chain = arm.chain_to(state.tool)
+    contact = tuple(f for f in state.findings if f.reason is Reason.CONTACT)
+    held = of_jog(chain, state.setpoint, wished_twist(chain, state.setpoint, jogging))
+    aimed = replace(state, goal=rest, branch=branch_of(chain, rest), findings=contact + held)
+    if state.t < jogging.until:
+        return aimed
+    # Braked as a jog, in step, the tool stays on its way.
+    return with_mode(aimed, IDLE if state.motion.at_rest else replace(jogging, rates=STILL))

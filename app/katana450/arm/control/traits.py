@@ -1,0 +1,56 @@
+"""Traits of the commands: what the rest of the program has to know of a command's class.
+
+A command declares them where it is defined. There is no other list of command classes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+
+@dataclass(frozen=True, kw_only=True)
+class Traits:
+    """Traits of one class of commands. The default is a motion of an arm that has a tool.
+
+    Attributes:
+        stream: several in a row are one motion, so a newer one replaces one that waits for a tick.
+        while_stopped: takes effect while a stop holds the arm; all others are refused then.
+        while_paused: takes effect during a pause. A jog does not: it has no goal to keep for later.
+        supersedes: ends the motion or the program that is under way or being planned.
+        passive: leaves a path that is being planned as it is; all others end the planning.
+        pacing: may be given by the owner of the running program too, which holds the lease itself.
+        joints_only: possible for a mechanism that has joints and no tool.
+        planned: a path is planned first, so the command takes effect later than its ticket.
+        safety: may be given by everybody, at any time, whoever holds the arm. It is never refused,
+            and what waits before it is dropped.
+    """
+
+    stream: bool = False
+    while_stopped: bool = False
+    while_paused: bool = True
+    supersedes: bool = True
+    passive: bool = False
+    pacing: bool = False
+    joints_only: bool = False
+    planned: bool = False
+    safety: bool = False
+
+    def __post_init__(self) -> None:
+        if self.passive and self.supersedes:
+            raise ValueError("A command that supersedes a motion cannot be passive to planning.")
+
+
+class BaseCommand:
+    """Base of all commands. Each class declares ``traits``."""
+
+    traits: ClassVar[Traits]
+
+    @property
+    def parts(self) -> tuple[BaseCommand, ...]:
+        """The single commands in this one."""
+        return (self,)
+
+    def replaces(self, waiting: BaseCommand) -> bool:
+        """Return whether ``waiting``, the newest before this one, need not be executed any more."""
+        return self.traits.stream and type(waiting) is type(self)

@@ -1,0 +1,108 @@
+"""The effect of every command in every mode of the session: the table that the session obeys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.modes import (
+    MODES,
+    Following,
+    Idle,
+    Jogging,
+    Mode,
+    Positioning,
+    Servoing,
+    Tracking,
+)
+from katana450.arm.control.state import State
+
+
+class Effect(Enum):
+    """The effect of a command on the mode.
+
+    A command can still be refused for a reason of its own, which is then a finding: a plan, because
+    the arm does not stand at its start.
+    """
+
+    ACCEPTED = "accepted"
+    """It takes effect, and the mode stays as it is."""
+    CONTINUES = "continues"
+    """The mode goes on with what the command says."""
+    SUPERSEDES = "supersedes"
+    """Another mode begins, and nothing of the present one is left."""
+    REFUSED = "refused"
+    """Nothing changes."""
+
+
+A, C, S, R = Effect
+
+
+@dataclass(frozen=True)
+class Row:
+    """The effects of one command.
+
+    begins: the mode that it begins where it supersedes; None where it never does.
+    effects: by mode.
+    """
+
+    begins: type[Mode] | None
+    effects: Mapping[type[Mode], Effect]
+
+
+def _row(begins: type[Mode] | None, *effects: Effect) -> Row:
+    return Row(begins, dict(zip(MODES, effects, strict=True)))
+
+
+TABLE: Mapping[type[cmd.BaseCommand], Row] = {
+    # begins                         Idle Pos. Trac Jog. Serv Foll
+    cmd.AxisCommand: _row(Positioning,  S,   S,   S,   S,   S,   S),
+    cmd.SetJoints: _row(Positioning,    S,   S,   S,   S,   S,   S),
+    cmd.Home: _row(Positioning,         S,   S,   S,   S,   S,   S),
+    cmd.GoToZero: _row(Positioning,     S,   S,   S,   S,   S,   S),
+    cmd.SetPose: _row(Positioning,      S,   S,   S,   S,   S,   S),
+    cmd.TakeBranch: _row(Positioning,   S,   S,   S,   S,   S,   S),
+    cmd.MoveTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
+    cmd.TurnTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
+    cmd.EndDrag: _row(Positioning,      A,   S,   C,   R,   R,   R),
+    cmd.Jog: _row(Jogging,              S,   S,   S,   C,   S,   S),
+    cmd.Servo: _row(Servoing,           S,   S,   S,   S,   C,   S),
+    cmd.Follow: _row(Following,         S,   S,   S,   S,   S,   S),
+    cmd.GoAlong: _row(None,             R,   R,   R,   R,   R,   C),
+    cmd.Stop: _row(Idle,                S,   S,   S,   S,   S,   S),
+    cmd.ClearStop: _row(Idle,           S,   S,   S,   S,   S,   S),
+    cmd.Hold: _row(Idle,                S,   S,   S,   S,   S,   S),
+    # The target was one of the other tool frame; the goal stays.
+    cmd.SetTool: _row(Positioning,      A,   S,   S,   S,   S,   A),
+    # A tool target is projected anew.
+    cmd.SetReading: _row(None,          A,   C,   C,   A,   A,   A),
+    cmd.Pause: _row(None,               A,   A,   A,   A,   A,   A),
+    cmd.Resume: _row(None,              A,   A,   A,   A,   A,   A),
+    cmd.SpeedScale: _row(None,          A,   A,   A,   A,   A,   A),
+    cmd.SetGripper: _row(None,          A,   A,   A,   A,   A,   A),
+    cmd.Place: _row(None,               A,   A,   A,   A,   A,   A),
+    cmd.Shift: _row(None,               A,   A,   A,   A,   A,   A),
+    cmd.Attach: _row(None,              A,   A,   A,   A,   A,   A),
+    cmd.Furnish: _row(None,             A,   A,   A,   A,   A,   A),
+    cmd.Remove: _row(None,              A,   A,   A,   A,   A,   A),
+    cmd.Fill: _row(None,                A,   A,   A,   A,   A,   A),
+    cmd.Dress: _row(None,               A,   A,   A,   A,   A,   A),
+    # Each of its commands has the effect of its own row.
+    cmd.Batch: _row(None,               A,   A,   A,   A,   A,   A),
+}  # fmt: skip
+
+
+def row_of(kind: type[cmd.BaseCommand]) -> Row:
+    """Return the row of a class of commands: its own, or that of its nearest base."""
+    return next(TABLE[each] for each in kind.__mro__ if each in TABLE)
+
+
+def effect_of(command: cmd.Command, state: State) -> Effect:
+    """The effect that ``command`` has on ``state``."""
+    if state.stopped is not None and not command.traits.while_stopped:
+        return Effect.REFUSED
+    if state.paused and not command.traits.while_paused:
+        return Effect.REFUSED
+    return row_of(type(command)).effects[type(state.intent)]

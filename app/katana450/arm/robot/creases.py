@@ -1,0 +1,158 @@
+"""Triangles for drawing: smooth where they bend a little, apart at creases and between colours."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+Colours = npt.NDArray[np.uint8]
+"""(m, 4) sRGB and opacity."""
+
+CREASE = math.radians(40.0)
+"""Faces that meet at a larger angle are shaded apart."""
+
+FLOAT, UINT = 5126, 5125
+ARRAY, ELEMENT = 34962, 34963
+
+ROUGHNESS = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """vertices: (n, 3) [m], each with one normal. faces: (m, 3) indices of them.
+
+    colours: (n, 4) sRGB and opacity a vertex; None where the file says none.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    colours: Colours | None = None
+
+
+def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None) -> Drawn:
+    """``vertices`` (n, 3), ``faces`` (m, 3) and their ``colours`` (m, 4), apart where they are to
+    be: corners of one vertex stay one where smooth edges of one colour lead from face to face."""
+    normals = np.cross(
+        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
+    )
+    lengths = np.linalg.norm(normals, axis=1)
+    normals = normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    # Half an edge runs from corner 3 f + i to corner 3 f + j of a face.
+    start = np.arange(faces.size)
+    end = 3 * (start // 3) + (start + 1) % 3
+    flat = faces.ravel()
+    low, high = np.minimum(flat[start], flat[end]), np.maximum(flat[start], flat[end])
+    order = np.lexsort((high, low))
+    meets = (low[order[1:]] == low[order[:-1]]) & (high[order[1:]] == high[order[:-1]])
+    one, other = order[:-1][meets], order[1:][meets]
+    smooth = (normals[one // 3] * normals[other // 3]).sum(axis=1) > math.cos(CREASE)
+    if colours is not None:
+        smooth &= (colours[one // 3] == colours[other // 3]).all(axis=1)
+    one, other = one[smooth], other[smooth]
+    # The ends of the one are those of the other, the other way round or not.
+    turned = flat[start[one]] != flat[start[other]]
+    first = np.where(turned, end[other], start[other])
+    last = np.where(turned, start[other], end[other])
+    label = _joined(
+        faces.size, np.concatenate((start[one], end[one])), np.concatenate((first, last))
+    )
+    kept, number = np.unique(label, return_inverse=True)
+    return Drawn(
+        vertices[flat[kept]],
+        number.reshape(-1, 3),
+        None if colours is None else colours[kept // 3],
+    )
+
+
+def _joined(count: int, one: IntArray, other: IntArray) -> IntArray:
+    """The lowest number among those that each of ``count`` hangs together with."""
+    label = np.arange(count)
+    while True:
+        lowest = label.copy()
+        np.minimum.at(lowest, one, label[other])
+        np.minimum.at(lowest, other, label[one])
+        lowest = lowest[lowest]
+        if np.array_equal(lowest, label):
+            return label
+        label = lowest
+
+
+def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
+    """A binary glTF file of it in its own colours, for viser, which takes its axes as they are."""
+    assert shape.colours is not None
+    alpha = shape.colours[:, 3:] / 255.0 * opacity
+    # Colours of vertices are linear there.
+    srgb = shape.colours[:, :3] / 255.0
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    blocks = (
+        (shape.vertices, np.float32, FLOAT, "VEC3", ARRAY),
+        (_normals(shape), np.float32, FLOAT, "VEC3", ARRAY),
+        (np.concatenate((linear, alpha), axis=1), np.float32, FLOAT, "VEC4", ARRAY),
+        (shape.faces.ravel(), np.uint32, UINT, "SCALAR", ELEMENT),
+    )
+    data, views, accessors = bytearray(), [], []
+    for number, (values, kind, component, shaped, target) in enumerate(blocks):
+        packed = np.ascontiguousarray(values, dtype=kind)
+        views.append(
+            {
+                "buffer": 0,
+                "byteOffset": len(data),
+                "byteLength": packed.nbytes,
+                "target": target,
+            }
+        )
+        accessor: dict[str, Any] = {
+            "bufferView": number,
+            "componentType": component,
+            "count": len(packed),
+            "type": shaped,
+        }
+        if number == 0:
+            accessor |= {"min": packed.min(axis=0).tolist(), "max": packed.max(axis=0).tolist()}
+        accessors.append(accessor)
+        data += packed.tobytes()
+    material = {
+        "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": ROUGHNESS},
+        "alphaMode": "BLEND" if alpha.min() < 1.0 else "OPAQUE",
+        "doubleSided": True,
+    }
+    primitive = {
+        "attributes": {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2},
+        "indices": 3,
+        "material": 0,
+    }
+    document = {
+        "asset": {"version": "2.0", "generator": "katana450"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive]}],
+        "materials": [material],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+    }
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(data), b"BIN\0") + bytes(data)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def _normals(shape: Drawn) -> FloatArray:
+    """(n, 3) of each vertex, its faces weighed by their areas."""
+    a, b, c = shape.vertices[shape.faces].transpose(1, 0, 2)
+    faces = np.cross(b - a, c - a)
+    sums = np.zeros_like(shape.vertices)
+    for corner in shape.faces.T:
+        np.add.at(sums, corner, faces)
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.where(lengths > 0.0, sums / np.where(lengths > 0.0, lengths, 1.0), (0.0, 0.0, 1.0))

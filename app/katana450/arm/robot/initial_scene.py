@@ -1,0 +1,25 @@
+"""What stands around the arm when the server starts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.robot.object_meshes import Mesh
+from katana450.maths.geometry.arrays import FloatArray
+
+
+class InitialScene(NamedTuple):
+    """A scene in place of the robot's own.
+
+    Attributes:
+        command: Puts its objects and its water there.
+        joints: (n,) where the arm stands [rad]; None for the ready posture.
+        meshes: Those of its objects.
+        notes: Sentences to print, on what was read.
+    """
+
+    command: cmd.Furnish
+    joints: FloatArray | None
+    meshes: tuple[Mesh, ...]
+    notes: tuple[str, ...]

@@ -1,0 +1,23 @@
+"""The options by which commands are given another arm."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from katana450.resources import URDF_PATH
+
+
+def add_arm_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--urdf`` and ``--tool`` to ``parser``."""
+    parser.add_argument(
+        "--urdf",
+        type=Path,
+        default=URDF_PATH,
+        metavar="FILE",
+        help="another arm: pan, three parallel axes, roll; `serve` drives any other tree joint "
+        "by joint (default: the Katana450)",
+    )
+    parser.add_argument(
+        "--tool", metavar="LINK", help="link that targets are for (default: the last one)"
+    )

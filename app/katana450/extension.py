@@ -1,0 +1,144 @@
+"""Extensions: parts of the app that the core never imports, found by name and loaded on use.
+
+An extension is one module with the constant ``EXTENSION``. Those of this distribution are listed in
+``BUILT_IN``; another distribution names its own in the entry point group ``katana450.extensions``:
+
+    [project.entry-points."katana450.extensions"]
+    weather = "weather_station.katana450:EXTENSION"
+
+Importing such a module must load nothing heavy: it is imported whenever options are read.
+"""
+
+from __future__ import annotations
+
+import logging
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from starlette.routing import BaseRoute
+
+    from katana450.arm.control.session import Session
+    from katana450.arm.control.things import Environment
+    from katana450.arm.robot.initial_scene import InitialScene
+    from katana450.arm.robot.robot import Robot
+    from katana450.server.service.nodes import Nodes
+    from katana450.server.view.layer import ViewLayer
+    from katana450.server.web.http_api import RouteContext
+
+PACKAGE = "katana450.extensions"
+"""Package of the built-in extensions, and the name of the group of entry points."""
+
+BUILT_IN = ("importers", "reachability", "export", "experiments", "render")
+"""Built-in extensions, in the order of their commands in the help."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class CliCommand:
+    """A command ``katana450 NAME``.
+
+    Attributes:
+        name: The word to type.
+        help: One line for ``katana450 --help``.
+        add_options: Adds its options to a parser.
+        run: Runs it with the options given and returns the exit status. Imports what it needs.
+    """
+
+    name: str
+    help: str
+    add_options: Callable[[ArgumentParser], None]
+    run: Callable[[Namespace], int]
+
+
+@dataclass(frozen=True)
+class ServeExtension:
+    """A part of ``katana450 serve``. Each function is called once at the start, or never.
+
+    Attributes:
+        add_options: Adds options to the parser of ``serve``.
+        initial_scene: Returns what stands around at first according to the options, or None. Its
+            second argument returns the session of the robot, and raises RobotDescriptionError if
+            that is not an arm. Called in the process of the arm. Raises KatanaError.
+        view_layer: Returns what to show in the scene according to the options, or None. Called in
+            the process of the view. Raises KatanaError.
+        routes: Returns routes for the web server, below ``/api/v1``. Called in the process of the
+            view.
+        nodes: Returns what of a robot and the objects around it can be read and set by name.
+            Called in the process of the view; the first extension that has it is asked.
+    """
+
+    add_options: Callable[[ArgumentParser], None] | None = None
+    initial_scene: Callable[[Namespace, Callable[[], Session]], InitialScene | None] | None = None
+    view_layer: Callable[[Namespace], ViewLayer | None] | None = None
+    routes: Callable[[RouteContext], list[BaseRoute]] | None = None
+    nodes: Callable[[Robot, Environment], Nodes] | None = None
+
+
+@dataclass(frozen=True)
+class Extension:
+    """All that one extension adds to the app.
+
+    Attributes:
+        name: Its name in messages.
+        commands: Commands of ``katana450``.
+        serve: Its part of ``katana450 serve``, if it has one.
+    """
+
+    name: str
+    commands: tuple[CliCommand, ...] = ()
+    serve: ServeExtension | None = None
+
+
+@cache
+def extensions() -> tuple[Extension, ...]:
+    """Return the installed extensions, the built-in ones first.
+
+    A built-in extension that is not installed is left out. One that cannot be loaded is left out
+    too, and logged.
+    """
+    return tuple(_loaded())
+
+
+def serve_extensions() -> tuple[ServeExtension, ...]:
+    """Return what the installed extensions add to ``katana450 serve``."""
+    return tuple(each.serve for each in extensions() if each.serve is not None)
+
+
+def missing_extension(error: ImportError) -> str | None:
+    """Return the name of the extension that ``error`` could not import, or None if it is another
+    module."""
+    prefix, _, rest = (error.name or "").partition(f"{PACKAGE}.")
+    return rest.split(".")[0] if rest and not prefix else None
+
+
+def _loaded() -> Iterator[Extension]:
+    for name in BUILT_IN:
+        try:
+            extension: Extension = import_module(f"{PACKAGE}.{name}.extension").EXTENSION
+        except ImportError as error:
+            if (error.name or "") != PACKAGE and missing_extension(error) is None:
+                _report(name, error)
+        else:
+            yield extension
+    for entry in entry_points(group=PACKAGE):
+        try:
+            found = entry.load()
+        except Exception as error:
+            # Code of other people: whatever is wrong with it, the app runs without it.
+            _report(entry.name, error)
+            continue
+        if isinstance(found, Extension):
+            yield found
+        else:
+            _report(entry.name, TypeError(f"{entry.value} is not an {Extension.__name__}"))
+
+
+def _report(name: str, error: Exception) -> None:
+    log.warning("The extension %s cannot be loaded and is left out: %s.", name, error)

@@ -1,0 +1,55 @@
+"""``katana450 run`` and ``katana450 demo``: a script rehearsed here, or run on a server."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+
+from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script_files import text_of
+from katana450.extensions.programs.source import ScriptError
+
+
+def run(options: Namespace) -> int:
+    """``katana450 run``."""
+    return _run(text_of(options.file), str(options.file), options)
+
+
+def demo(options: Namespace) -> int:
+    """``katana450 demo``."""
+    if options.demo == "pour":
+        text = PourDemo(options.water, options.cup, options.basin, options.shake).text
+    else:
+        text = CircleDemo(
+            options.centre,
+            options.normal,
+            options.radius,
+            options.turns,
+            options.pitch,
+            options.tool,
+        ).text
+    return _run(text, f"demo {options.demo}", options)
+
+
+def _run(text: str, source: str, options: Namespace) -> int:
+    if options.report is not None:
+        from katana450.extensions.report.figures import check_drawable
+
+        check_drawable()
+    try:
+        script = parse(text)
+        if options.headless or options.dry_run or options.report is not None:
+            from katana450.extensions.experiments.simulate import simulate
+
+            status = simulate(script, options)
+            if status or options.headless or options.dry_run:
+                return status
+        from katana450.extensions.experiments.live import run_live
+
+        return run_live(text, script, options)
+    except ScriptError as error:
+        for problem in error.problems:
+            print(f"{source}:{problem.line}:{problem.column}: {problem.said}", file=sys.stderr)
+        return 1

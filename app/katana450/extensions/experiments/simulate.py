@@ -1,0 +1,71 @@
+"""A script run without server and browser, on a clock of its own, and what is told of it."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from datetime import datetime
+
+from katana450.arm.robot.props import load_props
+from katana450.cli.version import version
+from katana450.extensions.programs.clocked_run import planned, played
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.script import Script
+from katana450.extensions.report.report import Report
+from katana450.server.view.texts import part
+from katana450.settings import Settings
+
+BARE = "The arm is without its gripper: its fingers would reach into the table."
+
+
+def simulate(script: Script, options: Namespace) -> int:
+    """Plan it, and unless that is all run it on a clock of its own and report."""
+    plan = planned(script, options.urdf, options.seed, options.speed)
+    program, robot = plan.program, plan.robot
+    notes = (BARE,) if script.bare else ()
+    for note in notes:
+        print(note)
+    if options.dry_run:
+        _tell(program)
+        return 0
+    rehearsal = played(plan)
+    facts = {
+        "version": version(),
+        "arm": robot.name,
+        "gripper": "none" if script.bare else "fitted",
+        "speed": program.speed,
+        "ticks_per_s": Settings().rate,
+        "seed": options.seed,
+    }
+    report = Report.of(script, program, robot.require_arm(), rehearsal.trace, facts, notes)
+    print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
+    print("\n".join(f"  {line}" for line in report.lines))
+    if options.report is not None:
+        # The pictures of a report are all that needs the renderer.
+        from katana450.extensions.report.stages import stage_pictures
+
+        pictures = stage_pictures(
+            program, robot, plan.session, load_props(), rehearsal.states, report.trace
+        )
+        report.write(options.report, datetime.now().astimezone(), pictures)
+        print(f"Report: {options.report / 'report.html'}")
+    for bound in report.bounds:
+        if not bound.held:
+            print(f"katana450: a bound is missed: {bound}", file=sys.stderr)
+    return 0 if report.held else 1
+
+
+def _tell(program: Program) -> None:
+    """Each task with its line, its time and the nearest it comes to anything."""
+    for task in program.tasks:
+        said = ""
+        if isinstance(task.order, Go):
+            plan = task.order.plan
+            said = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
+            if plan.nearest is not None:
+                one, other = map(part, plan.nearest.contact.parts)
+                apart = 1e3 * plan.nearest.contact.distance
+                said += f", {apart:.0f} mm from {one} to {other}"
+        print(f"line {task.line:>4}  {task.name:<24} {said}".rstrip())
+    print(f"{program.steps} steps, {program.duration:.2f} s of motion at full speed.")

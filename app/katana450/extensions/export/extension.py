@@ -1,0 +1,129 @@
+"""The extension ``export``: files for other programs, and the command that writes them."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.errors import InputError
+from katana450.extension import CliCommand, Extension, ServeExtension
+from katana450.resources import URDF_PATH
+
+if TYPE_CHECKING:
+    from katana450.arm.control.things import Environment
+    from katana450.arm.robot.robot import Robot
+    from katana450.server.service.nodes import Nodes
+
+FORMATS = {
+    "vrml": "a VRML97 world and a file a part, as LabVIEW, Simulink and X3D browsers read them",
+    "c": "C arrays and draw functions a link, and an OpenGL viewer with its Makefile",
+    "glb": "binary glTF 2.0, for browsers, Blender and game engines",
+    "urdf": "a zip of a ROS package with the URDF and its meshes",
+    "html": "a page of a run with a slider of its time, which opens without a server",
+}
+
+
+def add_export_options(parser: argparse.ArgumentParser) -> None:
+    """Put them into `parser`."""
+    parser.add_argument("format", choices=tuple(FORMATS), help=_listed())
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="directory for the files, or the file of html",
+    )
+    parser.add_argument(
+        "--pose",
+        type=joint_values,
+        default=(),
+        metavar="Q",
+        help="values of the driven joints in rad or m with commas between, gripper last, such as "
+        "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
+    )
+    parser.add_argument(
+        "--license",
+        metavar="NAME",
+        help="urdf: licence of the robot that package.xml states, such as Apache-2.0 (default: MIT "
+        "for the Katana450, unstated for another mechanism)",
+    )
+    parser.add_argument(
+        "--maintainer",
+        type=named_address,
+        metavar="'NAME <EMAIL>'",
+        help="urdf: who package.xml names as responsible for the package (default: unstated)",
+    )
+    motion = parser.add_mutually_exclusive_group()
+    motion.add_argument(
+        "--trajectory",
+        type=Path,
+        metavar="FILE",
+        help="vrml, glb and html: a motion the file plays by itself; .csv with the columns "
+        "t,theta1,...,theta5,gripper or .json with lists of these names",
+    )
+    motion.add_argument(
+        "--run",
+        metavar="SCRIPT",
+        help="html: circle, pour or the file of a script, whose run the page plays",
+    )
+    parser.add_argument(
+        "--urdf",
+        type=Path,
+        default=URDF_PATH,
+        metavar="FILE",
+        help="another mechanism: any tree of turning, sliding and mimicking joints "
+        "(default: the Katana450)",
+    )
+
+
+def _export(options: argparse.Namespace) -> int:
+    if options.format != "urdf" and (options.license or options.maintainer):
+        raise InputError(
+            f"A file of {options.format} states no licence and no maintainer; urdf does."
+        )
+    if options.format == "html":
+        from katana450.extensions.export.page import write_page
+
+        return write_page(options)
+    from katana450.extensions.export.export import export
+
+    return export(options)
+
+
+def _listed() -> str:
+    return "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+
+
+def named_address(text: str) -> tuple[str, str]:
+    """Return name and email of ``NAME <EMAIL>``."""
+    found = re.fullmatch(r"\s*([^<>]*[^<>\s])\s*<([^<>@\s]+@[^<>@\s]+)>\s*", text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"'NAME <EMAIL>', not {text!r}")
+    return found[1], found[2]
+
+
+def joint_values(text: str) -> tuple[float, ...]:
+    """Of a list with commas between [rad, m]."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"numbers with commas between, not {text!r}") from None
+
+
+def _nodes(robot: Robot, environment: Environment) -> Nodes:
+    from katana450.extensions.export.vrml_nodes import VrmlNodes
+
+    return VrmlNodes(robot, environment)
+
+
+EXTENSION = Extension(
+    "export",
+    (
+        CliCommand(
+            "export", "write the arm as files for other programs", add_export_options, _export
+        ),
+    ),
+    ServeExtension(nodes=_nodes),
+)

@@ -1,0 +1,110 @@
+"""States of an arm over time, to be shown: of a script, a table of joint values, or a pose."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import described
+from katana450.errors import InputError
+from katana450.extensions.export.trajectory_file import load_motion
+from katana450.settings import Settings
+
+
+class Playback(NamedTuple):
+    """An arm, and its states so many times a second; one where it only stands."""
+
+    robot: Robot
+    session: Session
+    states: Sequence[State]
+    rate: float
+    bare: bool = False
+
+    def at(self, t: float) -> State:
+        """The state nearest to ``t`` [s]; that at the end if it is later."""
+        return self.states[min(round(t * self.rate), len(self.states) - 1)]
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return (len(self.states) - 1) / self.rate
+
+
+def chosen(run: str | None, trajectory: Path | None, pose: Sequence[float], urdf: Path) -> Playback:
+    """What a person chose: a script or a demo by its name, a table, or else a pose."""
+    if run is not None:
+        return of_script(run, urdf)
+    if trajectory is not None:
+        return of_trajectory(trajectory, urdf)
+    return of_pose(pose, urdf)
+
+
+def of_script(name: str, urdf: Path) -> Playback:
+    """Return the run of a demo or of a script in a file; it is simulated with a progress bar.
+
+    Raises InputError with the line of the script that is wrong.
+    """
+    # A pose or a table can be shown without the extension ``programs``.
+    from katana450.extensions.programs.circle import CircleDemo
+    from katana450.extensions.programs.clocked_run import planned, played
+    from katana450.extensions.programs.pour import PourDemo
+    from katana450.extensions.programs.script import parse
+    from katana450.extensions.programs.script_files import text_of
+    from katana450.extensions.programs.source import ScriptError
+
+    demos = {"circle": CircleDemo, "pour": PourDemo}
+    text = demos[name]().text if name in demos else text_of(Path(name))
+    try:
+        plan = planned(parse(text), urdf)
+    except ScriptError as error:
+        found = error.problems[0]
+        raise InputError(f"{name}:{found.line}:{found.column}: {found.said}") from error
+    states = played(plan).states
+    return Playback(plan.robot, plan.session, states, Settings().rate, plan.script.bare)
+
+
+def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
+    """Standing at ``pose``: values of the driven joints [rad]; at home where there are none."""
+    robot, session, _ = _described(urdf)
+    if not pose:
+        return Playback(robot, session, [_at_rest(session)], 1.0)
+    return Playback(robot, session, [_standing(robot, session, robot.values(pose))], 1.0)
+
+
+def of_trajectory(path: Path, urdf: Path) -> Playback:
+    """As a table of joint values has it. Raises InputError for a file that is none."""
+    robot, session, _ = _described(urdf)
+    motion, rate = load_motion(path, robot), Settings().rate
+    t = np.arange(int(motion.t[-1] * rate) + 1) / rate
+    rows = {name: np.interp(t, motion.t, values) for name, values in motion.values.items()}
+    states = [
+        _standing(robot, session, {name: float(row[k]) for name, row in rows.items()}, time)
+        for k, time in enumerate(t.tolist())
+    ]
+    return Playback(robot, session, states, rate)
+
+
+def _described(urdf: Path) -> tuple[Robot, Session, tuple[str, ...]]:
+    robot, session, notes = described(Settings(), urdf, None)
+    for note in notes:
+        print(f"katana450: {note}", file=sys.stderr)
+    return robot, session, notes
+
+
+def _at_rest(session: Session) -> State:
+    """Where an arm is that nobody has moved."""
+    return session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
+
+
+def _standing(robot: Robot, session: Session, values: dict[str, float], t: float = 0.0) -> State:
+    arm = robot.require_arm()
+    q = np.array([values[name] for name in arm.chain.names])
+    driven = [name for name, follows in arm.fingers.items() if follows == (1.0, 0.0)]
+    return session.begin(q, values[driven[0]] if driven else 0.0, t)

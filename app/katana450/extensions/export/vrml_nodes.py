@@ -1,0 +1,340 @@
+"""The VRML world of a running arm, by its DEF names: what can be read of it, and what can be set.
+
+A joint's rotation is an order to go there, never a place it is put at; what things and paints are
+set to goes through the same door. The names are those of the exported files.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arrangement import look_of, shifted
+from katana450.arm.control.looks import Colour, Trait
+from katana450.arm.control.state import State
+from katana450.arm.control.support import check_carried, is_loose
+from katana450.arm.control.things import Environment, Thing
+from katana450.arm.robot.link import Joint
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import PLAIN
+from katana450.errors import InputError
+from katana450.extensions.export.vrml_names import Dressed, Names
+from katana450.extensions.export.vrml_node import WIDTHS, Type
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.api import answers, requests
+from katana450.server.service.nodes import Nodes
+
+ASIDE = 1e-6
+"""[rad] By which the axis of a rotation may be beside that of the joint."""
+
+FieldValue = float | list[float]
+
+
+class _Orders:
+    """What one message comes to, until all of it is understood."""
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        self.axes: dict[int, float] = {}
+        self.others: list[cmd.Command] = []
+
+    def command(self) -> cmd.Command:
+        """All of them, at once."""
+        turned = (cmd.SetAxes(tuple(self.axes.items())),) if self.axes else ()
+        said = (*turned, *self.others)
+        return said[0] if len(said) == 1 else cmd.Batch(said)
+
+
+@dataclass(frozen=True, eq=False)
+class _Field:
+    type: Type
+    read: Callable[[State], FieldValue]
+    put: Callable[[_Orders, FieldValue | None], None] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Node:
+    kind: str
+    of: str
+    fields: Mapping[str, _Field]
+
+
+class VrmlNodes(Nodes):
+    """Everything that has a DEF name. Changes nothing by itself."""
+
+    def __init__(self, robot: Robot, surroundings: Environment) -> None:
+        super().__init__(robot)
+        arm = robot.arm
+        axes = robot.driven if arm is None else arm.chain.names
+        self._axes: Mapping[str, int] = {name: axis for axis, name in enumerate(axes)}
+        self._fingers = () if arm is None else tuple(arm.fingers)
+        # A finger that follows another is set by it alone.
+        self._gripper = next((f for f in self._fingers if robot.joints[f].leader == f), None)
+        self._surroundings = surroundings
+        self._names = Names(robot)
+        self._fixed = self._of_the_robot()
+        # Of the things there are at present, by the names they had.
+        self._known: tuple[tuple[str, ...], Mapping[str, _Node]] = ((), self._fixed)
+
+    def world(self, state: State) -> answers.World:
+        """All nodes with what they are now."""
+        return answers.World(
+            nodes=[
+                answers.Node(
+                    node=name,
+                    kind=node.kind,
+                    of=node.of,
+                    fields=[
+                        answers.Field(
+                            field=field,
+                            type=each.type.value,
+                            value=each.read(state),
+                            settable=each.put is not None,
+                        )
+                        for field, each in node.fields.items()
+                    ],
+                )
+                for name, node in self._nodes(state).items()
+            ]
+        )
+
+    def read(self, state: State, asked: Iterable[requests.Named]) -> tuple[answers.Value, ...]:
+        """What the fields are now. Raises InputError for a name there is none of."""
+        return tuple(
+            answers.Value(
+                node=each.node,
+                field=each.field,
+                value=self._field(state, each.node, each.field).read(state),
+            )
+            for each in asked
+        )
+
+    def command(self, state: State, settings: Iterable[requests.Setting]) -> cmd.Command:
+        """What sets all of these. Raises InputError when one cannot be set, which and why."""
+        orders = _Orders(state)
+        for each in settings:
+            name = f"{each.node}.{each.field}"
+            field = self._field(state, each.node, each.field)
+            if field.put is None:
+                raise InputError(f"{name} can be read and not set.")
+            field.put(orders, None if each.value is None else _fitting(name, field, each.value))
+        self._check_carried(orders)
+        return orders.command()
+
+    def _check_carried(self, orders: _Orders) -> None:
+        """Raise InputError for an object that would stand on nothing once all is moved."""
+        moves = [each for each in orders.others if isinstance(each, cmd.Shift)]
+        things = functools.reduce(shifted, moves, orders.state).things
+        for name in {each.name for each in moves}:
+            thing = next(each for each in things if each.name == name)
+            if is_loose(thing):
+                check_carried(self._surroundings.table, things, thing)
+
+    def _field(self, state: State, node: str, field: str) -> _Field:
+        found = self._nodes(state).get(node)
+        if found is None:
+            raise InputError(f"There is no node {node!r}; `query` of `world` lists them.")
+        if field not in found.fields:
+            known = ", ".join(found.fields)
+            raise InputError(f"{node!r} is a {found.kind} with {known}, and has no {field!r}.")
+        return found.fields[field]
+
+    def _nodes(self, state: State) -> Mapping[str, _Node]:
+        names = tuple(thing.name for thing in state.things)
+        if names != self._known[0]:
+            nodes = dict(self._fixed)
+            for name, (put, dressed) in self._names.things(names).items():
+                nodes[put] = self._thing(name)
+                nodes |= _dress(name, f"thing {name}", dressed, PLAIN)
+            self._known = (names, nodes)
+        return self._known[1]
+
+    def _of_the_robot(self) -> dict[str, _Node]:
+        nodes: dict[str, _Node] = {}
+        for link in self._robot.links:
+            if link.joint is not None:
+                nodes[self._names.joints[link.joint.name]] = self._joint(link.joint)
+            if link.shapes:
+                dressed = self._names.dressed[link.name]
+                nodes |= _dress(link.name, f"link {link.name}", dressed, link.colour)
+        return nodes
+
+    def _joint(self, joint: Joint) -> _Node:
+        axis = self._robot.axis(joint)
+        name = joint.name
+
+        def read(state: State) -> FieldValue:
+            value = self._values(state)[name]
+            return [*(value * axis).tolist()] if joint.slides else [*axis.tolist(), value]
+
+        def put(orders: _Orders, value: FieldValue | None) -> None:
+            if not isinstance(value, list):
+                raise InputError(f"{name} has no value of its own to go back to; say where it is.")
+            if joint.leader != name:
+                raise InputError(f"{name} follows {joint.leader}: set that.")
+            amount = _along(name, axis, value) if joint.slides else _about(name, axis, value)
+            if name in self._axes:
+                orders.axes[self._axes[name]] = amount
+            elif name == self._gripper:
+                orders.others.append(cmd.SetGripper(amount))
+            elif name in self._fingers:
+                raise InputError(f"{name} is driven together with {self._gripper}: set that.")
+            else:
+                raise InputError(f"{name} stays where it is: it is no joint of the arm.")
+
+        moved = "translation" if joint.slides else "rotation"
+        kind = Type.VECTOR if joint.slides else Type.ROTATION
+        link = next(link for link in self._robot.links if link.joint is joint)
+        center: list[float] = self._robot.home[link.name][:3, 3].tolist()
+        fields = {moved: _Field(kind, read, put), "center": _Field(Type.VECTOR, lambda _: center)}
+        return _Node("Transform", f"joint {name}", fields)
+
+    def _thing(self, name: str) -> _Node:
+        def pose(state: State) -> FloatArray:
+            thing = _known_thing(state, name)
+            return self._surroundings.pose(thing, state.x)
+
+        def rotation(state: State) -> FieldValue:
+            return _axis_angle(pose(state)[:3, :3])
+
+        def translation(state: State) -> FieldValue:
+            return [*pose(state)[:3, 3].tolist()]
+
+        def move(orders: _Orders, value: FieldValue | None) -> None:
+            position = np.array(_out_of_the_hand(orders, name, value))
+            orders.others.append(cmd.Shift(name, position=position))
+
+        def turn(orders: _Orders, value: FieldValue | None) -> None:
+            R = _rotation(name, _out_of_the_hand(orders, name, value))
+            orders.others.append(cmd.Shift(name, R=R))
+
+        return _Node(
+            "Transform",
+            f"thing {name}",
+            {
+                "translation": _Field(Type.VECTOR, translation, move),
+                "rotation": _Field(Type.ROTATION, rotation, turn),
+            },
+        )
+
+
+def _dress(name: str, of: str, dressed: Dressed, colour: Colour) -> dict[str, _Node]:
+    """The Switch of a link or thing, and the Material of its paint."""
+
+    def put(trait: Trait) -> Callable[[_Orders, FieldValue | None], None]:
+        def changed(orders: _Orders, value: FieldValue | None) -> None:
+            said = tuple(value) if isinstance(value, list) else value
+            orders.others.append(cmd.Dress(name, trait, said))
+
+        return changed
+
+    return {
+        dressed.look: _Node(
+            "Switch",
+            of,
+            {
+                "whichChoice": _Field(
+                    Type.INT,
+                    lambda state: float(look_of(state, name).choice.value),
+                    put(Trait.CHOICE),
+                )
+            },
+        ),
+        dressed.paint: _Node(
+            "Material",
+            of,
+            {
+                "diffuseColor": _Field(
+                    Type.COLOR,
+                    lambda state: list(look_of(state, name).colour or colour),
+                    put(Trait.COLOUR),
+                ),
+                "transparency": _Field(
+                    Type.FLOAT,
+                    lambda state: look_of(state, name).transparency,
+                    put(Trait.TRANSPARENCY),
+                ),
+            },
+        ),
+    }
+
+
+def _fitting(name: str, field: _Field, value: FieldValue) -> FieldValue:
+    """``value`` if it is one of the field's type."""
+    numbers = value if isinstance(value, list) else [value]
+    if len(numbers) != WIDTHS[field.type] or isinstance(value, list) != (len(numbers) > 1):
+        wanted = "a number" if WIDTHS[field.type] == 1 else f"{WIDTHS[field.type]} numbers"
+        raise InputError(f"{name} is a {field.type.value}, which is {wanted}, not {value}.")
+    if not all(map(math.isfinite, numbers)):
+        raise InputError(f"{name} has to be finite: {value}.")
+    return value
+
+
+def _out_of_the_hand(orders: _Orders, name: str, value: FieldValue | None) -> list[float]:
+    """``value``, where the thing of that name can be moved."""
+    if _known_thing(orders.state, name).held:
+        raise InputError(f"{name!r} is held: open the gripper first.")
+    if not isinstance(value, list):
+        raise InputError(f"{name} has no place of its own to go back to; say where it is to be.")
+    return value
+
+
+def _about(name: str, axis: FloatArray, rotation: list[float]) -> float:
+    """The angle [rad] about ``axis`` of a rotation, which must be about that alone."""
+    angle = rotation[3]
+    if angle == 0.0:
+        return 0.0
+    given = _unit(rotation[:3])
+    if given is None or float(np.linalg.norm(np.cross(axis, given))) > ASIDE:
+        about = _shown(np.array(rotation[:3]))
+        raise InputError(f"{name} turns about {_shown(axis)}, and cannot turn about {about}.")
+    return angle if float(axis @ given) > 0.0 else -angle
+
+
+def _along(name: str, axis: FloatArray, translation: list[float]) -> float:
+    """How far [m] along ``axis`` a translation is, which must be along that alone."""
+    given = np.array(translation)
+    amount = float(axis @ given)
+    if float(np.linalg.norm(given - amount * axis)) > ASIDE * max(abs(amount), 1.0):
+        raise InputError(f"{name} slides along {_shown(axis)}, and cannot go to {_shown(given)}.")
+    return amount
+
+
+def _shown(vector: FloatArray) -> str:
+    return " ".join(f"{number + 0.0:g}" for number in np.round(vector, 6))
+
+
+def _rotation(name: str, given: list[float]) -> FloatArray:
+    """(3, 3) of a VRML rotation: an axis, and an angle about it [rad]."""
+    if given[3] == 0.0:
+        return np.eye(3)
+    axis = _unit(given[:3])
+    if axis is None:
+        raise InputError(f"{name} cannot turn about an axis without a direction.")
+    return so3.exp(math.remainder(given[3], math.tau) * axis)
+
+
+def _unit(given: list[float]) -> FloatArray | None:
+    """The direction of a vector of any length; None of one without."""
+    largest = max(map(abs, given))
+    if largest == 0.0:
+        return None
+    scaled = np.array([number / largest for number in given])
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
+def _axis_angle(R: FloatArray) -> list[float]:
+    """The VRML rotation (4,) of ``R`` (3, 3)."""
+    w = so3.log(R)
+    angle = float(np.linalg.norm(w))
+    return [*(w / angle).tolist(), angle] if angle else [0.0, 0.0, 1.0, 0.0]
+
+
+def _known_thing(state: State, name: str) -> Thing:
+    return next(thing for thing in state.things if thing.name == name)

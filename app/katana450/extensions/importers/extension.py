@@ -1,0 +1,56 @@
+"""The extension ``importers``: meshes and scenes read from files, at the start and by upload."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.extension import Extension, ServeExtension
+
+if TYPE_CHECKING:
+    from starlette.routing import BaseRoute
+
+    from katana450.arm.control.session import Session
+    from katana450.arm.robot.initial_scene import InitialScene
+    from katana450.server.web.http_api import RouteContext
+
+
+def add_serve_options(parser: ArgumentParser) -> None:
+    """Add to ``katana450 serve`` the options that say what stands around."""
+    parser.add_argument(
+        "--scene",
+        type=Path,
+        metavar="FILE",
+        help="what stands around: a scene.yaml with its meshes beside it, or a .zip of both",
+    )
+    parser.add_argument(
+        "--object",
+        dest="objects",
+        action="append",
+        default=[],
+        metavar="FILE[@x,y,z]",
+        help="an object besides, of a .wrl, .stl, .obj, .ply, .glb or .gltf file; where it stands "
+        "in mm, else in front of the arm; as often as there are",
+    )
+
+
+def _initial_scene(options: Namespace, session: Callable[[], Session]) -> InitialScene | None:
+    if options.scene is None and not options.objects:
+        return None
+    from katana450.extensions.importers.initial_scene import initial_scene
+
+    return initial_scene(session(), options.scene, options.objects)
+
+
+def _routes(context: RouteContext) -> list[BaseRoute]:
+    from katana450.extensions.importers.uploads import Uploads
+
+    return Uploads(context.hub, context.door, context.visitor).routes()
+
+
+EXTENSION = Extension(
+    "importers",
+    serve=ServeExtension(add_serve_options, initial_scene=_initial_scene, routes=_routes),
+)

@@ -1,0 +1,64 @@
+"""Meshes and scenes between files and the server: read, kept until they are asked for, saved."""
+
+from __future__ import annotations
+
+import hashlib
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.robot.object_meshes import Mesh
+from katana450.errors import LeaseError
+from katana450.extensions.importers.scene_file import StoredScene, scene_zip
+from katana450.extensions.scene.scene import Scene
+from katana450.maths.water.units import MILLILITRE, ML
+from katana450.server.api import answers
+from katana450.server.service.hub import Hub
+from katana450.server.service.interfaces import Arm
+from katana450.server.service.scenes import free_name, used_in
+
+
+def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
+    """Keep ``mesh``, so that it can be placed. Raises InputError if there is no room for it."""
+    state = None if hub.arm is None else hub.arm.state
+    hub.meshes.put([mesh], used_in(state))
+    names = {thing.name for thing in state.things} if state is not None else set()
+    return answers.Mesh(
+        key=mesh.key,
+        name=free_name(mesh.name, names),
+        said=mesh.said,
+        size=list(mesh.solid.size),
+        triangles=len(mesh.faces),
+    )
+
+
+def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: Arm) -> answers.Scene:
+    """Keep ``stored``, which came as ``data``, so that it can be loaded.
+
+    Raises InputError where that cannot be.
+    """
+    key = hashlib.sha256(data).hexdigest()[:32]
+    scene = stored.scene
+    hub.scenes.keep(key, cmd.Furnish(scene.things, scene.water), stored.meshes, arm)
+    names = [thing.name for thing in scene.things]
+    said = f"{len(names)} thing{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
+    if scene.joints is not None:
+        said += " The arm stays where it is."
+    return answers.Scene(key=key, things=names, said=said)
+
+
+def zipped(hub: Hub, arm: Arm) -> bytes:
+    """Return the present scene as a .zip. Raises InputError, LeaseError if it cannot be saved."""
+    hand = arm.surroundings.hand
+    return scene_zip(_stored(hub, arm), None if hand is None else hand.T_palm_tool)
+
+
+def _stored(hub: Hub, arm: Arm) -> StoredScene:
+    state = arm.state
+    held = state.held
+    if held is not None:
+        raise LeaseError(f"{held.name!r} is held: set it down first, a scene has nothing in hand.")
+    water = None
+    if state.poured is not None:
+        water = ML * state.poured.water.cup / MILLILITRE
+    keys = dict.fromkeys(t.solid.key for t in state.things if t.solid is not None)
+    meshes = tuple(hub.meshes.need(key) for key in keys)
+    return StoredScene(Scene(state.things, water, state.q), meshes)

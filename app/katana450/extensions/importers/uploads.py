@@ -1,0 +1,131 @@
+"""Files over HTTP: meshes and scenes, read off the thread that everybody is served by."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import TypeVar
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from katana450.errors import InputError, LeaseError
+from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.importers.scene_file import LARGEST_ZIP, read_scene_zip
+from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
+from katana450.extensions.importers.shape_file import LONGEST_NAME, MOST_BYTES
+from katana450.server.api import answers
+from katana450.server.api.fields import ROOT
+from katana450.server.service.hub import Hub
+from katana450.server.web.admission import identity
+from katana450.server.web.authenticator import Authenticator, Identity
+from katana450.server.web.bodies import (
+    NOT_NOW,
+    NOT_UNDERSTOOD,
+    TOO_MANY,
+    TOO_SLOW,
+    as_json,
+    body_of,
+)
+from katana450.server.web.places import Places
+from katana450.server.web.token_bucket import TokenBucket
+
+RATE, AT_ONCE = 0.5, 10.0
+"""Files a second, and at once, of everybody together."""
+
+WAITING, WAITING_EACH = 4, 2
+"""Files that are read or wait for it, of everybody together and of one identity."""
+
+PATIENCE = 60.0
+"""[s] Until a file is here and read, whoever sends it slowly."""
+
+NOT_ALLOWED = 403
+
+T = TypeVar("T")
+
+
+class Uploads:
+    """The routes. What comes is kept for a while, and used by a request that names its key."""
+
+    def __init__(
+        self, hub: Hub, door: Authenticator, visitor: Callable[[Request], Identity]
+    ) -> None:
+        """``visitor``: who asks, or the HTTPException that turns them away."""
+        self._hub = hub
+        self._door = door
+        self._visitor = visitor
+        self._often = TokenBucket(RATE, AT_ONCE, hub.clock())
+        self._reading = asyncio.Lock()
+        self._places = Places(WAITING, WAITING_EACH)
+
+    def routes(self) -> list[BaseRoute]:
+        """All of them."""
+        return [
+            Route(f"{ROOT}/mesh", self._mesh, methods=["POST"]),
+            Route(f"{ROOT}/scene", self._load, methods=["POST"]),
+            Route(f"{ROOT}/scene", self._save, methods=["GET"]),
+        ]
+
+    async def _mesh(self, request: Request) -> Response:
+        query = request.query_params
+        name, unit, format = query.get("name", ""), query.get("unit"), query.get("format")
+        if format and not name.lower().endswith(f".{format}"):
+            name = f"{name or 'shape'}.{format}"
+
+        async def keep() -> answers.Answer:
+            if len(name) > 4 * LONGEST_NAME:
+                raise InputError("The name of the file is too long.")
+            data = await body_of(request, MOST_BYTES, PATIENCE)
+            mesh = await self._off(lambda: read_mesh(data, name, unit or None))
+            return keep_mesh(self._hub, mesh)
+
+        return await self._answered(request, keep)
+
+    async def _load(self, request: Request) -> Response:
+        async def keep() -> answers.Answer:
+            arm = self._hub.present()
+            data = await body_of(request, LARGEST_ZIP, PATIENCE)
+            hand = arm.surroundings.hand
+            T_palm_tool = None if hand is None else hand.T_palm_tool
+            stored = await self._off(lambda: read_scene_zip(data, T_palm_tool))
+            return keep_scene(self._hub, data, stored, arm)
+
+        return await self._answered(request, keep)
+
+    async def _save(self, request: Request) -> Response:
+        self._visitor(request)
+        try:
+            arm = self._hub.present()
+            content = await asyncio.to_thread(zipped, self._hub, arm)
+        except (InputError, LeaseError) as error:
+            return as_json(answers.Refused(why=str(error)), NOT_NOW)
+        headers = {"Content-Disposition": 'attachment; filename="scene.zip"'}
+        return Response(content, media_type="application/zip", headers=headers)
+
+    async def _answered(
+        self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
+    ) -> Response:
+        """What ``keep`` answers, for somebody who may drive, and not too often."""
+        if not self._visitor(request).role.may_drive:
+            raise HTTPException(NOT_ALLOWED, "You may watch, not bring anything.")
+        with self._places.taken(identity(self._door, request) or "") as free:
+            if not free or not self._often.take(self._hub.clock()):
+                why = "Too many files at once. Wait a moment."
+                return as_json(answers.Refused(why=why), TOO_MANY)
+            try:
+                async with asyncio.timeout(PATIENCE):
+                    return as_json(await keep())
+            except TimeoutError:
+                why = f"That took more than {PATIENCE:g} s."
+                return as_json(answers.Refused(why=why), TOO_SLOW)
+            except InputError as error:
+                return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
+            except LeaseError as error:
+                return as_json(answers.Refused(why=str(error)), NOT_NOW)
+
+    async def _off(self, read: Callable[[], T]) -> T:
+        """What ``read`` makes, one at a time: each may take a process and a gigabyte."""
+        async with self._reading:
+            return await asyncio.to_thread(read)

@@ -1,0 +1,104 @@
+"""The extension ``reachability``: where the tool can be, as a command and in the scene."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.cli.arm_options import add_arm_options
+from katana450.extension import CliCommand, Extension, ServeExtension
+
+if TYPE_CHECKING:
+    from katana450.server.view.layer import ViewLayer
+
+
+def add_workspace_options(parser: argparse.ArgumentParser) -> None:
+    """Put them into `parser`; lengths are in mm, as a person measures them."""
+    parser.add_argument(
+        "--table",
+        type=float,
+        default=0.0,
+        metavar="HEIGHT",
+        help="height of the table above the foot of the control box, mm (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--voxel",
+        type=float,
+        default=20.0,
+        metavar="MM",
+        help="edge of a voxel, mm (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--pitches",
+        type=int,
+        default=36,
+        metavar="N",
+        help="pitches of the tool tried in each voxel, all round (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--rolls",
+        type=int,
+        default=24,
+        metavar="N",
+        help="rolls of the tool tried for each pitch, all round (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--samples",
+        type=int,
+        default=20_000,
+        metavar="N",
+        help="random postures for the cloud of tool points (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of the random postures (default: %(default)s)"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="file for map and cloud")
+    parser.add_argument(
+        "--ply", type=Path, metavar="FILE.ply", help="file for the map as coloured points"
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="spread the work over the Dask cluster of this scheduler, such as "
+        "tcp://10.0.0.1:8786; needs the extra `dask`",
+    )
+    add_arm_options(parser)
+
+
+def _workspace(options: argparse.Namespace) -> int:
+    from katana450.extensions.reachability.workspace import workspace
+
+    return workspace(options)
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """Add to `katana450 serve` the option that shows a map."""
+    parser.add_argument(
+        "--workspace",
+        type=Path,
+        metavar="FILE.npz",
+        help="a map written by `katana450 workspace --out`, to be shown in the scene",
+    )
+
+
+def _view_layer(options: argparse.Namespace) -> ViewLayer | None:
+    if options.workspace is None:
+        return None
+    from katana450.extensions.reachability.view import ReachabilityLayer
+
+    return ReachabilityLayer(options.workspace)
+
+
+EXTENSION = Extension(
+    "reachability",
+    (
+        CliCommand(
+            "workspace",
+            "map where the tool can be, and how freely it can be turned there",
+            add_workspace_options,
+            _workspace,
+        ),
+    ),
+    ServeExtension(add_serve_options, view_layer=_view_layer),
+)

@@ -1,0 +1,123 @@
+"""The reachability map in the scene: voxels as points, cut open so that one sees inside."""
+
+from __future__ import annotations
+
+from enum import Enum
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import viser
+
+from katana450.arm.robot.robot import Robot
+from katana450.errors import ConfigurationError
+from katana450.extensions.reachability.colors import share_colors
+from katana450.extensions.reachability.reachability_file import StoredMap, load_map
+
+FILL = 0.2
+"""Radius of a point to the edge of its voxel: the arm is seen between them."""
+
+STOPS = 9
+"""Colours of the scale; a browser draws those between them."""
+
+
+class Cut(Enum):
+    """The part of the map that is drawn."""
+
+    HIDDEN = "Hidden"
+    SLICE = "Slice through axis 1"
+    HALF = "Left half"
+    WHOLE = "Whole"
+
+
+class ReachabilityLayer:
+    """A stored map as a layer of the scene, hidden until a person chooses a cut of it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    @property
+    def what(self) -> str:
+        """A sentence that says what needs an arm."""
+        return f"{self._path} maps where a tool can be."
+
+    def attach(self, server: viser.ViserServer, robot: Robot) -> None:
+        """Read the map and prepare to draw it in the scene of ``robot``.
+
+        Raises InputError if the file is no map, ConfigurationError if it is that of another arm.
+        """
+        stored = load_map(self._path)
+        if stored.robot != robot.name:
+            raise ConfigurationError(
+                f"The map given with --workspace is of the arm {stored.robot!r}; this one is "
+                f"{robot.name!r}. Make one with: katana450 workspace --urdf ... --out map.npz"
+            )
+        middle = float(robot.require_arm().T_base_shoulder[1, 3])
+        self._cloud = ReachabilityCloud(server, stored, middle)
+
+    def add_controls(self, gui: viser.GuiApi) -> None:
+        """Add the choice of a cut, and the legend that is shown with it."""
+        cuts = gui.add_dropdown(
+            "Reachability",
+            tuple(cut.value for cut in Cut),
+            initial_value=Cut.HIDDEN.value,
+            hint="Where the tool can be: the map given with --workspace",
+        )
+        legend = gui.add_html(self._cloud.legend, visible=False)
+
+        @cuts.on_update
+        def _(_: viser.GuiEvent[Any]) -> None:
+            cut = Cut(cuts.value)
+            legend.visible = cut is not Cut.HIDDEN
+            self._cloud.show(cut)
+
+
+class ReachabilityCloud:
+    """The voxels of a map as points in the scene."""
+
+    def __init__(self, server: viser.ViserServer, stored: StoredMap, middle: float) -> None:
+        """``middle``: y of axis 1 in the base frame [m], where the map is cut."""
+        self._server = server
+        self._stored = stored
+        self._middle = middle
+        self._node: viser.PointCloudHandle | None = None
+        self._colors = share_colors(stored.share)
+
+    @property
+    def legend(self) -> str:
+        """What the colours mean, as HTML: a scale, and its ends in words."""
+        top = self._stored.share.max(initial=0.0)
+        stops = ", ".join(
+            f"rgb({red}, {green}, {blue})"
+            for red, green, blue in share_colors(np.linspace(0.0, 1.0, STOPS)).tolist()
+        )
+        return (
+            "<div class='k450'><p class='scale'>"
+            f"How freely {escape(self._stored.tool)} can be turned there"
+            f"<i style='background: linear-gradient(to right, {stops})'></i>"
+            f"0 %<span>{100.0 * top:.0f} % of all pitches and rolls</span></p></div>"
+        )
+
+    def show(self, cut: Cut) -> None:
+        """Draw the part ``cut`` of the map."""
+        if self._node is not None:
+            self._node.remove()
+            self._node = None
+        if cut is Cut.HIDDEN:
+            return
+        across = self._stored.points[:, 1] - self._middle
+        edge = self._stored.voxel
+        shown = {
+            # Of the two layers beside the plane one is the slice.
+            Cut.SLICE: np.floor(across / edge) == 0.0,
+            Cut.HALF: across >= 0.0,
+            Cut.WHOLE: np.ones(len(across), dtype=bool),
+        }[cut]
+        self._node = self._server.scene.add_point_cloud(
+            "/reachability",
+            self._stored.points[shown].astype(np.float32),
+            self._colors[shown],
+            point_size=FILL * edge,
+            point_shape="circle",
+        )

@@ -1,0 +1,1 @@
+"""The library behind ``import katana450``: arms, plans and pictures of them, for other programs."""

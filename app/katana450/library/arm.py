@@ -1,0 +1,382 @@
+"""An arm from its URDF: kinematics, plans, reachability and a view, for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy.typing as npt
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Thing
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
+from katana450.extensions.reachability.map import ReachabilityMap, Survey
+from katana450.extensions.reachability.reachability import Reachability
+from katana450.library.motion_plan import MotionPlan
+from katana450.library.nearest import NearestPose, nearest
+from katana450.library.planner import Planner
+from katana450.library.pose_frame import PoseFrame, dimensions
+from katana450.library.solutions import IKSolutions
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
+
+if TYPE_CHECKING:
+    from katana450.library.viewer import Viewer
+
+Priority = Literal["pose", "pitch", "position"]
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A 5-axis arm with its tool, made by `katana450.load`. It never changes.
+
+    Lengths are in m, angles in rad, times in s. ``T`` is a pose (4, 4): it maps coordinates of the
+    tool into the frame chosen in `load`. ``q`` are the n = 5 joint angles. Wherever an argument has
+    the wrong shape, is not finite or is no rotation, InputError says so; every error of the library
+    is a `katana450.KatanaError`.
+
+    Attributes:
+        robot: what the URDF says, as the app has it.
+        session: the rules of motion: limits, collision bodies, what stands around.
+        notes: sentences on what was taken for granted in the file.
+        pose_frame: the frame of poses and points.
+        things: objects that plans keep clear of.
+    """
+
+    robot: Robot
+    session: Session
+    notes: tuple[str, ...]
+    pose_frame: PoseFrame
+    things: tuple[Thing, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the robot in its URDF."""
+        return self.robot.name
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.chain.n
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, from the base to the tool."""
+        return self.chain.names
+
+    @property
+    def tool(self) -> str:
+        """Link that poses are of."""
+        return self._mounted.default_tool
+
+    @property
+    def frame(self) -> str:
+        """Frame of poses and points: "shoulder" or "base"."""
+        return self.pose_frame.name
+
+    @property
+    def lower(self) -> FloatArray:
+        """(n,) lower joint limits [rad]."""
+        return self.chain.lower
+
+    @property
+    def upper(self) -> FloatArray:
+        """(n,) upper joint limits [rad]."""
+        return self.chain.upper
+
+    @property
+    def speed(self) -> FloatArray:
+        """(n,) maximum joint speeds [rad/s]."""
+        return self.chain.speed
+
+    @property
+    def ready(self) -> FloatArray:
+        """(n,) posture with room to move [rad]; where plans begin by default."""
+        return self.session.ready
+
+    @property
+    def _mounted(self) -> MountedArm:
+        return self.robot.require_arm()
+
+    @cached_property
+    def chain(self) -> Chain:
+        """Home configuration M, screw axes S and limits, in the frame {S}."""
+        return self._mounted.chain_to(self.tool)
+
+    @property
+    def T_base_frame(self) -> FloatArray:
+        """(4, 4) maps coordinates of the frame of poses into the base [m]."""
+        return self._mounted.T_base_shoulder @ se3.inverse(self.pose_frame.T_frame_shoulder)
+
+    def __repr__(self) -> str:
+        return f"<katana450 arm {self.name!r}, tool {self.tool!r}, poses in frame {self.frame!r}>"
+
+    def fk(self, q: npt.ArrayLike) -> FloatArray:
+        """Return the tool's pose (4, 4), or poses (N, 4, 4), at joint angles (n,) or (N, n) [rad].
+
+        Raises InputError for another shape, NaN or infinity. Source: Lynch & Park, Modern Robotics
+        (2017), ch. 4.1, the product of exponentials.
+
+        >>> arm.fk([0.0, 0.0, 0.0, 0.0, 0.0]).shape
+        (4, 4)
+        >>> arm.fk(np.zeros((1000, 5))).shape
+        (1000, 4, 4)
+        >>> arm.fk([0.0, 0.0, 0.0])
+        Traceback (most recent call last):
+            ...
+        katana450.errors.InputError: The joint vector has shape (3,); it must be (5,).
+        """
+        several = dimensions(q) == 2
+        T = forward_batch(self.chain, q) if several else forward(self.chain, q)
+        return self.pose_frame.from_shoulder(T)
+
+    def ik(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> IKSolutions:
+        """Return all four solutions for the pose (4, 4), or for poses (N, 4, 4), in closed form.
+
+        Each carries whether it is inside the joint limits, and by how much it misses the pose: five
+        axes cannot take every pose. `nearest` gives the best the arm can do.
+
+        Args:
+            T: pose or poses of the tool [m].
+            q_hint: (n,) angles [rad]; joints that turn by more than a turn, and joints that the
+                pose leaves free, are put nearest to it. For a single pose.
+
+        Raises InputError for another shape, NaN, or a matrix that is no pose. Source: the paper's
+        eq. (12) to (29).
+
+        >>> T = arm.fk([0.3, -1.0, 1.4, 0.3, 0.2])
+        >>> for solution in arm.ik(T).feasible:
+        ...     print(solution.branch, solution.q.round(3).tolist())
+        front-up [0.3, -1.0, 1.4, 0.3, 0.2]
+        >>> arm.ik(np.stack([T, T, T])).q.shape
+        (3, 4, 5)
+        """
+        poses = self.pose_frame.to_shoulder(T)
+        if dimensions(T) == 3 and q_hint is None:
+            return IKSolutions.of_poses(self.chain, poses)
+        return IKSolutions.of_pose(self.chain, poses, q_hint)
+
+    def nearest(
+        self,
+        T: npt.ArrayLike,
+        *,
+        priority: Priority = "pose",
+        branch: Branch | str | None = None,
+        q_hint: npt.ArrayLike | None = None,
+        within_limits: bool = True,
+    ) -> NearestPose:
+        """Return the feasible pose nearest to ``T`` (4, 4), with the reason for what is missed.
+
+        Args:
+            T: pose of the tool [m].
+            priority: what counts most when five axes cannot satisfy all of it. "pose": position,
+                then the whole orientation. "pitch": pitch, then position, then roll. "position":
+                position, then pitch, then roll. The last two take the yaw from the arm.
+            branch: "front-up", "front-down", "back-up" or "back-down" to stay on it; None for the
+                one that comes nearest.
+            q_hint: (n,) angles [rad]; of equally good postures the one nearest to it is taken.
+            within_limits: keep every joint inside its limits.
+
+        Raises InputError for a pose, priority, branch or hint that cannot be used.
+
+        >>> T = arm.fk(arm.ready)
+        >>> T[0, 3] += 0.5
+        >>> best = arm.nearest(T)
+        >>> print(best.reason)
+        347 mm out of reach; its links reach no farther that way
+        >>> arm.nearest(arm.fk(arm.ready)).reason
+        ''
+        """
+        return nearest(
+            self.chain,
+            self.pose_frame,
+            T,
+            priority=priority,
+            branch=branch,
+            q_hint=q_hint,
+            within_limits=within_limits,
+        )
+
+    def jacobian(self, q: npt.ArrayLike, *, body: bool = False) -> FloatArray:
+        """Return the (6, n) Jacobian at joint angles ``q`` (n,) [rad].
+
+        ``J @ qd`` is the tool's twist (omega, v) [rad/s, m/s] in the frame of poses, or in the
+        tool's own frame if ``body``. Raises InputError for a ``q`` that cannot be used. Source:
+        Lynch & Park, Modern Robotics (2017), ch. 5.1.
+
+        >>> arm.jacobian(arm.ready).shape
+        (6, 5)
+        """
+        if body:
+            return jacobian_body(self.chain, q)
+        J = jacobian_space(self.chain, q)
+        if not self.pose_frame.in_base:
+            return J
+        return se3.adjoint(self.pose_frame.T_frame_shoulder) @ J
+
+    def plan(
+        self, goal: npt.ArrayLike, start: npt.ArrayLike | None = None, *, seed: int = 0
+    ) -> MotionPlan:
+        """Plan a timed, collision-free motion from ``start`` to ``goal``.
+
+        The joints go straight where that is clear, else round what is in the way.
+
+        Args:
+            goal: (n,) joint angles [rad], or a pose (4, 4) of the tool.
+            start: (n,) joint angles where the arm rests [rad]; None for `ready`.
+            seed: of the random search for a way round; the same seed gives the same plan.
+
+        Raises BlockedError, an InputError, if no clear path was found: which bodies would meet and
+        where; InputError for a goal beyond the limits or a pose the arm cannot take, with the
+        reason.
+
+        >>> plan = arm.plan([1.2, -1.0, 1.4, 0.3, 0.0])
+        >>> plan.end.tolist()
+        [1.2, -1.0, 1.4, 0.3, 0.0]
+        >>> arm.plan([0.0, 1.0, 0.0, 0.0, 0.0])
+        Traceback (most recent call last):
+            ...
+        katana450.errors.InputError: ...
+        """
+        return MotionPlan(self, self._planner.to(goal, start, seed))
+
+    def line(
+        self,
+        to: npt.ArrayLike | None = None,
+        *,
+        by: npt.ArrayLike | None = None,
+        start: npt.ArrayLike | None = None,
+        pitch: float | None = None,
+        roll: float | None = None,
+    ) -> MotionPlan:
+        """Plan a straight line of the tool point, pitch and roll turning evenly.
+
+        Args:
+            to: (3,) where the line ends [m]. by: (3,) how far it goes, instead of ``to`` [m]. With
+                neither the tool turns on the spot.
+            start: (n,) joint angles where it begins [rad]; None for `ready`.
+            pitch, roll: of the tool at the end [rad]; None to keep them. Pitch is positive
+                downwards.
+
+        Raises InputError where the line leaves the arm's reach or its limits, and BlockedError
+        where bodies would meet: how far along, where, and what to do.
+
+        >>> plan = arm.line(by=(0.05, 0.0, -0.05))
+        >>> round(plan.length, 6)
+        0.070711
+        """
+        return MotionPlan(self, self._planner.line(to, by, start, pitch, roll))
+
+    def circle(
+        self,
+        centre: npt.ArrayLike,
+        radius: float,
+        *,
+        normal: npt.ArrayLike = (1.0, 0.0, 0.0),
+        pitch: float | Literal["roomiest"] | None = "roomiest",
+        roll: float | None = None,
+        turns: float = 1.0,
+        branch: Branch | str | None = None,
+        start: npt.ArrayLike | None = None,
+    ) -> MotionPlan:
+        """Plan a circle of the tool point, from its highest point.
+
+        Args:
+            centre: (3,) [m]. radius: [m].
+            normal: (3,) direction about which the tool goes round; of any length but 0.
+            pitch: of the tool [rad]; "roomiest" keeps the joints farthest from their limits, None
+                keeps the present one.
+            roll: of the tool [rad]; None keeps the present one.
+            turns: how often, negative for the other way round, up to 20.
+            branch: as in `nearest`; None for the first on which the circle is possible.
+            start: (n,) joint angles [rad] where the plan begins, then going to the circle. None to
+                begin on the circle, as the arm would come to it from `ready`.
+
+        Raises InputError and BlockedError as `line`.
+
+        >>> plan = arm.circle((0.15, 0.0, -0.11), 0.1)
+        >>> bool(abs(plan.length - 2.0 * np.pi * 0.1) < 1e-5)
+        True
+        """
+        core = self._planner.circle(centre, radius, normal, start, pitch, roll, turns, branch)
+        return MotionPlan(self, core)
+
+    def reachability(
+        self,
+        voxel: float = 0.05,
+        *,
+        table: float = 0.0,
+        pitches: int = 36,
+        rolls: int = 24,
+        samples: int = 0,
+        seed: int = 0,
+    ) -> ReachabilityMap:
+        """Map where the tool can be, and which fraction of orientations it can have there.
+
+        Joint limits count, and elbow, wrist and tool point stay above the table; collisions do not
+        count.
+
+        Args:
+            voxel: edge of a voxel [m]; half of it takes eight times as long.
+            table: height of the table in the base frame [m].
+            pitches, rolls: steps in which pitch and roll are tried.
+            samples: random postures whose tool points are returned as ``cloud``. seed: of those.
+
+        Returns a map with ``points`` (N, 3) [m] in the base frame whatever the frame of poses,
+        ``share`` (N,), the fraction of orientations, and ``cloud`` (K, 3) [m].
+
+        Raises InputError for numbers that make no map, RobotDescriptionError for an arm whose axis
+        1 is not upright.
+
+        >>> map = arm.reachability(0.1, pitches=12, rolls=8)
+        >>> bool((map.share > 0.0).all() and (map.share <= 1.0).all())
+        True
+        """
+        reachability = Reachability(
+            self.chain, self._mounted.T_base_shoulder, table, pitches, rolls
+        )
+        survey = Survey(reachability, voxel, samples, seed)
+        return survey.map(survey.count(chunk) for chunk in survey.chunks())
+
+    def show(
+        self,
+        what: MotionPlan | npt.ArrayLike | None = None,
+        *,
+        port: int = 8090,
+        host: str = "127.0.0.1",
+    ) -> Viewer:
+        """Open a 3D scene of the arm for a browser; in a notebook it is shown below the cell.
+
+        Args:
+            what: a plan to be shown again and again, or joint angles (n,) [rad]; None for `ready`.
+            port: TCP port of the scene, or the next free one above it.
+            host: address to listen on. Nobody is asked for a password: leave it at this machine
+                unless the network is yours.
+
+        Raises ConfigurationError if no port could be opened. The scene is open until the viewer is
+        closed or the program ends; ``arm.show(plan).wait()`` keeps a script from ending.
+
+        >>> with arm.show([0.3, -1.0, 1.4, 0.3, 0.0]) as viewer:
+        ...     viewer.url.startswith("http://127.0.0.1:")
+        True
+        """
+        from katana450.library.viewer import opened
+
+        return opened(self, what, port, host)
+
+    def standing(self, q: npt.ArrayLike) -> State:
+        """Return the state of the arm at rest at ``q`` (n,) [rad], among its objects."""
+        angles = self.chain.check_q(q)
+        state = self.session.begin(angles, self._mounted.gripper.clamp(0.0), 0.0)
+        return replace(state, things=self.things)
+
+    @cached_property
+    def _planner(self) -> Planner:
+        return Planner(self.session, self._mounted.T_base_shoulder, self.pose_frame, self.standing)

@@ -1,0 +1,56 @@
+"""Loading an arm from its URDF file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from katana450.assembly.robot_session import described
+from katana450.extensions.importers.initial_scene import furnished
+from katana450.library.arm import Arm
+from katana450.library.pose_frame import PoseFrame
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+FrameName = Literal["shoulder", "base"]
+
+
+def load(
+    urdf: str | Path | None = None,
+    tool: str | None = None,
+    *,
+    frame: FrameName = "shoulder",
+    scene: str | Path | None = None,
+) -> Arm:
+    """Load a 5-axis arm from a URDF file.
+
+    The kinematics are in closed form for arms with a pan axis, three parallel axes and a roll axis.
+
+    Args:
+        urdf: the file; None for the Katana450.
+        tool: link that poses are of; None for the arm's own choice (``tcp`` for the Katana450).
+        frame: coordinates of all poses and points: "shoulder", the paper's frame {S} where axes 1
+            and 2 cross, parallel to the base; or "base", the root link of the URDF.
+        scene: YAML file of the objects that plans keep clear of besides the arm itself and the
+            table (docs/scenes.md); None for those of the app, a cup and a basin.
+
+    Raises RobotDescriptionError if the file cannot be read or is of another kind of mechanism, and
+    InputError for an unknown frame or an unusable scene; the message says what to do.
+
+    >>> arm = katana450.load()
+    >>> arm.name, arm.tool, arm.n
+    ('katana450', 'tcp', 5)
+    >>> katana450.load(tool="hand")
+    Traceback (most recent call last):
+        ...
+    katana450.errors.RobotDescriptionError: ...
+    """
+    robot, session, notes = described(Settings(), URDF_PATH if urdf is None else Path(urdf), tool)
+    stored, _ = furnished(session, None if scene is None else Path(scene), ())
+    return Arm(
+        robot=robot,
+        session=session,
+        notes=notes,
+        pose_frame=PoseFrame.of(robot.require_arm(), frame),
+        things=stored.scene.things,
+    )

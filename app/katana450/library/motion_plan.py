@@ -1,0 +1,104 @@
+"""A plan of the arm as a program uses it: sampled, plotted, shown or run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from katana450.library.trajectory import Trajectory, sampled
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.planning.plan import Plan
+
+if TYPE_CHECKING:
+    from katana450.client import Client
+    from katana450.library.arm import Arm
+    from katana450.server.api.answers import State
+
+
+@dataclass(frozen=True, eq=False)
+class MotionPlan:
+    """A timed, collision-free path of the joints, from rest to rest.
+
+    Made by `Arm.plan`, `Arm.line` and `Arm.circle`. Speed, acceleration and jerk of the joints and
+    the speed of the tool point (0.5 m/s) keep their limits; bodies keep 6 mm from one another.
+
+    Attributes:
+        arm: the arm it is for.
+        core: the plan as the controller follows it.
+    """
+
+    arm: Arm
+    core: Plan
+
+    def __repr__(self) -> str:
+        return f"<katana450 plan, {self.duration:.2f} s, {1e3 * self.length:.0f} mm>"
+
+    @property
+    def duration(self) -> float:
+        """Time from start to end [s]."""
+        return self.core.duration
+
+    @property
+    def length(self) -> float:
+        """Length of the tool point's path [m]."""
+        return self.core.length
+
+    @property
+    def start(self) -> FloatArray:
+        """(n,) joint angles where it begins [rad]."""
+        return self.core.start
+
+    @property
+    def end(self) -> FloatArray:
+        """(n,) joint angles where it ends [rad]."""
+        return self.core.end
+
+    @property
+    def clearance(self) -> float | None:
+        """Smallest distance between two bodies on the whole path [m].
+
+        None if the arm's description has no collision shapes: then nothing was checked.
+        """
+        return None if self.core.nearest is None else self.core.nearest.contact.distance
+
+    def sample(self, dt: float = 0.01) -> Trajectory:
+        """Return the motion every ``dt`` [s], from start to end.
+
+        Raises InputError if ``dt`` is not a number above 0, or makes a million samples.
+
+        >>> samples = arm.line(by=(0.0, 0.0, -0.05)).sample(0.01)
+        >>> samples.q.shape == samples.qd.shape == (len(samples), 5)
+        True
+        >>> bool(np.allclose(samples.points[-1] - samples.points[0], (0.0, 0.0, -0.05)))
+        True
+        """
+        return sampled(self.core, dt, self.arm.chain, self.arm.pose_frame)
+
+    def plot(self) -> Any:
+        """Draw the tool's path and the joints over time; return the matplotlib ``Figure``.
+
+        matplotlib is loaded by this call. Raises ConfigurationError if it is not installed.
+
+        >>> figure = arm.circle((0.15, 0.0, -0.11), 0.1).plot()
+        >>> figure.savefig("circle.png")  # doctest: +SKIP
+        """
+        from katana450.library.plot import figure_of
+
+        return figure_of(self)
+
+    def run(self, client: Client, dt: float = 0.02) -> State:
+        """Drive the arm of a server along this plan; return its state once it rests at the end.
+
+        The arm first goes to the start, then follows the joint angles as a stream. A stop ends the
+        run: nothing of the plan is sent after the server has refused a command.
+
+        Args:
+            client: a connection, from `katana450.connect`.
+            dt: time from one command to the next [s].
+
+        Raises RefusedError if the server refuses a command or the arm is stopped, LostError if the
+        connection is lost, InputError as `sample`.
+        """
+        from katana450.library.streaming import stream
+
+        return stream(self.sample(dt), client)

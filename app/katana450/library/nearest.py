@@ -1,0 +1,72 @@
+"""Projection of a pose onto those that the arm can take, with the reason for what is missed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy.typing as npt
+
+from katana450.arm.control.findings import of_projection
+from katana450.errors import InputError
+from katana450.library.pose_frame import PoseFrame
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.reading import Reading
+from katana450.server.view.texts import REASONS
+
+PRIORITIES = {"pose": Reading.POSE, "pitch": Reading.PITCH, "position": Reading.POSITION}
+
+
+@dataclass(frozen=True, eq=False)
+class NearestPose(Projection):
+    """The feasible pose nearest to the one asked for, and what is missed; every figure is measured.
+
+    Attributes:
+        T: (4, 4) the feasible pose, in the frame of the arm object [m].
+        q: (n,) joint angles that take it [rad].
+        branch: how the arm stands.
+        position_error: distance from the pose asked for [m].
+        rotation_error: angle from it [rad].
+        yaw_error: angle between the tool's roll axis asked for and the arm's plane, which a 5-axis
+            arm cannot leave [rad].
+        pitch_error: angle between the two roll axes within that plane [rad].
+        roll_error: missing roll where the pitch has priority [rad].
+        limits: indices, from 0, of the axes whose limit keeps the arm from coming nearer.
+        axis1: whether axis 1 is in the way.
+        reach: whether the links reach no farther.
+        reason: the same in words; empty if the pose is met to what the arm is precise to.
+    """
+
+    reason: str
+
+
+def nearest(
+    chain: Chain,
+    frame: PoseFrame,
+    T: npt.ArrayLike,
+    *,
+    priority: str,
+    branch: Branch | str | None,
+    q_hint: npt.ArrayLike | None,
+    within_limits: bool,
+) -> NearestPose:
+    """Project the pose ``T`` (4, 4) of ``frame``; see `katana450.Arm.nearest`."""
+    if priority not in PRIORITIES:
+        known = ", ".join(PRIORITIES)
+        raise InputError(f"There is no priority {priority!r}; choose from {known}.")
+    reading = PRIORITIES[priority]
+    best = project(
+        chain,
+        frame.to_shoulder(T),
+        branch=None if branch is None else Branch.parse(str(branch)),
+        within_limits=within_limits,
+        q_hint=q_hint,
+        reading=reading,
+    )
+    findings = of_projection(chain, best, reading, yaw_was_wished=reading is Reading.POSE)
+    said = "; ".join(REASONS[finding.reason](finding) for finding in findings)
+    best = replace(best, T=frame.from_shoulder(best.T))
+    return NearestPose(
+        **{each.name: getattr(best, each.name) for each in fields(best)}, reason=said
+    )

@@ -1,0 +1,156 @@
+"""Plans of the arm, made by the steps of scripts from a posture at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.bench import Bench, Draft, PlanContext
+from katana450.extensions.programs.places import ROOMIEST
+from katana450.extensions.programs.tool_moves import Circle, Line, Turn
+from katana450.library.nearest import nearest
+from katana450.library.pose_frame import PoseFrame, dimensions
+from katana450.library.solutions import IKSolutions
+from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.planning.plan import Plan
+
+MAX_TURNS = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Planner:
+    """Makes plans in coordinates of ``frame``; see `katana450.Arm`.
+
+    standing: the state of an arm at rest at joint angles (n,) [rad].
+    """
+
+    session: Session
+    T_base_shoulder: FloatArray
+    frame: PoseFrame
+    standing: Callable[[npt.ArrayLike], State]
+
+    def to(self, goal: npt.ArrayLike, start: npt.ArrayLike | None, seed: int) -> Plan:
+        """Plan to joint angles (n,) [rad] or to a pose (4, 4)."""
+        bench = self._bench(start, seed)
+        if dimensions(goal) == 2:
+            self._to_pose(bench, goal)
+        else:
+            bench.move_to(self.session.require_arm().chain.check_q(goal), "plan")
+        if not bench.orders:
+            raise InputError("The arm is at the goal already; there is nothing to plan.")
+        return _timed(bench)
+
+    def line(
+        self,
+        to: npt.ArrayLike | None,
+        by: npt.ArrayLike | None,
+        start: npt.ArrayLike | None,
+        pitch: float | None,
+        roll: float | None,
+    ) -> Plan:
+        """Plan a straight line of the tool point."""
+        if to is not None and by is not None:
+            raise InputError("A line has either `to`, its end, or `by`, its length and direction.")
+        step = Line(
+            None if to is None else finite_array(to, (3,), "The end of the line"),
+            None if by is None else finite_array(by, (3,), "The vector `by` of the line"),
+            _angle(pitch, "pitch"),
+            _angle(roll, "roll"),
+            self.frame.in_base,
+        )
+        bench = self._bench(start)
+        step.lay(bench)
+        return _timed(bench)
+
+    def circle(
+        self,
+        centre: npt.ArrayLike,
+        radius: float,
+        normal: npt.ArrayLike,
+        start: npt.ArrayLike | None,
+        pitch: float | str | None,
+        roll: float | None,
+        turns: float,
+        branch: Branch | str | None,
+    ) -> Plan:
+        """Plan a circle of the tool point, with the way to it from ``start``, if given."""
+        axis = finite_array(normal, (3,), "The normal of the circle")
+        length = math.hypot(*axis)
+        if length == 0.0:
+            raise InputError("The normal of the circle is zero; give it a direction.")
+        size = _number(radius, "The radius of the circle")
+        if size <= 0.0:
+            raise InputError(f"The radius of the circle is {size:g} m; it must be above 0.")
+        count = _number(turns, "The number of turns")
+        if not 0.0 < abs(count) <= MAX_TURNS:
+            raise InputError(
+                f"The number of turns is {count:g}; it must be up to {MAX_TURNS:g} and not 0."
+            )
+        turn = Turn(
+            finite_array(centre, (3,), "The centre of the circle"),
+            axis / length,
+            pitch if pitch == ROOMIEST else _angle(pitch, "pitch"),
+            _angle(roll, "roll"),
+            self.frame.in_base,
+        )
+        wanted = None if branch is None else Branch.parse(str(branch))
+        bench = self._bench(start)
+        Circle(turn, size, count, wanted).lay(bench)
+        if start is None:
+            del bench.orders[:-1]
+        return _timed(bench)
+
+    def _to_pose(self, bench: Bench, goal: npt.ArrayLike) -> None:
+        """Go to the nearest posture that takes the pose ``goal`` (4, 4) and can be reached."""
+        chain = bench.chain
+        found = IKSolutions.of_pose(chain, self.frame.to_shoulder(goal), bench.q).feasible
+        if not found:
+            best = nearest(
+                chain,
+                self.frame,
+                goal,
+                priority="pose",
+                branch=None,
+                q_hint=bench.q,
+                within_limits=True,
+            )
+            why = best.reason or "only the nearest pose is"
+            raise InputError(
+                f"The arm cannot take this pose: {why}. `Arm.nearest` gives the nearest it can."
+            )
+        q = bench.q
+        nearest_first = sorted(found, key=lambda each: float(np.abs(each.q - q).max()))
+        bench.first(nearest_first, lambda each: bench.move_to(each.q, "plan"))
+
+    def _bench(self, start: npt.ArrayLike | None, seed: int = 0) -> Bench:
+        rig = PlanContext(self.session, self.T_base_shoulder, seed)
+        return Bench(rig, self.standing(self.session.ready if start is None else start))
+
+
+def _timed(bench: Bench) -> Plan:
+    """Time the paths that ``bench`` has, one after another."""
+    drafts = [order for _, order in bench.orders if isinstance(order, Draft)]
+    paths = tuple(path for draft in drafts for path in draft.paths)
+    return replace(drafts[0], paths=paths).timed().plan
+
+
+def _number(value: float, name: str) -> float:
+    """Return ``value`` as a float. Raises InputError, which calls it ``name``."""
+    number = float(real_array(value, (), name))
+    if not math.isfinite(number):
+        raise InputError(f"{name} is {number}; give a finite number.")
+    return number
+
+
+def _angle(value: float | str | None, name: str) -> float | None:
+    if isinstance(value, str):
+        raise InputError(f"The {name} is {value!r}; give an angle in rad.")
+    return None if value is None else _number(value, f"The {name}")

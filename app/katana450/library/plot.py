@@ -1,0 +1,41 @@
+"""The figure of a plan: the tool's path in space, and the joints over time."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from katana450.extensions.report.figures import AXES, STYLE, TIME, check_drawable, equal_axes
+
+if TYPE_CHECKING:
+    from katana450.library.motion_plan import MotionPlan
+
+SAMPLES = 400
+
+
+def figure_of(plan: MotionPlan) -> Any:
+    """Draw ``plan`` and return the matplotlib ``Figure``, still open."""
+    check_drawable()
+    plt = importlib.import_module("matplotlib.pyplot")
+    samples = plan.sample(plan.duration / SAMPLES)
+    points = 1e3 * samples.points
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(9.0, 3.9), layout="constrained")
+        space = figure.add_subplot(1, 2, 1, projection="3d")
+        space.plot(*points.T, color=AXES[0], linewidth=1.4)
+        space.scatter(*points[0], color=AXES[1], s=16, label="start")
+        equal_axes(space, points)
+        space.set_title("Path of the tool point")
+        space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
+        space.legend(loc="upper left", fontsize=8.0)
+        panel = figure.add_subplot(1, 2, 2)
+        for axis, angles in enumerate(np.degrees(samples.q).T):
+            panel.plot(samples.t, angles, color=AXES[axis % len(AXES)], label=f"θ{axis + 1}")
+        panel.set_title("Joint angles")
+        panel.set_xlabel(TIME)
+        panel.set_ylabel("angle (deg)")
+        panel.legend(ncols=plan.arm.n, fontsize=8.0, loc="upper center")
+        panel.margins(x=0.0, y=0.15)
+    return figure

@@ -1,0 +1,64 @@
+"""Coordinates that a program gives poses in, and receives them in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.errors import InputError
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+
+NAMES = ("shoulder", "base")
+
+
+def dimensions(value: npt.ArrayLike) -> int:
+    """Return the number of dimensions of ``value``; 0 if it is not a regular array."""
+    try:
+        return np.ndim(value)
+    except ValueError:
+        return 0
+
+
+@dataclass(frozen=True, eq=False)
+class PoseFrame:
+    """One of two frames: "shoulder", the paper's {S}, or "base", the root link of the URDF.
+
+    Attributes:
+        name: of the frame.
+        T_frame_shoulder: (4, 4) maps coordinates in {S} into the frame [m].
+    """
+
+    name: str
+    T_frame_shoulder: FloatArray
+
+    @staticmethod
+    def of(arm: MountedArm, name: str) -> PoseFrame:
+        """Return the frame called ``name``. Raises InputError for another name."""
+        if name not in NAMES:
+            raise InputError(f"There is no frame {name!r}; choose from {', '.join(NAMES)}.")
+        return PoseFrame(name, frozen(np.eye(4)) if name == "shoulder" else arm.T_base_shoulder)
+
+    @property
+    def in_base(self) -> bool:
+        """Whether it is the base frame."""
+        return self.name == "base"
+
+    def from_shoulder(self, T: FloatArray) -> FloatArray:
+        """Return poses ``T`` (..., 4, 4) in {S} as poses in this frame [m]."""
+        return self.T_frame_shoulder @ T if self.in_base else T
+
+    def to_shoulder(self, T: npt.ArrayLike) -> npt.ArrayLike:
+        """Return poses ``T`` (..., 4, 4) in this frame as poses in {S} [m].
+
+        Anything else is returned as it is; the kinematics refuse it with the reason.
+        """
+        if not self.in_base or dimensions(T) < 2:
+            return T
+        array = np.asarray(T)
+        if array.shape[-2:] != (4, 4) or array.dtype.kind not in "iuf":
+            return T
+        return np.asarray(se3.inverse(self.T_frame_shoulder) @ array)

@@ -1,0 +1,78 @@
+"""All solutions of the inverse kinematics for one pose or for many."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import inverse_batch
+from katana450.maths.kinematics.branch import BRANCHES, Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.inverse import Solution, inverse
+
+
+@dataclass(frozen=True, eq=False)
+class IKSolutions:
+    """The four solutions of a pose, one for each branch, in the order of `branches`.
+
+    For N poses every array has a leading dimension N. For a single pose the solutions can also be
+    taken one by one, as ``for solution in arm.ik(T)``; each has ``q``, ``branch``,
+    ``within_limits``, ``position_error``, ``rotation_error`` and ``exact``.
+
+    Attributes:
+        q: (4, n) or (N, 4, n) joint angles [rad].
+        within_limits: (4,) or (N, 4) whether every joint is inside its limits.
+        position_error: (4,) or (N, 4) distance between the pose asked for and the pose that forward
+            kinematics gives of ``q`` [m].
+        rotation_error: (4,) or (N, 4) angle between the same two [rad].
+    """
+
+    q: FloatArray
+    within_limits: npt.NDArray[np.bool_]
+    position_error: FloatArray
+    rotation_error: FloatArray
+    _single: tuple[Solution, ...] | None = None
+
+    @staticmethod
+    def of_pose(chain: Chain, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> IKSolutions:
+        """Solve the pose ``T`` (4, 4) in {S}; errors as of `maths.kinematics.inverse.inverse`."""
+        found = tuple(inverse(chain, T, q_hint=q_hint))
+        return IKSolutions(
+            q=np.array([each.q for each in found]),
+            within_limits=np.array([each.within_limits for each in found]),
+            position_error=np.array([each.position_error for each in found]),
+            rotation_error=np.array([each.rotation_error for each in found]),
+            _single=found,
+        )
+
+    @staticmethod
+    def of_poses(chain: Chain, T: npt.ArrayLike) -> IKSolutions:
+        """Solve the poses ``T`` (N, 4, 4) in {S}; errors as of `inverse_batch`."""
+        found = inverse_batch(chain, T, residuals=True)
+        assert found.position_error is not None
+        assert found.rotation_error is not None
+        return IKSolutions(found.q, found.within_limits, found.position_error, found.rotation_error)
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """The branches, in the order of the solutions."""
+        return BRANCHES
+
+    @property
+    def feasible(self) -> tuple[Solution, ...]:
+        """Solutions of a single pose that reach it exactly and are inside the joint limits."""
+        return tuple(each for each in self if each.exact and each.within_limits)
+
+    def __iter__(self) -> Iterator[Solution]:
+        """Iterate over the solutions of a single pose. Raises InputError for several poses."""
+        if self._single is None:
+            raise InputError(
+                f"These are the solutions of {len(self.q)} poses. Index the arrays, for example "
+                "`.q[pose, branch]`, or solve one pose at a time."
+            )
+        return iter(self._single)

@@ -1,0 +1,23 @@
+"""A plan driven on a server, as a stream of joint angles."""
+
+from __future__ import annotations
+
+import time
+
+from katana450.client import Client
+from katana450.library.trajectory import Trajectory
+from katana450.server.api import requests
+from katana450.server.api.answers import State
+
+
+def stream(samples: Trajectory, client: Client) -> State:
+    """Go to the first of ``samples``, follow the others in their time, and wait for rest.
+
+    Each command is answered before the next is sent, so that a refusal ends the stream.
+    """
+    client.joints(samples.q[0])
+    begun = time.monotonic()
+    for t, q, qd in zip(samples.t.tolist(), samples.q, samples.qd, strict=True):
+        time.sleep(max(begun + t - time.monotonic(), 0.0))
+        client.ask(requests.Servo(q=q.tolist(), qd=qd.tolist()))
+    return client.joints(samples.q[-1])

@@ -1,0 +1,174 @@
+"""A 3D scene of the arm in a browser or a notebook, served from this process."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import html
+import io
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from katana450.arm.robot.object_meshes import Meshes
+from katana450.arm.robot.props import load_props
+from katana450.errors import ConfigurationError, InputError
+from katana450.library.motion_plan import MotionPlan
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.view.cameras import FOV, LOOKS, Preset
+from katana450.server.view.controls import NoGestures
+from katana450.server.view.scenery import Scenery
+
+if TYPE_CHECKING:
+    from katana450.library.arm import Arm
+
+FRAME_TIME = 1.0 / 60.0
+"""[s]"""
+
+PAUSE = 1.0
+"""[s] At the end of a plan, before it is shown again."""
+
+PATH_POINTS = 400
+
+PATH_COLOUR = (64, 156, 255)
+
+
+class Viewer:
+    """A viser server with the arm and what stands around it; made by `Arm.show`.
+
+    In a notebook the last line of a cell shows the scene below it. It is a picture of the arm, not
+    a control of any: nothing in it moves a simulated or real arm.
+    """
+
+    def __init__(self, arm: Arm, port: int, host: str) -> None:
+        """Serve a scene of ``arm`` at ``host``, on ``port`` or the next free one above it.
+
+        Raises ConfigurationError if no port could be opened.
+        """
+        self._arm = arm
+        try:
+            with contextlib.redirect_stdout(io.StringIO()):
+                self._server = viser.ViserServer(host=host, port=port, verbose=False)
+        except OSError as error:
+            raise ConfigurationError(f"No scene can be served at {host}: {error}.") from error
+        self.url = f"http://{host}:{self._server.get_port()}"
+        """Address of the scene, for a browser."""
+        scene = self._server.scene
+        scene.set_up_direction("+z")
+        look = LOOKS[Preset.FREE]
+        camera = self._server.initial_camera
+        camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
+        session = arm.session
+        scenery = (self._server, arm.robot, session, load_props(), NoGestures(), Meshes())
+        self._scenery = Scenery(*scenery)
+        self._path = scene.add_line_segments(
+            "/path", np.zeros((1, 2, 3), np.float32), PATH_COLOUR, thickness=0.003, visible=False
+        )
+        self._player: threading.Thread | None = None
+        self._stopped = threading.Event()
+        self._closed = threading.Event()
+        self._show(session.ready)
+        # Before viser's own: the player shows nothing on a server that has stopped.
+        atexit.register(self.close)
+
+    def move(self, q: npt.ArrayLike) -> None:
+        """Show the arm at the joint angles ``q`` (n,) [rad]; ends `play`.
+
+        Raises InputError if ``q`` is not n finite angles.
+        """
+        angles = self._arm.chain.check_q(q)
+        self.pause()
+        self._show(angles)
+
+    def play(self, plan: MotionPlan, speed: float = 1.0) -> None:
+        """Draw the tool's path and show the motion again and again, in a thread of its own.
+
+        ``speed``: factor on real time, above 0.
+        """
+        if not (np.isfinite(speed) and speed > 0.0):
+            raise InputError(f"The speed is {speed!r}; give a number above 0.")
+        self.pause()
+        samples = plan.sample(max(FRAME_TIME * speed, plan.duration / 100_000))
+        T_base_frame = self._arm.T_base_frame
+        points = plan.sample(plan.duration / PATH_POINTS).points
+        points = points @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
+        self._path.points = np.stack((points[:-1], points[1:]), axis=1).astype(np.float32)
+        self._path.visible = True
+        self._stopped = threading.Event()
+        self._player = threading.Thread(
+            target=self._run,
+            args=(samples.t / speed, samples.q, self._stopped),
+            name="katana450 viewer",
+            daemon=True,
+        )
+        self._player.start()
+
+    def pause(self) -> None:
+        """End `play`; the arm stays where it is shown."""
+        self._stopped.set()
+        if self._player is not None:
+            self._player.join()
+            self._player = None
+
+    def wait(self) -> None:
+        """Keep the scene until Ctrl-C is pressed or the viewer is closed: for scripts."""
+        with self, contextlib.suppress(KeyboardInterrupt):
+            self._closed.wait()
+
+    def close(self) -> None:
+        """End the scene and free its port."""
+        self.pause()
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        atexit.unregister(self.close)
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<katana450 viewer at {self.url}>"
+
+    def _repr_html_(self) -> str:
+        """Return the scene for a notebook."""
+        source = html.escape(self.url)
+        return f'<iframe src="{source}" width="100%" height="480" frameborder="0"></iframe>'
+
+    def _run(self, t: FloatArray, q: FloatArray, stopped: threading.Event) -> None:
+        while not stopped.is_set():
+            begun = time.monotonic()
+            passed = 0.0
+            while passed < t[-1] and not stopped.wait(FRAME_TIME):
+                passed = time.monotonic() - begun
+                self._show(q[min(int(np.searchsorted(t, passed)), len(q) - 1)])
+            stopped.wait(PAUSE)
+
+    def _show(self, q: FloatArray) -> None:
+        self._scenery.show(self._arm.standing(q))
+
+
+def opened(arm: Arm, what: MotionPlan | npt.ArrayLike | None, port: int, host: str) -> Viewer:
+    """Open a viewer of ``arm`` that shows ``what``; see `Arm.show`."""
+    if what is not None and not isinstance(what, MotionPlan):
+        arm.chain.check_q(what)
+    viewer = Viewer(arm, port, host)
+    if isinstance(what, MotionPlan):
+        viewer.play(what)
+    elif what is not None:
+        viewer.move(what)
+    return viewer

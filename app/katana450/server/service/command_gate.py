@@ -1,0 +1,203 @@
+"""The only path of a command to the arm. Lease and stop are checked here and nowhere else."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import NamedTuple
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.lease import Lease, Person
+from katana450.errors import InputError, LeaseError
+from katana450.server.service.interfaces import Arm
+from katana450.server.service.stop_state import Stopped
+
+log = logging.getLogger(__name__)
+
+PROTECTIVE = (cmd.Stop, cmd.Hold, cmd.SpeedScale)
+"""Commands that the server itself may give."""
+
+
+class RunningProgram(NamedTuple):
+    """The participant as which a program holds the lease, and the key of its owner."""
+
+    person: Person
+    owner: str
+
+
+class CommandGate:
+    """Accepts or refuses each command. Every method may be called in any thread.
+
+    A lock puts commands, stops and changes of the lease into one order. A gesture can be older than
+    that order shows: it waits in viser's socket while a stop comes and is cleared. So each gesture
+    carries the number of revocations at its receipt (``Actor.seen``), and an older number is
+    refused.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """``clock``: in seconds."""
+        self._clock = clock
+        self._lock = threading.RLock()
+        self.lease = Lease()
+        self.stopped: Stopped | None = None
+        self.arm: Arm | None = None
+        """None until the arm is there."""
+        self.program: RunningProgram | None = None
+        """None while no program runs."""
+        self.revocations = 0
+        """Number of stops, and of times that a holder lost the lease."""
+        self.on_stop: Callable[[], None] = lambda: None
+        """Called at each stop, before the arm is stopped."""
+        self._jogged = -cmd.JOG_TIME
+
+    def submit(self, command: cmd.Command, actor: Actor) -> int:
+        """Give ``command`` of ``actor`` to the arm; return its ticket, 0 without an arm.
+
+        Raises LeaseError with the reason why ``actor`` may not give it now, and InputError for a
+        command that the arm cannot be given. Takes the lease for ``actor`` if it is free.
+        """
+        with self._lock:
+            if isinstance(command, cmd.Stop):
+                return self._stop(Stopped(actor.name, f"{actor.name} pressed STOP."), actor)
+            if not all(each.traits.while_stopped for each in command.parts):
+                self.check_runs()
+            if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
+                raise LeaseError("The server itself does not move the arm.")
+            granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
+            ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
+            if isinstance(command, cmd.ClearStop):
+                self.stopped = None
+            elif isinstance(command, cmd.Jog):
+                self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME
+            return ticket
+
+    def claim(self, actor: Actor, *, pacing: bool = False) -> Actor:
+        """Return ``actor`` with the grounds on which it may command now; command nothing.
+
+        For a gesture that gives no command yet, or none at all, such as taking hold of a handle.
+        ``pacing``: the gesture pauses, resumes or slows down. Raises and takes a free lease as
+        ``submit`` does.
+        """
+        with self._lock:
+            self.check_runs()
+            return self._granted(actor, pacing=pacing)
+
+    def check_runs(self) -> Arm:
+        """Return the arm. Raises LeaseError while there is none, or it is stopped."""
+        arm = self.present()
+        self.check_not_stopped()
+        return arm
+
+    def check_not_stopped(self) -> None:
+        """Raise LeaseError while the arm is stopped."""
+        if self.stopped is not None:
+            raise LeaseError("The arm is stopped: clear the stop first.")
+
+    def check_current(self, actor: Actor) -> None:
+        """Raise LeaseError for a gesture that is older than a stop or a loss of the lease."""
+        if not self.is_current(actor):
+            raise LeaseError(
+                "The arm was stopped or changed hands after you began this. Do it again."
+            )
+
+    def is_current(self, actor: Actor) -> bool:
+        """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
+        return actor.seen is None or actor.seen == self.revocations
+
+    def present(self) -> Arm:
+        """Return the arm. Raises LeaseError while there is none yet."""
+        if self.arm is None:
+            raise LeaseError("The arm is not there yet.")
+        return self.arm
+
+    # Lease
+
+    def acquire(self, person: Person) -> None:
+        """Give the free lease to ``person``. Raises LeaseError."""
+        with self._lock:
+            self.lease = self.lease.acquire(person, self._clock())
+
+    def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
+        """Apply ``event`` to the lease at the present time; another holder finds an arm at rest.
+
+        ``by``: the giver of the hold at a change of holder. Raises LeaseError.
+        """
+        with self._lock:
+            lease = event(self.lease, self._clock())
+            if lease.holder != self.lease.holder:
+                self._revoke()
+                if self.arm is not None:
+                    # The mailbox is full, or the arm's process does not answer.
+                    with suppress(InputError):
+                        grounds = Grounds.SERVER if by is SERVER else Grounds.LEASE
+                        self.arm.deliver(cmd.Hold(), replace(by, grounds=grounds))
+            self.lease = lease
+
+    # Stop
+
+    def protect(self, why: str) -> None:
+        """Stop the arm on the server's own account, for the reason ``why``."""
+        with self._lock:
+            self._stop(Stopped(None, why), SERVER)
+
+    def reconcile(self) -> None:
+        """Make gate and arm agree on whether the arm is stopped; to be called often."""
+        with self._lock:
+            arm = self.arm
+            if arm is None:
+                return
+            snapshot = arm.snapshot
+            stopped = snapshot.state.stopped is not None
+            if self.stopped is not None:
+                self.stopped = self.stopped.seen(snapshot)
+                sent = self.stopped.ticket
+                if not stopped and (sent is None or snapshot.ticket >= sent):
+                    # An arm that came after the stop, or an error that undid it.
+                    self.stopped = self._requested(self.stopped, arm, SERVER)
+            elif stopped and arm.caught_up:
+                self.protect("The arm lost the server and stopped.")
+
+    def moves(self) -> bool:
+        """Return whether the arm moves, or is about to."""
+        with self._lock:
+            jogged = self._clock() - self._jogged < cmd.JOG_TIME
+            return self.arm is not None and (self.arm.state.moving or jogged)
+
+    def _stop(self, stopped: Stopped, actor: Actor) -> int:
+        self._revoke()
+        self.on_stop()
+        if self.stopped is None:
+            self.stopped = stopped
+            log.warning("Stopped: %s", stopped.why)
+        if self.arm is None:
+            return 0
+        self.stopped = self._requested(self.stopped, self.arm, actor)
+        return self.stopped.ticket or 0
+
+    @staticmethod
+    def _requested(stopped: Stopped, arm: Arm, actor: Actor) -> Stopped:
+        grounds = Grounds.SERVER if actor is SERVER else Grounds.SAFETY
+        return stopped.requested(arm.deliver(cmd.Stop(), replace(actor, grounds=grounds)))
+
+    def _revoke(self) -> None:
+        """Void every gesture that was received before now."""
+        self.revocations += 1
+        self._jogged = -cmd.JOG_TIME
+
+    def _granted(self, actor: Actor, *, pacing: bool) -> Actor:
+        if actor.channel is CommandChannel.SERVER:
+            return replace(actor, grounds=Grounds.SERVER)
+        self.check_current(actor)
+        holder = self.lease.holder
+        if holder == actor.person:
+            first = actor.grounds is Grounds.FREE_LEASE
+            return actor if first else replace(actor, grounds=Grounds.LEASE)
+        if pacing and self.program == (holder, actor.key):
+            return replace(actor, grounds=Grounds.PROGRAM_OWNER)
+        self.acquire(actor.person)
+        log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
+        return replace(actor, grounds=Grounds.FREE_LEASE)

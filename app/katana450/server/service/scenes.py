@@ -1,0 +1,65 @@
+"""Scenes that wait to be loaded, and the names of what stands around."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, NamedTuple
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.state import State
+from katana450.arm.control.things import MOST
+from katana450.arm.robot.object_meshes import Mesh, Meshes
+from katana450.errors import InputError, LeaseError
+
+if TYPE_CHECKING:
+    from katana450.server.service.interfaces import Arm
+
+KEPT = 4
+"""Scenes that were brought and not loaded yet."""
+
+
+class _Waiting(NamedTuple):
+    command: cmd.Furnish
+    meshes: tuple[Mesh, ...]
+
+
+class Scenes:
+    """Scenes by their keys, each a command that loads it and the meshes of its objects."""
+
+    def __init__(self, meshes: Meshes) -> None:
+        self._meshes = meshes
+        self._waiting: dict[str, _Waiting] = {}
+
+    def keep(self, key: str, command: cmd.Furnish, meshes: Collection[Mesh], arm: Arm) -> None:
+        """Keep a scene under ``key``; the oldest gives way.
+
+        Raises InputError if ``arm`` cannot have it, or there is no room for ``meshes``.
+        """
+        arm.rig.session.check(command)
+        self._meshes.put(meshes, used_in(arm.state))
+        self._waiting[key] = _Waiting(command, tuple(meshes))
+        while len(self._waiting) > KEPT:
+            self._waiting.pop(next(iter(self._waiting)))
+
+    def furnishing(self, key: str, arm: Arm) -> cmd.Furnish:
+        """What loads the scene. Raises InputError, LeaseError with the reason why not."""
+        waiting = self._waiting.get(key)
+        if waiting is None:
+            raise InputError("There is no scene of that key, or no more: upload it again.")
+        held = arm.state.held
+        if held is not None:
+            raise LeaseError(f"{held.name!r} is held: open the gripper first.")
+        self._meshes.put(waiting.meshes, used_in(arm.state))
+        return waiting.command
+
+
+def used_in(state: State | None) -> frozenset[str]:
+    """Return the keys of the meshes of the objects in ``state``."""
+    things = () if state is None else state.things
+    return frozenset(thing.solid.key for thing in things if thing.solid is not None)
+
+
+def free_name(name: str, taken: set[str]) -> str:
+    """Return ``name``, with a number behind it if it is ``taken``."""
+    tried = [name, *(f"{name[:36]} {number}" for number in range(2, MOST + 3))]
+    return next(each for each in tried if each not in taken)

@@ -1,0 +1,102 @@
+"""Traits: every command declares its own, and the rest of the program follows them."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.looks import Trait
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Form, Mount, Thing
+from katana450.arm.control.traits import BaseCommand, Traits
+from katana450.arm.runtime.mailbox import Mailbox
+from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.reading import Reading
+
+KINDS: tuple[type[BaseCommand], ...] = get_args(cmd.Command)
+ABSTRACT = (cmd.AxisCommand,)
+
+BALL = Thing("ball", Form.SPHERE, (0.02,), np.eye(4))
+
+
+def examples(session: Session, state: State) -> list[cmd.Command]:
+    """One command of each class."""
+    q = np.zeros(session.require_arm().chain.n)
+    return [
+        *(
+            cmd.SetJoint(0, 0.1),
+            cmd.SetAxes(((0, 0.1),)),
+            cmd.Nudge(0, 0.1),
+            cmd.SetJoints(q),
+            cmd.Servo(q),
+        ),
+        *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.TurnTool(0.1, 0.1), cmd.SetPose(np.eye(4))),
+        *(cmd.SetGripper(0.1), cmd.SetTool("flange"), cmd.SetReading(Reading.PITCH)),
+        *(cmd.TakeBranch(BRANCHES[0]), cmd.EndDrag(), cmd.Home(), cmd.GoToZero(), cmd.Hold()),
+        *(cmd.Stop(), cmd.ClearStop(), cmd.Pause(), cmd.Resume(), cmd.GoAlong(0.5)),
+        *(
+            cmd.Follow(plan_to(session.require_arm(), None, state, q)),
+            cmd.SpeedScale(0.5),
+            cmd.Jog(np.ones(5)),
+        ),
+        *(cmd.Place(BALL), cmd.Remove("ball"), cmd.Shift("ball"), cmd.Attach("ball", Mount.WORLD)),
+        *(cmd.Furnish((BALL,)), cmd.Dress("ball", Trait.CHOICE, 0), cmd.Fill(1e-4)),
+        cmd.Batch((cmd.Home(),)),
+    ]
+
+
+def subclasses(kind: type) -> set[type]:
+    below: list[type] = kind.__subclasses__()
+    return {kind}.union(*(subclasses(each) for each in below))
+
+
+def test_every_command_class_is_a_command_and_declares_its_traits() -> None:
+    found = subclasses(BaseCommand) - {BaseCommand, *ABSTRACT}
+    assert found == set(KINDS)
+    for kind in KINDS:
+        assert isinstance(vars(kind).get("traits"), Traits), f"{kind.__name__} declares no traits"
+        assert kind.__name__ in cmd.__all__
+        assert kind.__doc__
+
+
+def test_commands_passive_to_planning_supersede_nothing() -> None:
+    with pytest.raises(ValueError, match="passive"):
+        Traits(passive=True, supersedes=True)
+
+
+def test_only_stop_is_for_everybody() -> None:
+    assert [kind for kind in KINDS if kind.traits.safety] == [cmd.Stop]
+
+
+def test_a_stopped_arm_heeds_exactly_what_is_declared(session: Session, state: State) -> None:
+    stopped = session.step(state, [cmd.Stop()], state.t)
+    given: list[cmd.Command] = examples(session, state)
+    assert {type(each) for each in given} == set(KINDS)
+    for each in given:
+        if each.traits.while_stopped:
+            continue
+        after = session.step(stopped, [each], stopped.t)
+        same = ("goal", "mode", "findings", "stopped", "gripper_goal", "tool")
+        for field in same:
+            assert getattr(after, field) is getattr(stopped, field), (each, field)
+
+
+def test_of_a_stream_the_mailbox_keeps_the_newest(session: Session, state: State) -> None:
+    for each in examples(session, state):
+        mailbox = Mailbox(lambda _: None)
+        mailbox.put(each)
+        mailbox.put(each)
+        kept = len(mailbox.drain().commands)
+        assert kept == (1 if each.traits.stream or each.traits.safety else 2), each
+
+
+def test_a_stop_drops_what_waits_before_it(session: Session) -> None:
+    mailbox = Mailbox(session.check)
+    mailbox.put(cmd.Home())
+    mailbox.put(cmd.Stop())
+    assert mailbox.drain().commands == [cmd.Stop()]

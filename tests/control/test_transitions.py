@@ -1,0 +1,218 @@
+"""The table of command x mode covers everything, and the session does what it says."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.looks import Trait
+from katana450.arm.control.modes import (
+    MODES,
+    Following,
+    Idle,
+    Jogging,
+    Leaving,
+    Mode,
+    Positioning,
+    Servoing,
+    Tracking,
+)
+from katana450.arm.control.plans import plan_to
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.things import Mount, named
+from katana450.arm.control.transitions import TABLE, Effect, effect_of, row_of
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.reading import Reading
+
+TICK = 0.01
+
+COMMANDS = typing.get_args(cmd.Command)
+
+FAR = np.array([-0.2, 0.35, 0.1])
+"""[m] Farther than a drag gets in one tick."""
+
+
+def run(session: Session, state: State, commands: list[cmd.Command], ticks: int = 1) -> State:
+    """``ticks`` ticks, with ``commands`` in each of them."""
+    for _ in range(ticks):
+        state = session.step(state, commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+    return state
+
+
+def followed(session: Session, state: State) -> State:
+    """``state`` in the middle of a plan."""
+    goal = np.array(state.setpoint)
+    goal[0] += 0.8
+    plan = plan_to(session.require_arm(), session.world_at(state), state, goal)
+    return run(session, run(session, state, [cmd.Follow(plan)]), [], 60)
+
+
+def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Command:
+    """A command of each class that ``session`` can be asked for; a KeyError for an unknown one."""
+    things = state.things
+    cup = named(things, "cup")
+    assert cup is not None
+    pose = forward(session.require_arm().chain_to(state.tool), session.ready)
+    found: dict[type[cmd.Command], Callable[[], cmd.Command]] = {
+        cmd.SetJoint: lambda: cmd.SetJoint(0, 0.5),
+        cmd.SetAxes: lambda: cmd.SetAxes(((0, 0.5), (4, 0.1))),
+        cmd.Nudge: lambda: cmd.Nudge(0, 0.1),
+        cmd.SetJoints: lambda: cmd.SetJoints(session.ready + 0.1),
+        cmd.Servo: lambda: cmd.Servo(np.array(state.setpoint) + 0.002),
+        cmd.MoveTool: lambda: cmd.MoveTool(FAR + 0.01),
+        cmd.TurnTool: lambda: cmd.TurnTool(-0.4, 0.3),
+        cmd.SetPose: lambda: cmd.SetPose(pose),
+        cmd.SetGripper: lambda: cmd.SetGripper(0.4),
+        cmd.SetTool: lambda: cmd.SetTool("flange"),
+        cmd.SetReading: lambda: cmd.SetReading(Reading.POSITION),
+        cmd.TakeBranch: lambda: cmd.TakeBranch(BRANCHES[-1]),
+        cmd.EndDrag: cmd.EndDrag,
+        cmd.Home: cmd.Home,
+        cmd.GoToZero: cmd.GoToZero,
+        cmd.Hold: cmd.Hold,
+        cmd.Stop: cmd.Stop,
+        cmd.ClearStop: cmd.ClearStop,
+        cmd.Pause: cmd.Pause,
+        cmd.Resume: cmd.Resume,
+        cmd.Follow: lambda: cmd.Follow(
+            plan_to(session.require_arm(), None, state, session.ready + 0.3)
+        ),
+        cmd.GoAlong: lambda: cmd.GoAlong(0.3),
+        cmd.Place: lambda: cmd.Place(cup),
+        cmd.Remove: lambda: cmd.Remove("cup"),
+        cmd.Attach: lambda: cmd.Attach("cup", Mount.TABLE),
+        cmd.Furnish: lambda: cmd.Furnish(things),
+        cmd.Fill: lambda: cmd.Fill(1e-4),
+        cmd.Shift: lambda: cmd.Shift("cup", np.array([0.3, 0.35, 0.0])),
+        cmd.Dress: lambda: cmd.Dress("cup", Trait.CHOICE, -1),
+        cmd.Batch: lambda: cmd.Batch((cmd.SpeedScale(0.5),)),
+        cmd.SpeedScale: lambda: cmd.SpeedScale(0.5),
+        cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),
+    }
+    return found[kind]()
+
+
+def streamed(session: Session, state: State) -> State:
+    """``state`` in a stream that turns axis 1."""
+    for number in range(10):
+        q: FloatArray = session.ready + np.array([0.003 * number, 0.0, 0.0, 0.0, 0.0])
+        state = run(session, state, [cmd.Servo(q)])
+    return state
+
+
+def left(session: Session, state: State) -> State:
+    """``state`` that brakes along a plan, and will jog from there."""
+    state = followed(session, state)
+    assert isinstance(state.mode, Following)
+    jogged = run(session, state, [example(session, state, cmd.Jog)])
+    assert isinstance(jogged.intent, Jogging)
+    return replace(jogged, mode=Leaving(state.mode, jogged.intent))
+
+
+BEGINNINGS: dict[type[Mode], Callable[[Session, State], State]] = {
+    Idle: lambda _, state: state,
+    Positioning: lambda session, state: run(
+        session, state, [example(session, state, cmd.SetPose), cmd.SetJoint(0, 0.9)], 5
+    ),
+    Tracking: lambda session, state: run(session, state, [cmd.MoveTool(FAR)]),
+    Jogging: lambda session, state: run(session, state, [example(session, state, cmd.Jog)], 5),
+    Servoing: streamed,
+    Following: followed,
+    Leaving: left,
+}
+
+
+def test_the_table_covers_every_command_and_every_mode() -> None:
+    for kind in COMMANDS:
+        assert row_of(kind) in TABLE.values()
+    assert all(any(issubclass(kind, row) for kind in COMMANDS) for row in TABLE)
+    assert set(BEGINNINGS) == set(typing.get_args(Mode)) == {*MODES, Leaving}
+    for row in TABLE.values():
+        assert set(row.effects) == set(MODES)
+        supersedes = Effect.SUPERSEDES in row.effects.values()
+        assert supersedes == (row.begins is not None)
+
+
+def trace(state: State) -> tuple[object, ...]:
+    """All that shows in ``state``."""
+    motion = (state.setpoint, state.motion.qd, state.motion.qdd, state.goal)
+    seen = tuple(each.tobytes() for each in motion)
+    numbers = (state.gripper_goal, state.gripper_setpoint, state.speed, state.paused)
+    return (*seen, *numbers, state.findings, state.stopped, state.tool, state.reading)
+
+
+@pytest.fixture(scope="module")
+def begun(shipped: Session) -> dict[type[Mode], State]:
+    """A state in each mode."""
+    state = shipped.begin(shipped.ready, 0.0, 0.0)
+    return {mode: begin(shipped, state) for mode, begin in BEGINNINGS.items()}
+
+
+@pytest.mark.parametrize("mode", BEGINNINGS)
+@pytest.mark.parametrize("kind", COMMANDS)
+def test_each_command_has_its_effect_in_each_mode(
+    shipped: Session, begun: dict[type[Mode], State], mode: type[Mode], kind: type[cmd.Command]
+) -> None:
+    before = begun[mode]
+    assert isinstance(before.mode, mode)
+    command = example(shipped, before, kind)
+    row, effect = row_of(kind), effect_of(command, before)
+    after = run(shipped, before, [command])
+    if kind is cmd.Follow and not before.motion.at_rest:
+        found = [each.reason for each in after.findings]
+        # A jog reports its own findings in every tick.
+        assert Reason.NOT_AT_START in found or after.jogging is not None
+        effect = Effect.ACCEPTED
+    match effect:
+        case Effect.ACCEPTED:
+            assert type(after.intent) is type(before.intent)
+        case Effect.CONTINUES:
+            assert type(after.intent) in {type(before.intent), row.begins, Positioning}
+        case Effect.SUPERSEDES:
+            assert type(after.intent) is row.begins
+        case Effect.REFUSED:
+            assert trace(after) == trace(run(shipped, before, []))
+            assert type(after.intent) is type(before.intent)
+
+
+@pytest.mark.parametrize("kind", COMMANDS)
+def test_a_stop_refuses_all_but_what_is_listed(
+    shipped: Session, begun: dict[type[Mode], State], kind: type[cmd.Command]
+) -> None:
+    stopped = run(shipped, begun[Jogging], [cmd.Stop()])
+    assert stopped.stopped is not None
+    command = example(shipped, begun[Jogging], kind)
+    after = run(shipped, stopped, [command, cmd.Batch((cmd.SpeedScale(0.9),))])
+    assert isinstance(after.mode, Idle)
+    if not kind.traits.while_stopped:
+        assert effect_of(command, stopped) is Effect.REFUSED
+        idle = run(shipped, stopped, [cmd.SpeedScale(0.9)])
+        assert trace(after) == trace(idle)
+
+
+def test_a_jog_is_refused_during_a_pause(shipped: Session) -> None:
+    state = shipped.begin(shipped.ready, 0.0, 0.0)
+    paused = run(shipped, state, [cmd.Pause()])
+    command = example(shipped, state, cmd.Jog)
+    assert effect_of(command, paused) is Effect.REFUSED
+    after = run(shipped, paused, [command], 20)
+    assert after.findings == (Finding(Reason.PAUSED),)
+    assert isinstance(run(shipped, after, [cmd.Resume()], 20).mode, Idle)
+    np.testing.assert_array_equal(after.setpoint, state.setpoint)
+
+
+def test_a_batch_has_the_effects_of_its_commands(
+    shipped: Session, begun: dict[type[Mode], State]
+) -> None:
+    after = run(shipped, begun[Jogging], [cmd.Batch((cmd.SpeedScale(0.3), cmd.Home()))])
+    assert after.speed == 0.3
+    assert isinstance(after.mode, Positioning)

@@ -1,0 +1,128 @@
+"""The examples run as they are printed, each in a process of its own, in an empty folder."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from tests.browser.server import ROOT, AppServer
+
+EXAMPLES = ROOT / "examples"
+SECONDS = 120
+
+
+def run(folder: Path, *command: str | Path) -> str:
+    """Run a command in ``folder`` and return what it prints; it has to end well and quietly."""
+    done = subprocess.run(
+        [sys.executable, *(str(part) for part in command)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=SECONDS,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return done.stdout
+
+
+def test_circle_is_plotted_and_shown_until_ctrl_c(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, str(EXAMPLES / "circle.py")],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("0.628 m in")
+        opened = re.search(r"http://\S+\d", process.stdout.readline())
+        assert opened is not None
+        with urllib.request.urlopen(opened[0], timeout=10.0) as page:
+            assert page.status == 200
+        assert (tmp_path / "circle.png").read_bytes().startswith(b"\x89PNG")
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=SECONDS)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 0, said
+    assert said == ""
+
+
+def test_own_arm_is_solved_and_planned(tmp_path: Path) -> None:
+    said = run(tmp_path, EXAMPLES / "my_own_arm.py")
+    assert "my_own_arm: 5 joints, poses of the link 'tip' in the base frame" in said
+    assert said.count("inside limits") == 2
+    assert "out of reach" in said
+    assert "1000 poses solved" in said
+
+
+@pytest.mark.parametrize("arm", ["youbot_arm", "pincherx_150"])
+def test_arm_of_another_file_is_solved_and_planned(tmp_path: Path, arm: str) -> None:
+    said = run(
+        tmp_path, EXAMPLES / "my_own_arm.py", ROOT / "tests" / "robot" / "arms" / f"{arm}.urdf"
+    )
+    assert "1000 poses solved" in said
+
+
+def test_other_mechanism_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    file = ROOT / "tests" / "exchange" / "gantry.urdf"
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "my_own_arm.py"), str(file)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=SECONDS,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("This is no arm for katana450: ")
+
+
+def test_arm_of_a_server_is_driven(tmp_path: Path) -> None:
+    with AppServer() as server:
+        said = run(tmp_path, EXAMPLES / "drive_by_api.py", server.url)
+    assert "At the posture: as wanted." in said
+    assert "At the point: as wanted." in said
+    missed = re.search(r"The circle is done, (\S+) rad", said)
+    assert missed is not None
+    assert float(missed[1]) < 1e-6
+
+
+def test_notebook_runs_from_top_to_bottom(tmp_path: Path) -> None:
+    notebook = tmp_path / "quickstart.ipynb"
+    notebook.write_bytes((EXAMPLES / "quickstart.ipynb").read_bytes())
+    execute = "from nbclient.cli import main; main()"
+    command = ["-c", execute, "--timeout", str(SECONDS), "--inplace", str(notebook)]
+    done = subprocess.run(
+        [sys.executable, *command],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=2 * SECONDS,
+    )
+    assert done.returncode == 0, done.stderr
+    executed = notebook.read_text(encoding="utf-8")
+    assert "image/png" in executed
+    assert "<iframe" in executed
+    assert '"output_type": "error"' not in executed
+
+
+def test_notebook_is_kept_without_outputs() -> None:
+    text = (EXAMPLES / "quickstart.ipynb").read_text(encoding="utf-8")
+    assert '"output_type"' not in text
+
+
+def test_every_example_is_listed() -> None:
+    listed = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+    for file in set(EXAMPLES.iterdir()) - {EXAMPLES / "README.md"}:
+        assert file.name in listed, file.name

@@ -1,0 +1,239 @@
+"""Extensions found, left out and added: the command line in processes of their own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from katana450.client import RefusedError, connect
+from katana450.extension import BUILT_IN, extensions
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import ROOT as ROOT_PATH
+from tests.browser.server import AppServer, free_port
+
+ROOT = Path(__file__).resolve().parents[2]
+LINE = '{"q": [0, 0, 0, 0, 0]}\n'
+
+BLOCKING = """
+import os, sys
+
+class Blocked:
+    def find_spec(self, name, path=None, target=None):
+        for blocked in os.environ["BLOCKED"].split():
+            if name == blocked or name.startswith(blocked + "."):
+                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Blocked())
+"""
+
+STATION = """
+from katana450.extension import CliCommand, Extension
+
+def run(options):
+    print(f"It is {options.degrees} degrees.")
+    return 3
+
+def add_options(parser):
+    parser.add_argument("--degrees", type=int, default=20)
+
+EXTENSION = Extension("weather", (CliCommand(NAME, "tell the weather", add_options, run),))
+"""
+
+SERVED = """
+from starlette.responses import PlainTextResponse
+from starlette.routing import Route
+
+from katana450.extension import Extension, ServeExtension
+
+def add_options(parser):
+    parser.add_argument("--degrees", type=int, default=20)
+
+def routes(context):
+    async def weather(request):
+        context.visitor(request)
+        return PlainTextResponse(f"arm: {context.hub.arm is not None}")
+    return [Route("/api/v1/weather", weather)]
+
+def view_layer(options):
+    assert options.degrees == 7
+
+SERVE = ServeExtension(add_options, view_layer=view_layer, routes=routes)
+EXTENSION = Extension("weather", serve=SERVE)
+"""
+
+
+def katana450(*options: str, folder: Path | None = None, blocked: str = "", text: str = "") -> str:
+    """Return what a command prints, its errors too, after its exit status and a space."""
+    environment = os.environ | {"BLOCKED": blocked}
+    if folder is not None:
+        environment["PYTHONPATH"] = str(folder)
+    done = subprocess.run(
+        [sys.executable, "-m", "katana450", *options],
+        input=text,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env=environment,
+        timeout=60,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr
+    return f"{done.returncode} {done.stdout}{done.stderr}"
+
+
+@pytest.fixture
+def blocking(tmp_path: Path) -> Path:
+    """Return a folder that makes the packages in the variable BLOCKED impossible to import."""
+    (tmp_path / "sitecustomize.py").write_text(BLOCKING, encoding="utf-8")
+    return tmp_path
+
+
+def distribution(folder: Path, entry: str, module: str) -> Path:
+    """Write another distribution into ``folder``, with ``module`` and its entry point."""
+    information = folder / "weather-1.0.dist-info"
+    information.mkdir(parents=True)
+    lines = ("Metadata-Version: 2.1", "Name: weather", "Version: 1.0", "")
+    (information / "METADATA").write_text("\n".join(lines), encoding="utf-8")
+    points = f"[katana450.extensions]\nweather = {entry}\n"
+    (information / "entry_points.txt").write_text(points, encoding="utf-8")
+    (folder / "station.py").write_text(module, encoding="utf-8")
+    return folder
+
+
+def test_every_built_in_extension_is_found() -> None:
+    assert tuple(extension.name for extension in extensions()) == BUILT_IN
+
+
+@pytest.mark.parametrize(
+    ("name", "commands"),
+    [
+        ("reachability", ["workspace"]),
+        ("export", ["export", "render"]),
+        ("experiments", ["run", "demo"]),
+        ("render", ["render"]),
+    ],
+)
+def test_missing_extension_takes_its_commands_with_it(
+    blocking: Path, name: str, commands: list[str]
+) -> None:
+    blocked = f"katana450.extensions.{name}"
+    said = katana450("--help", folder=blocking, blocked=blocked)
+    listed = [line.split()[0] for line in said.splitlines() if line.startswith("    ")]
+    everything = ["serve", "fk", "ik", "access", "workspace", "export", "run", "demo", "render"]
+    assert [each for each in everything if each not in listed] == commands
+    refused = katana450(commands[0], folder=blocking, blocked=blocked)
+    assert refused.startswith("2 ")
+    assert f"invalid choice: '{commands[0]}'" in refused
+
+
+def test_core_commands_work_without_any_extension(blocking: Path) -> None:
+    blocked = "katana450.extensions"
+    helped = katana450("--help", folder=blocking, blocked=blocked)
+    assert helped.startswith("0 ")
+    assert "serve" in helped
+    assert "demo" not in helped
+    assert "left out" not in helped
+    assert '"T": [[1.0, ' in katana450("fk", folder=blocking, blocked=blocked, text=LINE)
+    assert "--workspace" not in katana450("serve", "--help", folder=blocking, blocked=blocked)
+
+
+def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
+    blocked = "katana450.extensions.report"
+    said = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
+    assert said.startswith("1 ")
+    assert "The extension report is needed and not installed." in said
+
+
+NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "report", "render")
+"""Extensions that a server runs without."""
+
+
+def test_server_runs_without_the_extensions_it_does_not_need(
+    blocking: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLOCKED", " ".join(f"katana450.extensions.{name}" for name in NOT_NEEDED))
+    monkeypatch.setenv("PYTHONPATH", str(blocking))
+    with AppServer() as server:
+        assert server.running
+        with connect(server.url, "Test") as arm:
+            assert arm.query(answers.Things).things
+            assert arm.query(answers.Links).links
+            with pytest.raises(RefusedError, match="not installed"):
+                arm.ask(requests.Get(node="Clock", field="startTime"))
+            arm.ask(requests.Home())
+        upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(upload, timeout=10)
+        with refused.value:
+            assert refused.value.code == 404
+
+
+def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
+    blocked = "katana450.extensions.importers"
+    said = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
+    assert said.startswith("2 ")
+    assert "unrecognized arguments: --scene" in said
+
+
+def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> None:
+    gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
+    options = ("--urdf", gantry, "--workspace", str(tmp_path / "map.npz"))
+    said = katana450("serve", "--port", str(free_port()), *options)
+    assert said.startswith("1 ")
+    assert "map.npz maps where a tool can be. " in said
+
+
+def test_another_distribution_adds_to_the_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = distribution(tmp_path, "station:EXTENSION", SERVED)
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    command = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+    with (
+        AppServer((*command, "--degrees", "7")) as server,
+        urllib.request.urlopen(f"{server.url}{ROOT_PATH}/weather", timeout=10) as answer,
+    ):
+        assert answer.read() == b"arm: True"
+
+
+def test_another_distribution_adds_a_command(tmp_path: Path) -> None:
+    module = STATION.replace("NAME", "'weather'")
+    folder = distribution(tmp_path, "station:EXTENSION", module)
+    assert "tell the weather" in katana450("--help", folder=folder)
+    assert katana450("weather", "--degrees", "7", folder=folder) == "3 It is 7 degrees.\n"
+
+
+@pytest.mark.parametrize(
+    ("entry", "module", "said"),
+    [
+        ("station:EXTENSION", "raise ValueError('no wind')", "weather cannot be loaded"),
+        ("station:EXTENSION", "import no_such_thing", "No module named 'no_such_thing'"),
+        ("station:EXTENSION", "EXTENSION = 7", "is not an Extension"),
+        ("station:EXTENSION", STATION.replace("NAME", "'fk'"), "two commands fk"),
+    ],
+)
+def test_broken_extension_of_another_distribution_is_reported_and_left_out(
+    tmp_path: Path, entry: str, module: str, said: str
+) -> None:
+    folder = distribution(tmp_path, entry, module)
+    answered = katana450("fk", folder=folder, text=LINE)
+    assert answered.startswith("0 ")
+    assert '"T": [[1.0, ' in answered
+    assert said in answered
+
+
+def test_reading_options_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; from katana450.cli.main import _parser; _parser();"
+        "print(*sorted({'numpy', 'viser', 'yaml', 'trimesh', 'asyncio'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.split() == []

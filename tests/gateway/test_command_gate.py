@@ -1,0 +1,220 @@
+"""The command gate: lease, stop and the age of a gesture, with viser's hook and with threads."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import viser
+from viser import _messages as wire
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import SERVER, Actor, Grounds
+from katana450.arm.control.lease import Role
+from katana450.arm.control.session import Session
+from katana450.errors import LeaseError
+from katana450.server.service.hub import Window
+from katana450.server.view.controls import listener
+from katana450.server.viser_bridge.frames import FrameSlot
+from katana450.server.viser_bridge.gestures import Gestures, _Browser
+from katana450.server.viser_bridge.guard import Guard
+from tests.browser.server import free_port
+from tests.gateway.test_hub import PAGES, FakeArm, Table
+
+CLIENT = 7
+
+
+@pytest.fixture
+def table(session: Session) -> Table:
+    return Table(session.begin(session.ready, 0.0, 0.0))
+
+
+def test_actor_travels_with_its_grounds(table: Table) -> None:
+    first, second = (table.join(page, Role.OPERATOR) for page in PAGES)
+    hub, arm = table.hub, table.arm
+    hub.move(first, cmd.Home())
+    hub.move(first, cmd.Home())
+    hub.stop(second.actor)
+    hub.clear_stop(first)
+    hub.release_lease(first)
+    assert [(actor.name, actor.grounds) for actor in arm.actors] == [
+        ("Window 1", Grounds.FREE_LEASE),
+        ("Window 1", Grounds.LEASE),
+        ("Window 2", Grounds.SAFETY),
+        ("Window 1", Grounds.LEASE),
+        ("Window 1", Grounds.LEASE),
+    ]
+
+
+def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
+    gate = table.hub.gate
+    with pytest.raises(LeaseError, match="does not move"):
+        gate.submit(cmd.Home(), SERVER)
+    gate.submit(cmd.SpeedScale(0.5), SERVER)
+    gate.submit(cmd.Hold(), SERVER)
+    assert (table.arm.share, table.arm.holds, table.hub.lease.holder) == (0.5, 1, None)
+
+
+def test_gesture_let_through_before_a_stop_is_refused_after_it_was_cleared(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    gesture = table.touch(driver.person.key)
+    table.stop("Vera")
+    with pytest.raises(LeaseError, match="stopped"):
+        table.hub.gate.submit(cmd.Home(), gesture)
+    table.hub.clear_stop(driver)
+    with pytest.raises(LeaseError, match="Do it again"):
+        table.hub.gate.submit(cmd.Home(), gesture)
+    assert table.arm.commands == []
+    table.hub.gate.submit(cmd.Home(), table.touch(driver.person.key))
+    assert table.arm.commands == [cmd.Home()]
+
+
+def test_gesture_from_before_the_lease_was_lost_takes_no_free_lease(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    gesture = table.touch(driver.person.key)
+    table.hub.release_lease(driver)
+    with pytest.raises(LeaseError, match="Do it again"):
+        table.hub.gate.submit(cmd.Home(), gesture)
+    assert table.hub.lease.holder is None
+
+
+def test_no_gesture_of_another_thread_passes_a_stop(table: Table) -> None:
+    """Of each accepted command, every stop before it was made before its gesture was received."""
+    driver = table.join(PAGES[0])
+    gate, done = table.hub.gate, threading.Event()
+
+    class RecordingArm(FakeArm):
+        def __init__(self) -> None:
+            super().__init__(table.arm.rest)
+            self.order: list[tuple[cmd.Command, Actor]] = []
+
+        def deliver(self, command: cmd.Command, actor: Actor) -> int:
+            self.order.append((command, actor))
+            return super().deliver(command, actor)
+
+    arm = gate.arm = RecordingArm()
+
+    def gesture() -> None:
+        while not done.is_set():
+            try:
+                gate.submit(cmd.Home(), table.touch(driver.person.key))
+            except LeaseError:
+                continue
+
+    threads = [threading.Thread(target=gesture) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for _ in range(1000):
+        table.stop("Vera")
+        table.hub.clear_stop(driver)
+    done.set()
+    for thread in threads:
+        thread.join()
+    stops = moves = 0
+    stopped = False
+    for command, actor in arm.order:
+        match command:
+            case cmd.Stop():
+                stops, stopped = stops + 1, True
+            case cmd.ClearStop():
+                stopped = False
+            case _:
+                moves += 1
+                assert not stopped
+                assert actor.seen == stops
+    assert stops == 1000
+    assert moves > 0
+
+
+class Hooked:
+    """viser's hook for one browser of a window, without the gateway's end of its socket."""
+
+    def __init__(self, table: Table, server: viser.ViserServer, window: Window) -> None:
+        self.gate = table.hub.gate
+        self.gestures = Gestures(server, Guard(server), table.hub)
+        self.corrections: list[Any] = []
+        self.refusals: list[str] = []
+        self.slot = FrameSlot(window.person.key, self.refusals.append)
+        connection: Any = SimpleNamespace(queue_message=self.corrections.append)
+        self.gestures._browsers[CLIENT] = _Browser(connection, self.slot)
+        client: Any = SimpleNamespace(add_notification=lambda *_, **__: None)
+        server._connected_clients[CLIENT] = client
+
+    def receive(self) -> None:
+        """The gateway receives a message and passes it on."""
+        self.slot.stamps.append(self.gate.revocations)
+
+    async def handle(self, message: Any) -> None:
+        """Viser comes to handle it."""
+        await self.gestures._handle(CLIENT, message)
+        await asyncio.sleep(0)
+
+
+@pytest.fixture
+def viser_server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(port=free_port(), verbose=False)
+    yield server
+    server._connected_clients.clear()
+    server.stop()
+
+
+def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
+    table: Table, viser_server: viser.ViserServer
+) -> None:
+    """The slider was moved before STOP and clear, and viser comes to it after both."""
+    driver = table.join(PAGES[0])
+
+    async def slide() -> None:
+        hooked = Hooked(table, viser_server, driver)
+        slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
+        listener(hooked.gestures)(slider, lambda: cmd.SetJoint(0, slider.value))
+        moved = wire.GuiUpdateMessage(slider._impl.uuid, {"value": 0.5})
+        hooked.receive()
+        table.stop("Vera")
+        table.hub.clear_stop(driver)
+        await hooked.handle(moved)
+        assert (table.arm.commands, slider.value) == ([], 0.0)
+        assert "Do it again" in hooked.refusals[0]
+        # The window is shown the truth.
+        (correction,) = hooked.corrections
+        assert correction.updates == {"value": 0.0}
+        hooked.receive()
+        await hooked.handle(moved)
+        assert table.arm.commands == [cmd.SetJoint(0, 0.5)]
+        assert table.arm.actors[-1].name == driver.person.name
+        assert table.arm.actors[-1].grounds is Grounds.LEASE
+
+    asyncio.run(slide())
+
+
+def test_slider_of_another_than_the_driver_changes_nothing_for_anybody(
+    table: Table, viser_server: viser.ViserServer
+) -> None:
+    driver, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    table.hub.acquire(driver)
+
+    async def slide() -> None:
+        hooked = Hooked(table, viser_server, other)
+        slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
+        listener(hooked.gestures)(slider, lambda: cmd.SetJoint(0, slider.value))
+        told = viser_server._websock_server.get_message_buffer().message_from_id
+        before = len(told)
+        hooked.receive()
+        await hooked.handle(wire.GuiUpdateMessage(slider._impl.uuid, {"value": 0.5}))
+        assert (table.arm.commands, slider.value, len(told)) == ([], 0.0, before)
+        assert hooked.refusals == ["Window 1 holds the arm: ask for it."]
+
+    asyncio.run(slide())
+
+
+def test_event_of_a_browser_without_a_gesture_has_no_actor(
+    table: Table, viser_server: viser.ViserServer
+) -> None:
+    gestures = Gestures(viser_server, Guard(viser_server), table.hub)
+    for client_id in (None, CLIENT):
+        with pytest.raises(LeaseError, match="front page"):
+            gestures.actor(client_id)

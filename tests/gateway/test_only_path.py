@@ -1,0 +1,42 @@
+"""Nothing but the command gate puts commands into the link to the arm."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import katana450
+
+PACKAGE = Path(katana450.__file__).parent
+
+DELIVERIES = {
+    ("server/service/command_gate.py", "self.arm"),
+    ("server/service/command_gate.py", "arm"),
+    # Behind the gate: the handle passes on, the worker also adds the path it has found.
+    ("server/service/arm_handle.py", "self._sink"),
+    ("arm/runtime/planning_worker.py", "self._arm"),
+}
+"""Files, and what they deliver commands to."""
+
+
+def uses(name: str) -> set[tuple[str, str]]:
+    """Return each file with what it takes the attribute ``name`` of, called or not."""
+    return {
+        (path.relative_to(PACKAGE).as_posix(), ast.unparse(node.value))
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and node.attr == name
+    }
+
+
+def test_only_the_gate_delivers_commands() -> None:
+    assert uses("deliver") == DELIVERIES
+
+
+def test_only_the_link_makes_command_messages() -> None:
+    made = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if "CommandMessage(" in path.read_text(encoding="utf-8")
+    }
+    assert made == {"arm/runtime/link.py"}

@@ -1,0 +1,48 @@
+"""The examples in the docstrings of the library run as they are printed."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import pkgutil
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import katana450
+from katana450 import library
+
+MODULES = [f"katana450.library.{each.name}" for each in pkgutil.iter_modules(library.__path__)]
+
+METHODS = ("fk", "ik", "nearest", "jacobian", "plan", "line", "circle", "reachability", "show")
+
+MUST_HAVE = {f"katana450.library.arm.Arm.{name}" for name in METHODS} | {
+    f"katana450.library.{name}"
+    for name in ("loading.load", "motion_plan.MotionPlan.sample", "motion_plan.MotionPlan.plot")
+}
+
+FINDER = doctest.DocTestFinder(exclude_empty=True)
+
+EXAMPLES = [
+    found
+    for name in MODULES
+    for found in FINDER.find(importlib.import_module(name), name)
+    if found.examples
+]
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
+def test_examples_in_docstrings_run(
+    example: doctest.DocTest, shoulder_arm: katana450.Arm, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mpl.use("Agg")
+    example.globs.update(katana450=katana450, np=np, arm=shoulder_arm)
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    result = doctest.DocTestRunner(optionflags=flags).run(example, out=print)
+    assert result.attempted > 0
+    assert result.failed == 0, capsys.readouterr().out
+
+
+def test_every_method_that_computes_has_an_example() -> None:
+    assert {each.name for each in EXAMPLES} >= MUST_HAVE

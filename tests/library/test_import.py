@@ -1,0 +1,71 @@
+"""``import katana450``: what it gives, and what it leaves unloaded."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import katana450
+
+HEAVY = ("numpy", "viser", "coal", "trimesh", "yourdfpy", "matplotlib", "ruckig", "msgspec")
+
+
+def modules_after(words: str) -> set[str]:
+    """Return the names of all modules that a fresh process has loaded after ``words``."""
+    done = subprocess.run(
+        [sys.executable, "-c", f"{words}; import sys; print(*sys.modules)"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    return set(done.stdout.split())
+
+
+def test_import_loads_no_library() -> None:
+    loaded = modules_after("import katana450")
+    assert "katana450" in loaded
+    assert not loaded.intersection(HEAVY)
+    assert not {name for name in loaded if name.startswith("katana450.")}
+
+
+def test_errors_and_names_load_no_library() -> None:
+    loaded = modules_after("import katana450; dir(katana450); katana450.InputError")
+    assert not loaded.intersection(HEAVY)
+
+
+def test_kinematics_load_neither_viewer_nor_plots() -> None:
+    loaded = modules_after("import katana450; katana450.load().fk([0.0] * 5)")
+    assert "numpy" in loaded
+    assert not loaded.intersection({"viser", "matplotlib", "starlette", "websockets"})
+
+
+@pytest.mark.parametrize("name", katana450.__all__)
+def test_every_public_name_is_there_with_a_docstring(name: str) -> None:
+    assert getattr(katana450, name).__doc__
+    assert name in dir(katana450)
+
+
+def test_names_for_editors_are_those_at_run_time() -> None:
+    tree = ast.parse(Path(katana450.__file__).read_text(encoding="utf-8"))
+    typed = {
+        alias.name: f"{node.module}"
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert sorted(typed) == katana450.__all__
+    assert {name: f"katana450.{module}" for name, module in katana450._MODULES.items()} == typed
+
+
+def test_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = katana450.nonsense  # type: ignore[attr-defined]
+    with pytest.raises(ImportError):
+        exec("from katana450 import nonsense")

@@ -1,0 +1,187 @@
+"""Kinematics of the library: the core's own numbers, in the frame asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry import se3
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse import inverse
+from tests.exchange.conftest import GANTRY
+
+Q = np.array([0.3, -1.0, 1.4, 0.3, 0.2])
+
+
+def postures(arm: katana450.Arm, count: int) -> np.ndarray:
+    return np.random.default_rng(7).uniform(arm.lower, arm.upper, (count, arm.n))
+
+
+@pytest.fixture
+def mounted(robot: Robot) -> MountedArm:
+    return robot.require_arm()
+
+
+@pytest.fixture(params=["shoulder_arm", "base_arm"])
+def arm(request: pytest.FixtureRequest) -> katana450.Arm:
+    found: katana450.Arm = request.getfixturevalue(request.param)
+    return found
+
+
+def test_forward_kinematics_are_those_of_the_core(
+    shoulder_arm: katana450.Arm, base_arm: katana450.Arm, mounted: MountedArm
+) -> None:
+    T = forward(mounted.chain, Q)
+    assert (shoulder_arm.fk(Q) == T).all()
+    np.testing.assert_allclose(base_arm.fk(Q), mounted.T_base_shoulder @ T, atol=1e-15)
+    np.testing.assert_allclose(
+        shoulder_arm.T_base_frame @ shoulder_arm.fk(Q), base_arm.fk(Q), atol=1e-15
+    )
+
+
+def test_many_postures_are_the_same_as_one_at_a_time(arm: katana450.Arm) -> None:
+    q = postures(arm, 20)
+    np.testing.assert_allclose(arm.fk(q), [arm.fk(each) for each in q], atol=1e-14)
+    found = arm.ik(arm.fk(q))
+    for number, each in enumerate(q):
+        single = arm.ik(arm.fk(each))
+        np.testing.assert_allclose(found.q[number], single.q, atol=1e-7)
+        assert (found.within_limits[number] == single.within_limits).all()
+        assert found.position_error[number] == pytest.approx(single.position_error, abs=1e-12)
+        assert found.rotation_error[number] == pytest.approx(single.rotation_error, abs=1e-9)
+
+
+def test_all_branches_come_back_with_limits_and_residuals(
+    arm: katana450.Arm, mounted: MountedArm
+) -> None:
+    for q in postures(arm, 20):
+        T = arm.fk(q)
+        found = arm.ik(T)
+        assert [each.branch for each in found] == list(found.branches)
+        for solution, inside in zip(found, found.within_limits, strict=True):
+            assert solution.within_limits == mounted.chain.within_limits(solution.q) == inside
+            missed = np.linalg.norm(arm.fk(solution.q)[:3, 3] - T[:3, 3])
+            assert missed == pytest.approx(solution.position_error, abs=1e-12)
+        assert any(np.abs(each.q - q).max() < 1e-6 for each in found.feasible)
+
+
+def test_hint_chooses_the_turn(shoulder_arm: katana450.Arm, mounted: MountedArm) -> None:
+    T = shoulder_arm.fk(Q)
+    hint = Q + 2.0 * np.pi * np.eye(5)[4]
+    expected = [each.q for each in inverse(mounted.chain, T, q_hint=hint)]
+    np.testing.assert_array_equal(shoulder_arm.ik(T, hint).q, expected)
+
+
+def test_solutions_of_many_poses_are_not_iterated(shoulder_arm: katana450.Arm) -> None:
+    found = shoulder_arm.ik(shoulder_arm.fk(postures(shoulder_arm, 3)))
+    with pytest.raises(katana450.InputError, match="3 poses"):
+        list(found)
+
+
+def test_nearest_pose_of_a_feasible_one_is_itself(arm: katana450.Arm) -> None:
+    T = arm.fk(Q)
+    best = arm.nearest(T)
+    np.testing.assert_allclose(best.T, T, atol=1e-12)
+    np.testing.assert_allclose(best.q, Q, atol=1e-9)
+    assert best.reason == ""
+
+
+def test_nearest_pose_says_what_is_missed_and_why(arm: katana450.Arm) -> None:
+    T = arm.fk(arm.ready)
+    far = T.copy()
+    far[0, 3] += 1.0
+    best = arm.nearest(far)
+    np.testing.assert_allclose(arm.fk(best.q), best.T, atol=1e-14)
+    missed = float(np.linalg.norm(best.T[:3, 3] - far[:3, 3]))
+    assert best.position_error == pytest.approx(missed, abs=1e-12)
+    assert best.reach
+    assert "out of reach" in best.reason
+    assert "links" in best.reason
+    turned = T @ se3.from_rotation_translation(
+        np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), np.zeros(3)
+    )
+    assert "yaw" in arm.nearest(turned).reason
+    assert arm.nearest(turned, priority="position").position_error < 1e-9
+
+
+def test_nearest_pose_stays_on_a_branch(arm: katana450.Arm) -> None:
+    best = arm.nearest(arm.fk(Q), branch="front-down")
+    assert str(best.branch) == "front-down"
+    assert best.reason
+
+
+def test_jacobians_are_the_derivative_of_forward_kinematics(arm: katana450.Arm) -> None:
+    h = 1e-6
+    T = arm.fk(Q)
+    for axis, step in enumerate(h * np.eye(5)):
+        rate = (arm.fk(Q + step) - arm.fk(Q - step)) / (2.0 * h)
+        for V, hat in (
+            (arm.jacobian(Q)[:, axis], rate @ se3.inverse(T)),
+            (arm.jacobian(Q, body=True)[:, axis], se3.inverse(T) @ rate),
+        ):
+            np.testing.assert_allclose(se3.hat(V), hat, atol=1e-8)
+
+
+def test_tool_is_chosen_when_the_arm_is_loaded(mounted: MountedArm) -> None:
+    flange = katana450.load(tool="flange")
+    assert flange.tool == "flange"
+    np.testing.assert_array_equal(flange.fk(Q), forward(mounted.chain_to("flange"), Q))
+
+
+def test_reachability_map_is_in_the_base_frame(shoulder_arm: katana450.Arm) -> None:
+    found = shoulder_arm.reachability(0.1, pitches=12, rolls=8, samples=50)
+    assert (found.points[:, 2] > 0.0).all()
+    assert ((found.share > 0.0) & (found.share <= 1.0)).all()
+    assert 0 < len(found.cloud) <= 50
+
+
+Refused = Callable[[katana450.Arm], Any]
+
+REFUSED: dict[str, tuple[Refused, str]] = {
+    "angles of another arm": (lambda arm: arm.fk([0.0] * 6), r"shape \(6,\)"),
+    "angles in a box": (lambda arm: arm.fk(np.zeros((2, 2, 5))), "shape"),
+    "no number": (lambda arm: arm.fk([0.0, 0.0, 0.0, 0.0, np.nan]), "axis 5"),
+    "no number among many": (lambda arm: arm.fk([[0.0] * 5, [np.inf] + [0.0] * 4]), "vector 1"),
+    "ragged": (lambda arm: arm.fk([[0.0], [0.0, 1.0]]), "regular"),
+    "words": (lambda arm: arm.fk(["a"] * 5), "numbers"),
+    "pose of rows": (lambda arm: arm.ik(np.eye(3)), "shape"),
+    "pose with NaN": (lambda arm: arm.ik(np.full((4, 4), np.nan)), "nan"),
+    "no rotation": (lambda arm: arm.ik(np.diag([2.0, 1.0, 1.0, 1.0])), "rotation"),
+    "one of many": (lambda arm: arm.ik(np.array([np.eye(4), 2.0 * np.eye(4)])), "ose 1"),
+    "nearest to nothing": (lambda arm: arm.nearest(np.zeros((4, 4))), "last row"),
+    "unknown priority": (lambda arm: arm.nearest(np.eye(4), priority="yaw"), "'yaw'"),  # type: ignore[arg-type]
+    "unknown branch": (lambda arm: arm.nearest(np.eye(4), branch="left"), "front-up"),
+    "short jacobian": (lambda arm: arm.jacobian([0.0]), "shape"),
+    "huge voxel": (lambda arm: arm.reachability(10.0), "voxel"),
+    "unknown frame": (lambda arm: katana450.load(frame="world"), "'world'"),  # type: ignore[arg-type]  # noqa: ARG005
+    "no such scene": (lambda arm: katana450.load(scene="/nowhere.yaml"), "nowhere"),  # noqa: ARG005
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_unusable_input_is_refused_with_the_reason(arm: katana450.Arm, case: str) -> None:
+    call, said = REFUSED[case]
+    with pytest.raises(katana450.InputError, match=said):
+        call(arm)
+
+
+@pytest.mark.parametrize(
+    ("file", "tool", "said"),
+    [
+        (GANTRY, None, "axis|axes|joint"),
+        (Path("/nowhere/arm.urdf"), None, "nowhere"),
+        (None, "hand", "no link 'hand'"),
+    ],
+)
+def test_other_mechanisms_and_tools_are_refused(
+    file: Path | None, tool: str | None, said: str
+) -> None:
+    with pytest.raises(katana450.RobotDescriptionError, match=said):
+        katana450.load(file, tool)

@@ -1,0 +1,62 @@
+"""Plans that the arm of a real server follows, and a STOP in the middle of one."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import katana450
+from katana450.client import RefusedError
+from katana450.server.api import answers, requests
+from tests.browser.server import AppServer
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as running:
+        yield running
+
+
+@pytest.fixture
+def client(server: AppServer) -> Iterator[katana450.Client]:
+    with katana450.connect(server.url, name="Plan") as connected:
+        yield connected
+
+
+def test_plan_is_followed_to_its_end(shoulder_arm: katana450.Arm, client: katana450.Client) -> None:
+    plan = shoulder_arm.line(by=(0.0, 0.0, -0.05))
+    state = plan.run(client)
+    np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
+    assert not state.moving
+
+
+def test_stop_ends_the_run_and_nothing_moves_after_it(
+    shoulder_arm: katana450.Arm, client: katana450.Client, server: AppServer
+) -> None:
+    plan = shoulder_arm.plan([2.0, -1.0, 1.4, 0.3, 0.0], [-2.0, -1.0, 1.4, 0.3, 0.0])
+    refused: list[RefusedError] = []
+
+    def run() -> None:
+        with pytest.raises(RefusedError) as raised:
+            plan.run(client)
+        refused.append(raised.value)
+
+    client.joints(plan.start)
+    running = threading.Thread(target=run)
+    running.start()
+    with katana450.connect(server.url, name="Onlooker") as onlooker:
+        for state in onlooker.states():
+            if state.q[0] > -1.5:
+                break
+        onlooker.ask(requests.Stop())
+        running.join(60.0)
+        assert len(refused) == 1
+        client.ask(requests.ClearStop())
+        at_rest = next(each for each in onlooker.states() if not each.moving)
+        time.sleep(0.5)
+        assert onlooker.query(answers.State).q == at_rest.q
+        assert at_rest.q[0] < 1.9

@@ -1,0 +1,27 @@
+"""A gate for gestures that lets everything through and remembers it."""
+
+from __future__ import annotations
+
+from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.commands import Command
+from katana450.arm.control.lease import Person, Role
+
+ANNA = Actor(Person("anna", "Anna", Role.OPERATOR), CommandChannel.SCENE, seen=0)
+
+
+class RecordedGestures:
+    """Everything is Anna's."""
+
+    def __init__(self) -> None:
+        self.commands: list[Command] = []
+        self.revocations = 0
+
+    def actor(self, _client_id: int | None) -> Actor:
+        return ANNA
+
+    def submit(self, command: Command, _actor: Actor) -> int:
+        self.commands.append(command)
+        return len(self.commands)
+
+    def is_current(self, actor: Actor) -> bool:
+        return actor.seen == self.revocations
