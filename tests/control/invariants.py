@@ -64,7 +64,7 @@ JOINTS = Joints(
 
 
 def session_of(name: str) -> Session:
-    """The session of the app, the same without contacts, or one of joints alone."""
+    """The session of the app, the same for an arm without its gripper, or one of joints alone."""
     if name not in SESSIONS:
         if name == "joints":
             SESSIONS[name] = Session(JOINTS, JOINTS.ready)
@@ -126,7 +126,7 @@ class JointRules(RuleBasedStateMachine):
         q = self.state.goal + (0.4 * rate if jump else 0.0)
         for tick in range(ticks):
             self.tick([cmd.Servo(q + rate * DT * tick)] if tick % every == 0 else ())
-            if self.state.halted is None:
+            if self.state.stopped is None:
                 assert isinstance(self.state.intent, Servoing)
 
     @rule(command=st.sampled_from([cmd.Home(), cmd.Stretch()]), ticks=ticks)
@@ -136,18 +136,18 @@ class JointRules(RuleBasedStateMachine):
     @rule(ticks=ticks)
     def hold(self, ticks: int) -> None:
         self.run([cmd.Reset()], ticks)
-        if self.state.halted is None:
+        if self.state.stopped is None:
             assert isinstance(self.state.intent, Idle)
 
     @rule(ticks=ticks)
     def stop(self, ticks: int) -> None:
         self.run([cmd.Stop()], ticks)
 
-    @precondition(lambda self: self.state.halted is not None)
+    @precondition(lambda self: self.state.stopped is not None)
     @rule(ticks=ticks)
     def clear_stop(self, ticks: int) -> None:
         self.run([cmd.Release()], ticks)
-        assert self.state.halted is None
+        assert self.state.stopped is None
 
     @rule(ticks=ticks)
     def pause(self, ticks: int) -> None:
@@ -184,7 +184,7 @@ class JointRules(RuleBasedStateMachine):
         state = self.session.step(before, commands, t)
         self.check_nothing_survives(before, commands, state, t)
         self.state = self.session.observe(state, state.setpoint, state.gripper_setpoint)
-        if before.halted is None and state.halted is not None:
+        if before.stopped is None and state.stopped is not None:
             self.ordered = self.gripped = False
             self.stop_ends = state.goal
         self.check_limits(before, state)
@@ -199,7 +199,7 @@ class JointRules(RuleBasedStateMachine):
                 self.note(each.commands)
             elif isinstance(each, cmd.Stop):
                 self.ordered = self.gripped = False
-            elif self.state.halted is None or any(isinstance(c, cmd.Release) for c in commands):
+            elif self.state.stopped is None or any(isinstance(c, cmd.Release) for c in commands):
                 self.ordered |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
                 self.gripped |= isinstance(each, cmd.SetGripper)
 
@@ -222,7 +222,7 @@ class JointRules(RuleBasedStateMachine):
 
     def check_rest(self, before: State, state: State) -> None:
         """No motion while stopped or paused, once braked, nor without a newer command."""
-        resting = state.halted is not None or state.paused
+        resting = state.stopped is not None or state.paused
         self.braking = self.braking + 1 if resting else 0
         same = (state.setpoint == before.setpoint).all()
         if resting:
@@ -240,9 +240,9 @@ class JointRules(RuleBasedStateMachine):
         """Flags, findings and mode agree."""
         reasons = {finding.reason for finding in state.findings}
         assert Reason.INTERNAL not in reasons
-        assert (Reason.HALTED in reasons) == (state.halted is not None)
+        assert (Reason.HALTED in reasons) == (state.stopped is not None)
         assert (Reason.PAUSED in reasons) == state.paused
-        if state.halted is not None:
+        if state.stopped is not None:
             assert not state.paused
             assert isinstance(state.intent, Idle)
             assert state.gripper_goal == state.gripper_setpoint
@@ -267,7 +267,7 @@ class JointRules(RuleBasedStateMachine):
         if len(commands) != 1 or before.following is not None:
             return
         (command,) = commands
-        again = isinstance(command, cmd.Stop) and before.halted is not None
+        again = isinstance(command, cmd.Stop) and before.stopped is not None
         elsewhere = isinstance(command, cmd.Follow) and not isinstance(after.mode, Following)
         if again or elsewhere or effect_of(command, before) is not Effect.SUPERSEDES:
             return

@@ -167,7 +167,7 @@ def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
     stopped = run(session, session.step(tight, [cmd.SetJoint(0, 0.3)], tight.t + 0.01), cmd.Stop())
     cup, _ = cup_of(session, stopped)
     assert cup.held
-    assert stopped.halted is not None
+    assert stopped.stopped is not None
 
 
 def test_fingers_that_open_let_the_cup_stand_on_the_table(

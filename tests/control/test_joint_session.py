@@ -104,17 +104,17 @@ def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
 ) -> None:
     moving = after(session, state, 0.8, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
     stopped = after(session, moving, DT, cmd.Stop())
-    assert stopped.halted is not None
-    rest = after(session, stopped, stopped.halted.time)
+    assert stopped.stopped is not None
+    rest = after(session, stopped, stopped.stopped.time)
     assert rest.motion.at_rest
     np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
     far = np.abs(moving.setpoint - rest.q).max()
-    assert stopped.halted.way == pytest.approx(far, abs=1e-9)
+    assert stopped.stopped.way == pytest.approx(far, abs=1e-9)
     ignored = after(session, rest, 0.5, cmd.Home(), cmd.Dress("a", Trait.CHOICE, -1))
     np.testing.assert_array_equal(ignored.q, rest.q)
     assert ignored.looks.of("a").choice is Choice.HIDDEN
     free = after(session, ignored, 0.5, cmd.Release())
-    assert (free.halted, free.findings, free.moving) == (None, (), False)
+    assert (free.stopped, free.findings, free.moving) == (None, (), False)
     home = after(session, free, 10.0, cmd.Home())
     np.testing.assert_array_equal(home.q, JOINTS.ready)
 

@@ -117,7 +117,7 @@ def test_every_mode_of_a_random_order_comes_to_an_end(session: Session, state: S
     for _ in range(1500):
         command = kinds[rng.integers(len(kinds))](state)
         state = run(session, state, command, int(rng.integers(1, 4)))
-        if state.halted is not None:
+        if state.stopped is not None:
             assert isinstance(state.mode, Idle)
     # Left alone, every mode but a pause comes to an end.
     state = run(session, run(session, state, cmd.Release()), cmd.Resume())

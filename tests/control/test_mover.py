@@ -122,7 +122,7 @@ def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
     once = run(session, moving, [cmd.Stop()], 20)
     twice = run(session, once, [cmd.Stop()])
     assert twice.findings == once.findings
-    assert twice.halted == once.halted
+    assert twice.stopped == once.stopped
 
 
 def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: State) -> None:

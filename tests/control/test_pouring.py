@@ -98,7 +98,7 @@ def test_a_stop_in_mid_pour_leaves_what_the_tilt_holds(session: Session, full: S
         assert state.moving
         state = tick(session, state)
     state = tick(session, state, cmd.Stop(), times=500)
-    assert state.halted is not None
+    assert state.stopped is not None
     assert state.poured is not None
     assert state.poured.water.cup > 0
     assert state.poured.water.total == FULL

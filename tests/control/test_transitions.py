@@ -152,7 +152,7 @@ def trace(state: State) -> tuple[object, ...]:
     motion = (state.setpoint, state.motion.qd, state.motion.qdd, state.goal)
     seen = tuple(each.tobytes() for each in motion)
     numbers = (state.gripper_goal, state.gripper_setpoint, state.speed, state.paused)
-    return (*seen, *numbers, state.findings, state.halted, state.tool, state.reading)
+    return (*seen, *numbers, state.findings, state.stopped, state.tool, state.reading)
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +194,7 @@ def test_a_stop_refuses_all_but_what_is_listed(
     shipped: Session, begun: dict[type[Mode], State], kind: type[cmd.Command]
 ) -> None:
     stopped = run(shipped, begun[Jogging], [cmd.Stop()])
-    assert isinstance(stopped.halted, Halt)
+    assert isinstance(stopped.stopped, Halt)
     command = example(shipped, begun[Jogging], kind)
     after = run(shipped, stopped, [command, cmd.Together((cmd.SpeedScale(0.9),))])
     assert isinstance(after.mode, Idle)

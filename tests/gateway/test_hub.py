@@ -69,8 +69,8 @@ class FakeArm:
     def state(self) -> State:
         halted = Halt(0.0, 0.0) if self.halted else None
         if not self.moves:
-            return replace(self.rest, halted=halted)
-        return replace(self.rest, goal=self.rest.setpoint + 0.1, halted=halted)
+            return replace(self.rest, stopped=halted)
+        return replace(self.rest, goal=self.rest.setpoint + 0.1, stopped=halted)
 
     @property
     def snapshot(self) -> Snapshot:

@@ -109,10 +109,10 @@ def test_the_ledger_comes_over_entry_by_entry(ends: Ends) -> None:
 
 def test_a_front_that_falls_silent_stops_an_arm_that_moves(ends: Ends) -> None:
     time.sleep(2 * SILENCE)
-    assert ends.loop.board.snapshot.state.halted is None
+    assert ends.loop.board.snapshot.state.stopped is None
     ends.front.put(cmd.SetJoint(0, 2.0))
     began = time.monotonic()
-    until(lambda: ends.loop.board.snapshot.state.halted is not None)
+    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
     assert SILENCE < time.monotonic() - began < 2 * SILENCE
     until(lambda: not ends.loop.board.snapshot.state.moving)
 
@@ -123,12 +123,12 @@ def test_a_pipe_that_breaks_stops_the_arm_and_the_next_front_moves_nothing(ends:
     with socket.socket(fileno=os.dup(ends.theirs.fileno())) as line:
         line.shutdown(socket.SHUT_RDWR)
     until(ends.arm_end.cut.is_set, 2.0)
-    until(lambda: ends.loop.board.snapshot.state.halted is not None)
+    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
     ends.arm_end, again = ends.connect()
-    assert again.board.snapshot.state.halted is not None
+    assert again.board.snapshot.state.stopped is not None
     until(lambda: not again.board.snapshot.state.moving)
     again.put(cmd.Release())
-    until(lambda: again.board.snapshot.state.halted is None)
+    until(lambda: again.board.snapshot.state.stopped is None)
     q = again.board.snapshot.state.q
     time.sleep(0.2)
     np.testing.assert_array_equal(again.board.snapshot.state.q, q)

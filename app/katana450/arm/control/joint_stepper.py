@@ -46,7 +46,7 @@ class JointStepper:
 
     def _ahead(self, state: State, dt: float) -> Motion:
         limiter, motion, servo = self._limiter, state.motion, state.servo
-        if state.halted is not None:
+        if state.stopped is not None:
             return limiter.stop(motion, dt)
         if state.paused:
             return limiter.pause(motion, state.goal, dt)

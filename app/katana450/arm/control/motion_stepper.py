@@ -155,14 +155,14 @@ class MotionStepper:
 
     def _free_to_leave(self, state: State) -> bool:
         # How far a stop takes has been said, so it goes on as it began.
-        return state.motion.at_rest or (state.halted is None and self.may_leave(state))
+        return state.motion.at_rest or (state.stopped is None and self.may_leave(state))
 
     def _ahead(self, state: State, dt: float) -> tuple[Motion, Following | None]:
         """The next motion, and the place on the plan if one is followed."""
         following = state.following
         if following is None:
             return self._beside(state, dt), None
-        if state.halted is not None or state.paused or isinstance(state.mode, Leaving):
+        if state.stopped is not None or state.paused or isinstance(state.mode, Leaving):
             return self._brake(state, dt)
         ahead = self._follower.ahead(following, dt, state.speed)
         return ahead.motion(), ahead
@@ -174,7 +174,7 @@ class MotionStepper:
         step towards the goal is such a one, this brake is what the arm does.
         """
         limiter, motion = self.limiter(state), state.motion
-        if state.halted is not None:
+        if state.stopped is not None:
             return self._any.stop(motion, dt)
         chain = self._arm.chain_to(state.tool)
         if state.paused:
@@ -251,7 +251,7 @@ class MotionStepper:
 
     def _fingers(self, state: State, dt: float) -> float:
         reach = self._arm.gripper.speed * dt
-        if state.halted is not None or state.paused:
+        if state.stopped is not None or state.paused:
             return state.gripper_setpoint
         return state.gripper_setpoint + min(
             max(state.gripper_goal - state.gripper_setpoint, -reach), reach

@@ -265,7 +265,7 @@ class Session:
                 return self._halt(state)
             case cmd.Release():
                 goal = self._stepper(state).halt(state)[0]
-                free = with_mode(replace(state, halted=None, goal=goal), IDLE)
+                free = with_mode(replace(state, stopped=None, goal=goal), IDLE)
                 return without_finding(free, Reason.HALTED)
             case cmd.Reset():
                 held = replace(state, gripper_goal=state.gripper_setpoint)
@@ -330,14 +330,14 @@ class Session:
 
     def _halt(self, state: State) -> State:
         """Brake, and forget every target. The grip stays: what is held must not be dropped."""
-        if state.halted is not None:
+        if state.stopped is not None:
             return state
         free = state.following is None or self._stepper(state).may_leave(state)
         state = replace(state, mode=IDLE) if free else with_mode(state, IDLE)
         goal, way, time = self._stepper(state).halt(state)
         halted = replace(
             state,
-            halted=Halt(way, time),
+            stopped=Halt(way, time),
             paused=False,
             goal=goal,
             gripper_goal=state.gripper_setpoint,

@@ -130,7 +130,7 @@ class State:
         reading: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished, or is not gone to; else empty.
         blocked: whether the arm waits on its way because it would touch something.
-        halted: the stop that holds the arm until a person releases it; None when there is none.
+        stopped: the stop that holds the arm until a person clears it; None when there is none.
         paused: whether the arm waits on its way because a person wants it to.
         speed: the share of every greatest speed that is allowed, above 0 and up to 1.
         mode: what decides where the goal is. A drag is over once the goal is there; until then
@@ -153,7 +153,7 @@ class State:
     reading: Reading = Reading.POSE
     findings: tuple[Finding, ...] = ()
     blocked: bool = False
-    halted: Halt | None = None
+    stopped: Halt | None = None
     paused: bool = False
     speed: float = 1.0
     mode: Mode = IDLE
@@ -190,7 +190,7 @@ class State:
         """What the findings come to."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
-        if self.halted is not None:
+        if self.stopped is not None:
             return Status.HALTED
         if self.paused:
             return Status.PAUSED
@@ -238,7 +238,7 @@ class State:
     @property
     def moving(self) -> bool:
         """Whether the arm or the gripper is still on its way."""
-        resting = self.blocked or self.paused or self.halted is not None
+        resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
 
     @property

@@ -103,7 +103,7 @@ NOT_WHILE_PAUSED = (cmd.Jog,)
 
 def effect_of(command: cmd.Command, state: State) -> Effect:
     """The effect that ``command`` has on ``state``."""
-    if state.halted is not None and not isinstance(command, WHILE_STOPPED):
+    if state.stopped is not None and not isinstance(command, WHILE_STOPPED):
         return Effect.REFUSED
     if state.paused and isinstance(command, NOT_WHILE_PAUSED):
         return Effect.REFUSED

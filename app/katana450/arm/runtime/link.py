@@ -178,7 +178,7 @@ class ArmEnd:
         while not self.cut.wait(self._silence / 4):
             silent = self.unheard
             state = self._loop.board.snapshot.state
-            if silent > self._silence and state.moving and state.halted is None:
+            if silent > self._silence and state.moving and state.stopped is None:
                 log.error("Nothing was heard from the page's server for %.2f s: STOP.", silent)
                 self._mailbox.put(cmd.Stop())
 

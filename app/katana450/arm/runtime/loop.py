@@ -110,7 +110,7 @@ class ControlLoop:
         while not self._stopping.is_set():
             late = self._clock.now() - due
             self._punctuality.note(late)
-            if late > self._held_up and self._state.moving and self._state.halted is None:
+            if late > self._held_up and self._state.moving and self._state.stopped is None:
                 log.error("The control loop was %.2f s late while the arm moved: STOP.", late)
                 self._mailbox.put(Stop())
             if late > self._period:

@@ -65,7 +65,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     if run.phase is not Phase.RUNNING:
         return run, ()
     dt, run = t - run.t, replace(run, t=t)
-    if state.halted is not None:
+    if state.stopped is not None:
         return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
     if any(finding.reason is Reason.INTERNAL for finding in state.findings):
         return replace(run, phase=Phase.FAILED, why="The arm's controller met an error."), ()

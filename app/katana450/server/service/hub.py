@@ -261,7 +261,7 @@ class Hub:
     def _agree_with(self, arm: Arm) -> None:
         """What is stopped here is stopped there, and the other way round."""
         snapshot = arm.snapshot
-        halted = snapshot.state.halted is not None
+        halted = snapshot.state.stopped is not None
         if self.stopped is not None:
             self.stopped = self.stopped.seen(snapshot)
             sent = self.stopped.ticket

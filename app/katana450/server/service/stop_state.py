@@ -41,7 +41,7 @@ class Stopped:
         """Confirmed, once ``snapshot`` has the request in it and is stopped; else as it was."""
         if self.confirmed or self.ticket is None or snapshot.ticket < self.ticket:
             return self
-        return self if snapshot.state.halted is None else replace(self, confirmed=True)
+        return self if snapshot.state.stopped is None else replace(self, confirmed=True)
 
 
 class Presses:
