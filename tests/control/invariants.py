@@ -199,6 +199,9 @@ class JointRules(RuleBasedStateMachine):
                 self.note(each.commands)
             elif isinstance(each, cmd.Stop):
                 self.ordered = self.gripped = False
+            elif isinstance(each, cmd.Release) and not self.state.motion.at_rest:
+                # Cleared while it brakes, the arm brakes in another way from here.
+                self.stop_ends = None
             elif self.state.stopped is None or any(isinstance(c, cmd.Release) for c in commands):
                 self.ordered |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
                 self.gripped |= isinstance(each, cmd.SetGripper)
@@ -257,7 +260,6 @@ class JointRules(RuleBasedStateMachine):
             assert state.t < state.intent.until or not state.intent.rates.any()
         if state.servo is not None:
             assert state.t - state.servo.t < cmd.JOG_TIME + DT
-        assert state.blocked <= (Reason.CONTACT in reasons)
         assert (state.held is None) == (state.grip is None)
 
     def check_nothing_survives(

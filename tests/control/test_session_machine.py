@@ -31,10 +31,6 @@ from katana450.maths.planning.plan import Plan
 from tests.conftest import LONG
 from tests.control.invariants import JointRules, fractions, ticks
 
-STOP = (cmd.Stop(), cmd.Release())
-
-PAUSE = (cmd.Pause(), cmd.Resume())
-
 
 class ArmRules(JointRules):
     """The commands of an arm with a gripper, objects and plans besides."""
@@ -92,10 +88,15 @@ class ArmRules(JointRules):
                 self.set_joints(data=data, ticks=ticks)
             elif kind == "grip":
                 self.grip(angle=data.draw(st.integers(-3, 9)), ticks=ticks)
+            elif kind == "pause":
+                self.run([cmd.Pause()], ticks)
+                self.run([cmd.Resume()], 5)
             else:
-                cut, free = STOP if kind == "stop" else PAUSE
-                self.run([cut], ticks)
-                self.run([free], 5)
+                wide = self.state.gripper_setpoint < 0.1
+                self.tick([cmd.SetGripper(0.3 if wide else -0.3)])
+                self.run([cmd.Stop()], ticks)
+                self.run([cmd.Home(), cmd.SetGripper(0.0)], 2)
+                self.run([cmd.Release()], 5)
 
     @rule(pitch=fractions(1), roll=fractions(1), ticks=ticks)
     def turn(self, pitch: FloatArray, roll: FloatArray, ticks: int) -> None:
