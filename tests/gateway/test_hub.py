@@ -26,7 +26,7 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.service.heartbeats import Heartbeat
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub, Window, key_of, visiting
 from katana450.server.service.nodes import Nodes
 from katana450.server.web.authenticator import Identity
@@ -130,7 +130,7 @@ class Table:
         page: str,
         role: Role = Role.ADMIN,
         name: str | None = None,
-        heartbeat: Heartbeat | None = None,
+        heartbeat: LastHeartbeat | None = None,
     ) -> Window:
         told = self.told.setdefault(page, [])
         return self.hub.join(Identity("session", name, role), page, told.append, heartbeat)
