@@ -161,7 +161,7 @@ def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:
 
 
 def test_the_script_that_comes_along_is_the_demo() -> None:
-    path = ROOT / "app" / "katana450" / "programs" / "library" / "circle.yaml"
+    path = ROOT / "app" / "katana450" / "extensions" / "programs" / "library" / "circle.yaml"
     stored, demo = parse(path.read_text(encoding="utf-8")), parse(CircleDemo().text)
     assert (stored.about, stored.expected) == (demo.about, demo.expected)
     assert [repr(a.step) for a in stored.steps] == [repr(b.step) for b in demo.steps]
