@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 
+import katana450
+
 FORMAT = "%(asctime)s %(levelname)s %(message)s"
 
 CONTINUED = "    | "
@@ -39,4 +41,4 @@ def start_log() -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(LineFormatter())
     logging.basicConfig(handlers=[handler])
-    logging.getLogger("app").setLevel(logging.INFO)
+    logging.getLogger(katana450.__name__).setLevel(logging.INFO)
