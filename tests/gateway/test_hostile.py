@@ -559,6 +559,8 @@ def test_every_answer_tells_the_browser_what_it_may_do(server: AppServer) -> Non
         assert "'unsafe-eval'" not in scripts
 
 
-@pytest.mark.parametrize("path", ["/static/../app/katana450/cli/main.py", "/static/%2e%2e/pyproject.toml"])
+@pytest.mark.parametrize(
+    "path", ["/static/../app/katana450/cli/main.py", "/static/%2e%2e/pyproject.toml"]
+)
 def test_no_other_file_is_given_out(server: AppServer, path: str) -> None:
     assert ask(server.url + path)[0] == 404
