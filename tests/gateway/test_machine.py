@@ -85,7 +85,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         None,
         None,
     )
-    assert "no link that hangs on five turning joints" in told.joints_only
+    assert "need five turning axes. Its joints are j1 (prismatic)" in told.joints_only
     state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
