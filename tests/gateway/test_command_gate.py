@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,10 +15,13 @@ from viser import _messages as wire
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
+from katana450.arm.control.event_log import Entry
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason
 from katana450.errors import LeaseError
-from katana450.server.service.hub import Window
+from katana450.server.service import serialize
+from katana450.server.service.hub import TICK, Window
 from katana450.server.view.controls import listener
 from katana450.server.viser_bridge.frames import FrameSlot
 from katana450.server.viser_bridge.gestures import Gestures, _Browser
@@ -48,6 +52,45 @@ def test_actor_travels_with_its_grounds(table: Table) -> None:
         ("Window 1", Grounds.LEASE),
         ("Window 1", Grounds.LEASE),
     ]
+
+
+def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> None:
+    driver, watcher = table.join(PAGES[0]), table.join(PAGES[1], Role.VIEWER, "Vera")
+    granted = table.touch(driver.person.key)
+    table.stop(watcher.person.name)
+    stopped = table.arm.actors[-1]
+    findings = [
+        Finding(Reason.AXIS_LIMIT, 0.5, axis=1),
+        Finding(Reason.CONTACT, 0.006, parts=("finger_left_link", "table")),
+        Finding(Reason.STOPPED, 0.02, time=0.3),
+        Finding(Reason.STOPPED, 0.02, time=0.3),
+    ]
+    server = replace(SERVER, grounds=Grounds.SERVER)
+    causes = [(None, ""), (granted, "MoveTool"), (stopped, "Stop"), (server, "Stop")]
+    entries = [
+        Entry(table.t, finding, True, *cause)
+        for finding, cause in zip(findings, causes, strict=True)
+    ]
+    for upto in range(len(entries)):
+        table.arm.ledger = tuple(entries[max(upto - 1, 0) : upto + 1])
+        table.wait(TICK)
+    lines = [serialize.line(line) for line in table.hub.journal.lines]
+    assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
+    assert [line.command for line in lines] == ["", "MoveTool", "Stop", "Stop"]
+    assert [line.grounds for line in lines] == [
+        None,
+        "took the free lease",
+        "anybody may stop the arm",
+        "protection by the server",
+    ]
+    told = [line.finding for line in lines]
+    assert [each.reason for each in told] == ["axis limit", "contact", "stopped", "stopped"]
+    amounts = [(each.amount, each.unit) for each in told[:3]]
+    assert amounts == [(0.5, "rad"), (0.006, "m"), (0.02, "m")]
+    assert told[0].axis == 2
+    assert told[1].parts == ("finger_left_link", "table")
+    assert told[2].seconds == 0.3
+    assert "Clear stop in the bar" in told[2].said
 
 
 def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:

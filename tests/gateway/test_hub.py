@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.lease import LOST_AFTER, Lease, Role
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State, StoppingDistance
+from katana450.arm.control.state import State, StoppingDistance
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -26,8 +26,7 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.service import serialize
-from katana450.server.service.heartbeats import Heartbeat
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub, Window, key_of, visiting
 from katana450.server.service.nodes import Nodes
 from katana450.server.web.authenticator import Identity
@@ -131,7 +130,7 @@ class Table:
         page: str,
         role: Role = Role.ADMIN,
         name: str | None = None,
-        heartbeat: Heartbeat | None = None,
+        heartbeat: LastHeartbeat | None = None,
     ) -> Window:
         told = self.told.setdefault(page, [])
         return self.hub.join(Identity("session", name, role), page, told.append, heartbeat)
@@ -176,45 +175,6 @@ def test_who_touches_a_control_first_has_the_arm(table: Table) -> None:
     with pytest.raises(LeaseError, match="Window 2 holds the arm"):
         table.touch(first.person.key)
     assert table.arm.holds == 0
-
-
-def test_the_journal_names_who_gave_the_command_and_on_what_grounds(table: Table) -> None:
-    driver, watcher = table.join(PAGES[0]), table.join(PAGES[1], Role.VIEWER, "Vera")
-    granted = table.touch(driver.person.key)
-    table.stop(watcher.person.name)
-    stopped = table.arm.actors[-1]
-    findings = [
-        Finding(Reason.AXIS_LIMIT, 0.5, axis=1),
-        Finding(Reason.CONTACT, 0.006, parts=("finger_left_link", "table")),
-        Finding(Reason.STOPPED, 0.02, time=0.3),
-        Finding(Reason.STOPPED, 0.02, time=0.3),
-    ]
-    server = replace(SERVER, grounds=Grounds.SERVER)
-    causes = [(None, ""), (granted, "MoveTool"), (stopped, "Stop"), (server, "Stop")]
-    entries = [
-        Entry(table.t, finding, True, *cause)
-        for finding, cause in zip(findings, causes, strict=True)
-    ]
-    for upto in range(len(entries)):
-        table.arm.ledger = tuple(entries[max(upto - 1, 0) : upto + 1])
-        table.wait(TICK)
-    lines = [serialize.line(line) for line in table.hub.journal.lines]
-    assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
-    assert [line.command for line in lines] == ["", "MoveTool", "Stop", "Stop"]
-    assert [line.grounds for line in lines] == [
-        None,
-        "took the free lease",
-        "anybody may stop the arm",
-        "protection by the server",
-    ]
-    told = [line.finding for line in lines]
-    assert [each.reason for each in told] == ["axis limit", "contact", "stopped", "stopped"]
-    amounts = [(each.amount, each.unit) for each in told[:3]]
-    assert amounts == [(0.5, "rad"), (0.006, "m"), (0.02, "m")]
-    assert told[0].axis == 2
-    assert told[1].parts == ("finger_left_link", "table")
-    assert told[2].seconds == 0.3
-    assert "Clear stop in the bar" in told[2].said
 
 
 def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:

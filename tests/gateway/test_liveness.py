@@ -11,7 +11,7 @@ import pytest
 
 from katana450.arm.control.session import Session
 from katana450.server.service import status
-from katana450.server.service.heartbeats import Arrival, Heartbeat
+from katana450.server.service.heartbeats import Arrival, LastHeartbeat
 from katana450.server.service.hub import TICK
 from katana450.server.service.stop_state import Stopped
 from katana450.settings import Settings
@@ -21,7 +21,7 @@ LATE = 0.2
 """[s] Between two looks of a server that is held up: within the silence that is allowed."""
 
 
-class Received(Heartbeat):
+class Received(LastHeartbeat):
     """A connection whose newest message was received when the test says, and not handled yet."""
 
     received = 0.0

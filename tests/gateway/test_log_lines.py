@@ -11,6 +11,8 @@ import time
 import pytest
 
 from katana450.assembly.log_lines import LineFormatter, printable
+from katana450.client import connect
+from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import ask, websocket
 from tests.gateway.lines import Lines
@@ -26,7 +28,7 @@ ENTRY = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} [A-Z]+ ")
 @pytest.mark.parametrize("each", BREAKS)
 def test_message_stays_on_its_line(each: str) -> None:
     record = logging.LogRecord(
-        "app", logging.INFO, "", 0, "%s asks.", (f"Eve{each}{FORGED}",), None
+        "katana450", logging.INFO, "", 0, "%s asks.", (f"Eve{each}{FORGED}",), None
     )
     line = LineFormatter().format(record)
     assert line.isprintable()
@@ -39,7 +41,7 @@ def test_traceback_follows_on_marked_lines() -> None:
         raise ValueError(f"no\n{FORGED}")
     except ValueError as error:
         about = (ValueError, error, error.__traceback__)
-    record = logging.LogRecord("app", logging.ERROR, "", 0, "A fault.", None, about)
+    record = logging.LogRecord("katana450", logging.ERROR, "", 0, "A fault.", None, about)
     first, *rest = LineFormatter().format(record).splitlines()
     assert first.endswith("A fault.")
     assert len(rest) > 2
@@ -51,13 +53,22 @@ def test_printable_text_is_left_as_it_is() -> None:
         assert printable(text) == text
 
 
+def test_log_names_the_person_who_stopped_the_arm() -> None:
+    with AppServer() as server, connect(server.url, "Anna") as arm:
+        arm.ask(requests.Stop())
+        end = time.monotonic() + 10.0
+        while " INFO Anna: " not in server.output:
+            assert time.monotonic() < end, server.output
+            time.sleep(0.02)
+
+
 def test_requests_cannot_forge_a_line_of_the_log() -> None:
     """Fields, values, names, headers and paths, by every way in."""
     with AppServer((*APP, "--lines", "0")) as server:
         for each in BREAKS:
             evil = f"x{each}{FORGED}"
-            requests = [{"do": evil}, {"do": "stop", evil: 1}, {"do": "tool", "name": evil}]
-            asyncio.run(_say(server, [json.dumps(request) for request in requests]))
+            asked = [{"do": evil}, {"do": "stop", evil: 1}, {"do": "tool", "name": evil}]
+            asyncio.run(_say(server, [json.dumps(request) for request in asked]))
             lines = Lines(server)
             with lines.socket, lines.reader:
                 lines.say(do="hello", name=f"x{each}y")

@@ -86,7 +86,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         None,
         None,
     )
-    assert "no joints in a row that carry a tool" in told.joints_only
+    assert "need five turning axes. Its joints are j1 (prismatic)" in told.joints_only
     state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))

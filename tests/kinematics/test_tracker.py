@@ -19,7 +19,7 @@ from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
 from katana450.maths.kinematics.reading import Reading
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.tracker import EFFORT, HOP, Tracked, Tracking, leap, track
+from katana450.maths.kinematics.tracker import EFFORT, HOP, Tracked, TrackingStatus, leap, track
 from tests.kinematics.family import random_member, random_pose
 
 READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
@@ -105,7 +105,7 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
     assert all(np.allclose(goals[i][1].best.q, plain[i].q, atol=1e-9) for i in range(at))
     assert steps.max() < HOP
     end = goals[-1][1]
-    assert end.status is Tracking.HELD
+    assert end.status is TrackingStatus.HELD
     assert end.ahead is not None
     assert np.allclose(end.ahead.q, plain[-1].q, atol=1e-9)
     axis, far = end.leap_ahead()
@@ -115,7 +115,7 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
     back = list(dragged(chain, split, end.best.q, stops[::-1]))
     assert np.abs(np.diff([b.best.q for _, b in back], axis=0)).max() < HOP
     assert np.allclose(back[-1][1].best.q, start, atol=1e-9)
-    assert back[-1][1].status is not Tracking.HELD
+    assert back[-1][1].status is not TrackingStatus.HELD
 
 
 def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> None:
@@ -129,10 +129,10 @@ def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> Non
         tracked = track(chain, q, target, branch=FRONT_UP, since=since)
         assert np.abs(tracked.best.q - q).max() < 2 * HOP
         if azimuth <= chain.upper[0]:
-            assert tracked.status is Tracking.OK
+            assert tracked.status is TrackingStatus.OK
         else:
             assert tracked.best.q[0] == pytest.approx(chain.upper[0], abs=1e-12)
-            held += tracked.status is Tracking.HELD
+            held += tracked.status is TrackingStatus.HELD
         q, since = tracked.best.q, target
     # Beyond the gap the place is reachable, but only the long way round.
     assert held > 20
@@ -153,7 +153,7 @@ def test_over_axis_1_the_arm_does_not_turn_round_by_itself(chain: Chain) -> None
         assert np.abs(tracked.best.q - q).max() < 2 * HOP
         assert abs(tracked.best.q[0]) < 1e-9
         q, since = tracked.best.q, target
-    assert tracked.status is Tracking.HELD
+    assert tracked.status is TrackingStatus.HELD
     assert forward(chain, q)[0, 3] == pytest.approx(0.0, abs=1e-9)
     axis, far = tracked.leap_ahead()
     assert axis == 0
@@ -200,7 +200,7 @@ def test_what_is_reached_is_reached_exactly(chain: Chain, rng: np.random.Generat
         q = rng.uniform(chain.lower + 0.1, chain.upper - 0.1)
         wished = ToolTarget.at(chain, q + rng.normal(scale=0.02, size=5))
         tracked = track(chain, q, wished, branch=branch_of(chain, q))
-        if tracked.status is Tracking.OK:
+        if tracked.status is TrackingStatus.OK:
             assert np.allclose(forward(chain, tracked.best.q)[:3, 3], wished.position, atol=1e-12)
             assert pitch_and_roll(chain, tracked.best.q) == pytest.approx(
                 (wished.pitch, wished.roll), abs=1e-9
@@ -319,5 +319,5 @@ def test_a_pitch_that_no_hop_leads_to_turns_nothing_away(chain: Chain) -> None:
         tracked = track(chain, q, target, branch=branch_of(chain, q), reading=Reading.PITCH)
         pitch, _ = pitch_and_roll(chain, tracked.best.q)
         was, now = (math.remainder(p - target.pitch, math.tau) for p in (since.pitch, pitch))
-        if np.abs(tracked.best.q - q).max() > HOP or tracked.status is Tracking.HELD:
+        if np.abs(tracked.best.q - q).max() > HOP or tracked.status is TrackingStatus.HELD:
             assert abs(now) <= abs(was) + 1e-9

@@ -35,7 +35,8 @@ Priority = Literal["pose", "pitch", "position"]
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A 5-axis arm with its tool, made by `katana450.load`. It never changes.
+    """A 5-axis arm with its tool, made by `katana450.load`. It never changes; it plans for one
+    thread at a time.
 
     Lengths are in m, angles in rad, times in s. ``T`` is a pose (4, 4): it maps coordinates of the
     tool into the frame chosen in `load`. ``q`` are the n = 5 joint angles. Wherever an argument has

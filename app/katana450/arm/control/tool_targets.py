@@ -21,7 +21,7 @@ from katana450.arm.control.modes import (
     Tracking,
 )
 from katana450.arm.control.motion_stepper import wished_twist
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.state import GRIPPER_LIMITS, Reason, State
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.projection import project
@@ -29,6 +29,9 @@ from katana450.maths.kinematics.tracker import track
 
 STILL = frozen(np.zeros(5))
 """The rates of a jog that ends."""
+
+KEPT = (Reason.PAUSED, Reason.CONTACT, *GRIPPER_LIMITS)
+"""The reasons that a jog does not work out anew."""
 
 
 def with_pose_target(arm: Arm, state: State, target: PoseTarget) -> State:
@@ -98,9 +101,9 @@ def jogged(arm: Arm, state: State, jogging: Jogging, rest: FloatArray) -> State:
     So the arm does come to rest there when the jog is not renewed.
     """
     chain = arm.chain_to(state.tool)
-    contact = tuple(f for f in state.findings if f.reason is Reason.CONTACT)
+    kept = tuple(f for f in state.findings if f.reason in KEPT)
     held = of_jog(chain, state.setpoint, wished_twist(chain, state.setpoint, jogging))
-    aimed = replace(state, goal=rest, branch=branch_of(chain, rest), findings=contact + held)
+    aimed = replace(state, goal=rest, branch=branch_of(chain, rest), findings=kept + held)
     if state.t < jogging.until:
         return aimed
     # Braked as a jog, in step, the tool stays on its way.

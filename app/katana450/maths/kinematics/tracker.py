@@ -69,7 +69,7 @@ WORTH_A_LEAP: Final = 5e-5
 missed."""
 
 
-class Tracking(Enum):
+class TrackingStatus(Enum):
     """How the goal stands to the target."""
 
     OK = "ok"
@@ -91,15 +91,15 @@ class Tracked:
     since: ToolTarget | None = None
 
     @property
-    def status(self) -> Tracking:
+    def status(self) -> TrackingStatus:
         """HELD when a better pose lies beyond a gap, OK when nothing worth telling is given up."""
         if self.ahead is not None:
-            return Tracking.HELD
+            return TrackingStatus.HELD
         given_up = (
             self.best.position_error > POSITION_WORTH_TELLING
             or self.best.rotation_error > ANGLE_WORTH_TELLING
         )
-        return Tracking.LIMITED if given_up else Tracking.OK
+        return TrackingStatus.LIMITED if given_up else TrackingStatus.OK
 
     def leap_ahead(self) -> tuple[int, float]:
         """The axis (from 0) that would leap farthest to the pose ahead, and how far [rad]."""

@@ -12,7 +12,7 @@ KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
 """[s, s, probes] A host that is gone without a word is noticed within 11 s."""
 
 
-class Heartbeat:
+class LastHeartbeat:
     """The newest sign of life of one participant, stamped as it is handled."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -34,7 +34,7 @@ class Heartbeat:
         return 0.0
 
 
-class Arrival(Heartbeat):
+class Arrival(LastHeartbeat):
     """The newest sign of life on one TCP connection, stamped by the kernel on arrival.
 
     A message counts from when it arrived: one that is handled late is no later sign of life, and

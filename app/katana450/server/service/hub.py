@@ -20,7 +20,7 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import Rates
 from katana450.server.service.command_gate import CommandGate
 from katana450.server.service.event_log import Journal
-from katana450.server.service.heartbeats import Heartbeat
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.interfaces import Arm, Behind
 from katana450.server.service.program_runner import ProgramRunner
 from katana450.server.service.scenes import Scenes
@@ -42,7 +42,7 @@ class Window:
     person: Person
     number: int
     tell: Callable[[dict[str, Any]], None]
-    heartbeat: Heartbeat
+    heartbeat: LastHeartbeat
     channel: CommandChannel
 
     @property
@@ -100,7 +100,7 @@ class Hub:
         visitor: Identity,
         page: str,
         tell: Callable[[dict[str, Any]], None],
-        heartbeat: Heartbeat | None = None,
+        heartbeat: LastHeartbeat | None = None,
         channel: CommandChannel = CommandChannel.PAGE,
     ) -> Window:
         """A page opens its control socket; one that comes back is who it was.
@@ -114,7 +114,7 @@ class Hub:
         self._remembered[key] = (person, number)
         while len(self._remembered) > REMEMBERED:
             self._remembered.pop(next(iter(self._remembered)))
-        window = Window(person, number, tell, heartbeat or Heartbeat(self.clock), channel)
+        window = Window(person, number, tell, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
         self.beat(window)
         return window

@@ -21,7 +21,7 @@ from katana450.extensions.programs.source import LARGEST
 from katana450.server.api import answers
 from katana450.server.api.fields import Order
 from katana450.server.service.command_gate import RunningProgram
-from katana450.server.service.heartbeats import Heartbeat
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.program_planning import Planning
 from katana450.server.web.authenticator import Identity
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-class _Here(Heartbeat):
+class _Here(LastHeartbeat):
     """A program runs in this thread and so is always there; its owner is watched instead."""
 
     @property

@@ -49,7 +49,7 @@ class Ruling(Enum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FilterResult:
     """On one message.
 
     Attributes:
@@ -73,7 +73,7 @@ class Firewall:
         self.dropped: Counter[str] = Counter()
         """Bad messages by their type."""
 
-    def judge(self, data: bytes | None, t: float) -> Verdict:
+    def judge(self, data: bytes | None, t: float) -> FilterResult:
         """Of a message that came at ``t`` [s]; ``data`` is None for one of text."""
         if not self._flood.take(t):
             return self._drop("flood", "it comes too fast", t)
@@ -81,7 +81,7 @@ class Firewall:
             return self._drop("none", "it is too long or no bytes", t, NO_MESSAGE)
         seen = _seen(data)
         if seen is not None:
-            return Verdict(Ruling.DROP, seen=seen)
+            return FilterResult(Ruling.DROP, seen=seen)
         try:
             message = wire.Message.deserialize(data)
         except Exception as error:
@@ -90,9 +90,9 @@ class Firewall:
         objection = self._guard.objection(message)
         if objection is not None:
             return self._drop(type(message).__name__, objection, t)
-        return Verdict(Ruling.PASS)
+        return FilterResult(Ruling.PASS)
 
-    def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> Verdict:
+    def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
         self.dropped[kind] += 1
         told = self.dropped.total()
         if told <= TOLD:
@@ -100,7 +100,7 @@ class Firewall:
         if told == TOLD:
             log.warning("More of %s is dropped without a word.", self._who)
         patient = self._patience.take(t, weight)
-        return Verdict(Ruling.DROP if patient else Ruling.CLOSE)
+        return FilterResult(Ruling.DROP if patient else Ruling.CLOSE)
 
 
 def _seen(data: bytes) -> int | None:

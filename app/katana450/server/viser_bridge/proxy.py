@@ -16,7 +16,7 @@ from katana450.server.service.hub import Hub, key_of
 from katana450.server.viser_bridge.flow import Flow
 from katana450.server.viser_bridge.frames import HATCH_HEADER, FrameSlot
 from katana450.server.viser_bridge.guard import Guard
-from katana450.server.viser_bridge.message_filter import Firewall, Ruling, Verdict
+from katana450.server.viser_bridge.message_filter import FilterResult, Firewall, Ruling
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
 from katana450.server.web.authenticator import NOT_YOU, Authenticator, Identity
 from katana450.server.web.control_socket import PAGE
@@ -176,7 +176,7 @@ class _Line:
                 self._unwelcome = True
                 return
 
-    def _note(self, verdict: Verdict) -> bool:
+    def _note(self, verdict: FilterResult) -> bool:
         """Take in which frames are on the screen; False for a browser that lies about it."""
         if verdict.seen is None:
             return True
