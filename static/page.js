@@ -151,8 +151,9 @@
     const { mine, holder, windows, asking: wanting } = status;
     const wants = mine && wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
-    const watching = windows > 1 ? `, ${windows} windows` : "";
-    text("name", wants || `${status.name}${status.role === "viewer" ? ", watching" : ""}${watching}`);
+    // Programs count too.
+    const connected = windows > 1 ? `, ${windows} connected` : "";
+    text("name", wants || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
     const key = JSON.stringify([mine, holder, status.asked, wanting, status.others]);
     if (key !== drawnActs) {
       drawnActs = key;

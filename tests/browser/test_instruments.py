@@ -198,6 +198,8 @@ def test_a_watchers_knob_springs_back_and_says_why(
     with connect(server.url, "Octave") as other:
         other.ask(requests.Acquire())
         page.wait_until(lambda: bar(page, "holder") == "Octave drives", "who drives")
+        # A program is no window.
+        assert bar(page, "name").endswith(", 2 connected")
         before = goal(page, "axis-2")
         turn(page, "axis-2", -30.0)
         page.wait_until(lambda: bar(page, "toast") == "Octave holds the arm: ask for it.", "why")

@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import Status
+from katana450.client import connect
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.api import requests
 from katana450.server.view.room import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.test_gateway import take
 from tests.gateway.slow_link import SlowLink
 
 MOVE = "/target/move"
@@ -267,6 +270,26 @@ def test_on_a_phone_by_night_and_a_slow_line_all_is_dark_and_seen_from_the_first
         assert sky.min() > 200
         page.page.emulate_media(color_scheme="dark")
         assert page.errors == []
+
+
+def test_buttons_of_the_lease_fit_on_a_phone(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=PORTRAIT, **PHONE)
+    with connect(server.url, "An arm driver with a long name") as other:
+        take(page)
+        page.wait_until(lambda: page.page.locator("#acts select").count(), "the other")
+        assert overhang(page) <= 0.0
+        other.ask(requests.Take())
+        page.wait_until(lambda: page.page.get_by_text("Take over").count(), "who drives")
+        assert overhang(page) <= 0.0
+
+
+def overhang(page: ViserPage) -> float:
+    """How far the bar's last button is beyond the right edge of the screen, in pixels."""
+    right: float = page.page.evaluate(
+        "() => Math.max(...[...document.querySelector('#acts').children]"
+        ".map((each) => each.getBoundingClientRect().right))"
+    )
+    return right - PORTRAIT[0]
 
 
 def in_view(page: ViserPage, text: str) -> bool:
