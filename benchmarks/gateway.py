@@ -29,6 +29,7 @@ import zstandard
 from websockets.asyncio.client import ClientConnection, connect
 
 from benchmarks.start_and_idle import cpu_seconds
+from katana450.assembly.routes import application
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.viser_bridge.guard import Guard
@@ -37,7 +38,6 @@ from katana450.server.viser_bridge.viser_server import KEY_HEADER, open_server
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
 from katana450.server.web.listen import listen
-from katana450.server.web.routes import application
 from tests.gateway.client import enter, page_name, websocket
 
 KEY = "known to both halves of this benchmark"

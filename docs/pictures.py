@@ -16,7 +16,7 @@ from katana450.client import Client, connect
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.server.api import answers, requests
-from katana450.server.view.cameras import FOV, LOOKS, Preset
+from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
 from tests.browser.server import AppServer

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import READINGS, room
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.cli.main import main
 from katana450.extensions.reachability.reachability_file import load_map
 from katana450.extensions.reachability.view import Cut
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
-from katana450.server.view.texts import READINGS, room
 from katana450.settings import Settings
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage

@@ -11,8 +11,9 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.server.view.cameras import AHEAD, LOOKS, Preset
-from katana450.server.view.room import DARK, LIGHT
+from katana450.server.view.cameras import AHEAD
+from katana450.server.viser_bridge.presets import LOOKS, Preset
+from katana450.server.viser_bridge.themes import DARK, LIGHT
 from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage

@@ -15,7 +15,7 @@ from katana450.arm.control.state import Status
 from katana450.client import connect
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import requests
-from katana450.server.view.room import DARK
+from katana450.server.viser_bridge.themes import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

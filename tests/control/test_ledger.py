@@ -9,9 +9,9 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import Entry, news
+from katana450.arm.control.messages import REASONS, STATUS, sentence
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State, Status
-from katana450.server.view.texts import REASONS, STATUS, sentence
 
 TICK = 0.01
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.findings import of_projection
+from katana450.arm.control.messages import told
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.maths.geometry import se3, so3
@@ -16,7 +17,6 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.reading import Reading
-from katana450.server.view.texts import told
 
 COUNT = 300
 

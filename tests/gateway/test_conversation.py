@@ -10,7 +10,7 @@ from katana450.arm.control.lease import Role
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
-from katana450.server.web.authenticator import Identity
+from katana450.server.service.identity import Identity
 from katana450.server.web.channel import FAREWELL, GoneError
 from katana450.server.web.program_socket import Program
 

@@ -19,8 +19,8 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.derived import once
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import Arm
-from katana450.server.web.authenticator import Identity
 
 
 def _snapshot() -> Snapshot:

@@ -28,8 +28,8 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub, Window, key_of, visiting
+from katana450.server.service.identity import Identity
 from katana450.server.service.nodes import Nodes
-from katana450.server.web.authenticator import Identity
 from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")

@@ -25,7 +25,7 @@ from katana450.extensions.render.water import CUP
 from katana450.maths.geometry import se3
 from katana450.png import png
 from katana450.resources import URDF_PATH
-from katana450.server.view.room import DARK, LIGHT, THEMES
+from katana450.server.viser_bridge.themes import DARK, LIGHT, THEMES
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
 from tests.render.conftest import Workshop

@@ -10,7 +10,7 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.cameras import FOV, LOOKS, Preset
+from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
 
 ASPECT = 1.2
 """Width to height of the scene in a window of 1280 by 800 beside the panel."""

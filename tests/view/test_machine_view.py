@@ -17,11 +17,10 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.looks import PERSONAL
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel, page
 from katana450.server.view.paint import PaintNodes
-from katana450.server.view.programs import STEERING
+from katana450.server.viser_bridge.labels import PERSONAL, STEERING
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 from tests.view.gestures import RecordedGestures

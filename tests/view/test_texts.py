@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.choices import Choice
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State, Status
-from katana450.maths.collision.contact import Contact
-from katana450.maths.kinematics.branch import BRANCHES
-from katana450.maths.kinematics.branch_metrics import BranchMetrics
-from katana450.maths.kinematics.reading import Reading
-from katana450.server.view.texts import (
+from katana450.arm.control.messages import (
     AXIS_NAMES,
     BRANCH_HEADINGS,
     READING_HINTS,
@@ -32,6 +26,12 @@ from katana450.server.view.texts import (
     sentence,
     title,
 )
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.maths.collision.contact import Contact
+from katana450.maths.kinematics.branch import BRANCHES
+from katana450.maths.kinematics.branch_metrics import BranchMetrics
+from katana450.maths.kinematics.reading import Reading
 from katana450.server.view.view import GHOST_COLOURS
 
 

@@ -11,6 +11,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
+from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import Described, recognised
 from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
@@ -21,7 +22,6 @@ from katana450.server.view.follower import Follower
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.view import View, ViewOptions
-from katana450.server.web.web_server import Gateway
 
 
 def attached(

@@ -132,8 +132,8 @@ def _run(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
 
 def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
     from katana450.arm.robot.object_meshes import Meshes
+    from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server
-    from katana450.server.web.web_server import Gateway
 
     kept = Meshes()
     kept.put(outfit.meshes, ())

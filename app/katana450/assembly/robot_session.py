@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
 
+from katana450.arm.control.messages import UNCHECKED
 from katana450.arm.control.session import Session
 from katana450.arm.control.things import Hand, Thing
 from katana450.arm.drivers.simulated import SimulatedDriver
@@ -26,7 +27,6 @@ from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.errors import RobotDescriptionError
-from katana450.server.view.texts import UNCHECKED
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)

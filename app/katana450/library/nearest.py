@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields, replace
 import numpy.typing as npt
 
 from katana450.arm.control.findings import of_projection
+from katana450.arm.control.messages import REASONS
 from katana450.errors import InputError
 from katana450.library.pose_frame import PoseFrame
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.reading import Reading
-from katana450.server.view.texts import REASONS
 
 PRIORITIES = {"pose": Reading.POSE, "pitch": Reading.PITCH, "position": Reading.POSITION}
 

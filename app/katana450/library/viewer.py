@@ -20,9 +20,9 @@ from katana450.arm.robot.props import load_props
 from katana450.errors import ConfigurationError, InputError
 from katana450.library.motion_plan import MotionPlan
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.view.cameras import FOV, LOOKS, Preset
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
+from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
 
 if TYPE_CHECKING:
     from katana450.library.arm import Arm

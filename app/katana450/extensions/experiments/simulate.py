@@ -6,6 +6,7 @@ import sys
 from argparse import Namespace
 from datetime import datetime
 
+from katana450.arm.control.messages import part
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
 from katana450.extensions.programs.clocked_run import planned, played
@@ -13,7 +14,6 @@ from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.extensions.report.report import Report
-from katana450.server.view.texts import part
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."

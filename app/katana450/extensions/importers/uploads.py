@@ -19,8 +19,9 @@ from katana450.extensions.importers.shape_file import LONGEST_NAME, MOST_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
 from katana450.server.web.admission import identity
-from katana450.server.web.authenticator import Authenticator, Identity
+from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import (
     NOT_NOW,
     NOT_UNDERSTOOD,

@@ -16,7 +16,7 @@ from katana450.extensions.render.scene import Bools, Floats, Ints, Item, Scene
 from katana450.extensions.render.shading import Stuff, developed, shaded
 from katana450.extensions.render.sight import FLOOR, NOWHERE, Sight, look, through
 from katana450.extensions.render.tracer import Tracer
-from katana450.server.view.room import Theme
+from katana450.server.viser_bridge.themes import Theme
 
 STILL, MOVING = 4, 1
 """Rays of each kind for a pixel: of a picture, of one in a film."""

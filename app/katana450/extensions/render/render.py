@@ -32,8 +32,9 @@ from katana450.extensions.render.picture import MOVING, STILL, picture
 from katana450.extensions.render.stage import Stage
 from katana450.extensions.render.tracer import check_traceable
 from katana450.png import png
-from katana450.server.view.cameras import FOV, Preset, look_from
-from katana450.server.view.room import THEMES, Theme
+from katana450.server.view.cameras import look_from
+from katana450.server.viser_bridge.presets import FOV, Preset
+from katana450.server.viser_bridge.themes import THEMES, Theme
 from katana450.settings import Settings
 
 Pixels = npt.NDArray[np.uint8]

@@ -9,7 +9,8 @@ from katana450.extensions.render.light import Light
 from katana450.extensions.render.scene import Floats, light_of
 from katana450.extensions.render.shading import Lamp, lamp
 from katana450.extensions.render.sight import Sight
-from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM, Theme
+from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM
+from katana450.server.viser_bridge.themes import Theme
 
 LAMPS: tuple[Lamp, ...] = (
     lamp(KEY, (255, 250, 242), 1.08),

@@ -25,8 +25,8 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
 from katana450.maths.planning.tool_path import ToolPath
 from katana450.png import png
-from katana450.server.view.room import LIGHT
 from katana450.server.view.traces import DESIRED, PLACES, coloured
+from katana450.server.viser_bridge.themes import LIGHT
 
 SIZE = 880, 550
 

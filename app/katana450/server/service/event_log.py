@@ -11,9 +11,9 @@ from datetime import UTC, datetime
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.event_log import Entry
+from katana450.arm.control.messages import told
 from katana450.arm.control.state import Reason
 from katana450.arm.runtime.state_publisher import KEPT
-from katana450.server.view.texts import told
 
 log = logging.getLogger(__name__)
 

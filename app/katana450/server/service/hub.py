@@ -21,11 +21,11 @@ from katana450.server.api.fields import Rates
 from katana450.server.service.command_gate import CommandGate
 from katana450.server.service.event_log import Journal
 from katana450.server.service.heartbeats import LastHeartbeat
+from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import Arm, Behind
 from katana450.server.service.program_runner import ProgramRunner
 from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_state import Presses, Stopped
-from katana450.server.web.authenticator import Identity
 from katana450.settings import Settings
 
 TICK = 0.02

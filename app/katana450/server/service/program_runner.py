@@ -22,8 +22,8 @@ from katana450.server.api import answers
 from katana450.server.api.fields import Order
 from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.heartbeats import LastHeartbeat
+from katana450.server.service.identity import Identity
 from katana450.server.service.program_planning import Planning
-from katana450.server.web.authenticator import Identity
 
 if TYPE_CHECKING:
     from katana450.server.service.hub import Hub, Window

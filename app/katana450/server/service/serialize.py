@@ -11,6 +11,7 @@ from katana450.arm.control import state as control
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
+from katana450.arm.control.messages import sentence, told
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
 from katana450.arm.robot.mounted_arm import MountedArm
@@ -27,7 +28,6 @@ from katana450.server.service.derived import once
 from katana450.server.service.event_log import UNITS, Line
 from katana450.server.service.hub import Hub
 from katana450.server.service.interfaces import Arm
-from katana450.server.view.texts import sentence, told
 
 
 def finding(found: control.Finding) -> answers.Finding:

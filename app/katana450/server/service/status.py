@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from katana450.arm.control.messages import headline, mood, sentence
 from katana450.arm.control.state import State, Status
 from katana450.server.api.answers import Progress
 from katana450.server.api.fields import Order
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.program_planning import Stage
-from katana450.server.view.programs import RUNS
-from katana450.server.view.texts import headline, mood, sentence
+from katana450.server.service.steering import RUNS
 
 NO_STATE = 0.3
 """[s] Without a word of the arm's process, after which its state counts as unknown."""

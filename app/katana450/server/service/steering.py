@@ -16,6 +16,9 @@ from katana450.server.service.program_runner import ProgramRunner
 PATIENCE = 2.0
 """[s] Until the panel gives up on an answer."""
 
+RUNS = ("running", "paused", "blocked")
+"""States of a program that holds the arm, as `answers.Progress.status`."""
+
 
 class Steering:
     """What the panel may ask; done in the gateway's one thread."""

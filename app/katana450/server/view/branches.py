@@ -15,12 +15,12 @@ import viser
 
 from katana450.arm.control.choices import Choice
 from katana450.arm.control.commands import TakeBranch
+from katana450.arm.control.messages import BRANCH_HEADINGS, badge
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.server.view.controls import Listen
 from katana450.server.view.scene import Colour, GhostNodes
-from katana450.server.view.texts import BRANCH_HEADINGS, badge
 
 COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (216, 67, 121))
 """One for each of BRANCHES, told apart by people of every kind of sight; the table has them too."""

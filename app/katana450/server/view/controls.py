@@ -13,6 +13,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.state import State
 from katana450.errors import KatanaError, LeaseError
+from katana450.server.viser_bridge.labels import PACING
 
 WORTH_SENDING = 2e-6
 """[deg, mm] Rounding on the way to radians and back is less."""
@@ -33,9 +34,6 @@ Clickable = (
 
 Listen = Callable[[Clickable, Callable[[], cmd.Command]], None]
 """Sends what the function makes when a person, not this program, changes the handle."""
-
-PACING = ("Motion", "Speed")
-"""Labels of the controls that pause, resume and slow down whatever moves."""
 
 ORDERS: dict[str, cmd.Command] = {
     "Pause": cmd.Pause(),

@@ -8,7 +8,7 @@ from html import escape
 import viser
 
 from katana450.arm.control.event_log import Entry
-from katana450.server.view.texts import told
+from katana450.arm.control.messages import told
 
 SHOWN = 12
 """Entries in the panel; the log has all, and who drove."""

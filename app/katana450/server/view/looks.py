@@ -8,12 +8,9 @@ from typing import Any
 
 import viser
 
-from katana450.server.view.cameras import Preset
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.room import THEMES
-
-PERSONAL = ("View", "Theme")
-"""Labels of the controls that concern no window but the one they are clicked in."""
+from katana450.server.viser_bridge.presets import Preset
+from katana450.server.viser_bridge.themes import THEMES
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import viser
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.joints import Joints
+from katana450.arm.control.messages import headline, mood, sentence, signed
 from katana450.arm.control.state import State
 from katana450.server.view.controls import (
     GestureGate,
@@ -23,7 +24,6 @@ from katana450.server.view.follower import READOUT_INTERVAL
 from katana450.server.view.ledger import LedgerList
 from katana450.server.view.looks import add_themes
 from katana450.server.view.readout import style
-from katana450.server.view.texts import headline, mood, sentence, signed
 
 GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import viser
 
+from katana450.arm.control.messages import title
 from katana450.arm.robot.camera import camera
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
@@ -16,7 +17,6 @@ from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.room import furnish
-from katana450.server.view.texts import title
 
 
 class MachineView(Follower):

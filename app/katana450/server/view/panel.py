@@ -10,6 +10,14 @@ import viser
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.event_log import Entry
+from katana450.arm.control.messages import (
+    AXIS_NAMES,
+    READING_HINTS,
+    READINGS,
+    UNCHECKED,
+    degrees,
+    millimetres,
+)
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3, so3
@@ -29,14 +37,6 @@ from katana450.server.view.controls import (
 from katana450.server.view.follower import READOUT_INTERVAL
 from katana450.server.view.ledger import LedgerList
 from katana450.server.view.looks import Shows, add_shows, add_views
-from katana450.server.view.texts import (
-    AXIS_NAMES,
-    READING_HINTS,
-    READINGS,
-    UNCHECKED,
-    degrees,
-    millimetres,
-)
 
 FARTHEST = 1000.0
 """[mm] Beyond any tool point of the arm: what a typed position may hold."""

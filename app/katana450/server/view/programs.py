@@ -22,14 +22,9 @@ from katana450.extensions.programs.taught import taught
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress as Told
 from katana450.server.api.fields import Order
+from katana450.server.service.steering import RUNS
 from katana450.server.view.controls import GestureGate, refuse
 from katana450.server.view.preview import Preview
-
-STEERING = ("Script", "Program", "Look at", "Teach", "Name")
-"""Labels of the controls that steer a program: who may, the gateway decides."""
-
-RUNS = ("running", "paused", "blocked")
-"""How a program stands that has the arm."""
 
 STEP = 0.1
 """[s] Between two times to look at."""

@@ -5,15 +5,7 @@ from __future__ import annotations
 import math
 from html import escape
 
-from katana450.arm.control.state import State
-from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.maths.geometry import so3
-from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.velocity import limit_distances, singular_values
-from katana450.resources import STATIC
-from katana450.server.view.texts import (
+from katana450.arm.control.messages import (
     ROOM,
     condition,
     degrees,
@@ -23,6 +15,14 @@ from katana450.server.view.texts import (
     sentence,
     signed,
 )
+from katana450.arm.control.state import State
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.velocity import limit_distances, singular_values
+from katana450.resources import STATIC
 
 ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
 

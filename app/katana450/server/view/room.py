@@ -2,34 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-import numpy.typing as npt
 import viser
 
-from katana450.server.view.scene import Colour
-
-
-@dataclass(frozen=True)
-class Theme:
-    """Colours of the room. dark: whether the panel is dark too."""
-
-    floor: Colour
-    cell: Colour
-    section: Colour
-    sky: Colour
-    shadow: float
-    dark: bool
-
-
-LIGHT = Theme((226, 231, 236), (207, 213, 220), (178, 187, 197), (247, 249, 251), 0.35, dark=False)
-DARK = Theme((38, 42, 48), (50, 55, 62), (70, 77, 87), (22, 24, 28), 0.6, dark=True)
+from katana450.server.viser_bridge.themes import LIGHT, Theme, gradient
 
 FLOOR_AT = -0.0255
 """[m] The table lies on the floor, a hair above it so that nothing flickers."""
-
-THEMES = {"Light": LIGHT, "Dark": DARK}
 
 
 def furnish(server: viser.ViserServer) -> None:
@@ -67,9 +45,3 @@ def _paint(scene: viser.SceneApi, theme: Theme) -> None:
         position=(0.0, 0.0, FLOOR_AT),
     )
     scene.set_background_image(gradient(theme.sky, theme.floor), format="png")
-
-
-def gradient(top: Colour, bottom: Colour) -> npt.NDArray[np.uint8]:
-    """The sky as a picture (128, 2, 3): from ``top`` down to ``bottom``."""
-    rows: npt.NDArray[np.uint8] = np.linspace(top, bottom, 128).round().astype(np.uint8)
-    return np.repeat(rows[:, None, :], 2, axis=1)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import viser
 
+from katana450.arm.control.messages import title
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import PoseTarget, State, Status, ToolTarget
 from katana450.arm.robot.object_meshes import Meshes
@@ -18,7 +19,7 @@ from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.extensions.programs.script_files import Scripts
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.server.view.cameras import Cameras, Preset
+from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.ellipsoid import Ellipsoid
 from katana450.server.view.follower import Follower
@@ -31,9 +32,9 @@ from katana450.server.view.panel import Panel
 from katana450.server.view.programs import ProgramsPanel, Steering
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
-from katana450.server.view.texts import title
 from katana450.server.view.tint import Tint
 from katana450.server.view.traces import Traces
+from katana450.server.viser_bridge.presets import Preset
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),

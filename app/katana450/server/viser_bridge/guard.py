@@ -14,9 +14,7 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-from katana450.server.view.controls import PACING
-from katana450.server.view.looks import PERSONAL
-from katana450.server.view.programs import STEERING
+from katana450.server.viser_bridge.labels import PACING, PERSONAL, STEERING
 
 WORKSPACE = 1.5
 """[m] No gizmo goes farther from the base in any direction: more than twice the arm's reach."""

@@ -13,12 +13,13 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from katana450.server.service.hub import Hub, key_of
+from katana450.server.service.identity import Identity
 from katana450.server.viser_bridge.flow import Flow
 from katana450.server.viser_bridge.frames import HATCH_HEADER, FrameSlot
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import FilterResult, Firewall, Ruling
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
-from katana450.server.web.authenticator import NOT_YOU, Authenticator, Identity
+from katana450.server.web.authenticator import NOT_YOU, Authenticator
 from katana450.server.web.control_socket import PAGE
 from katana450.server.web.places import Places
 

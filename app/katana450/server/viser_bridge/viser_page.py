@@ -17,7 +17,7 @@ import zstandard
 
 from katana450.errors import ConfigurationError
 from katana450.png import png
-from katana450.server.view.room import THEMES, gradient
+from katana450.server.viser_bridge.themes import THEMES, gradient
 
 INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"
 

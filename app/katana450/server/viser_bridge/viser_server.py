@@ -9,9 +9,9 @@ from typing import Any
 
 import viser
 
-from katana450.server.view.cameras import FOV, LOOKS, Preset
 from katana450.server.viser_bridge import frames
 from katana450.server.viser_bridge.brand import dress
+from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
 
 KEY_HEADER = "X-Katana450-Key"
 """Header in which the gateway shows the key."""

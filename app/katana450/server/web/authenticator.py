@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
+from katana450.server.service.identity import Identity
 from katana450.server.web.access_links import LONGEST_NAME, AccessFile
 
 SESSION_SIZE = 22
@@ -26,15 +27,6 @@ NOT_YOU = 4401
 """Close code for who must come in (again) by the front page."""
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
-
-
-@dataclass(frozen=True)
-class Identity:
-    """Somebody who may come in. ``session`` tells browsers apart; ``name`` is that of the link."""
-
-    session: str
-    name: str | None
-    role: Role
 
 
 @dataclass(frozen=True)

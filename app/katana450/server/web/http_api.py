@@ -23,9 +23,10 @@ from katana450.server.api.fields import ROOT, Id
 from katana450.server.service.budget import FIXED_HTTP, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub, Window, visiting
+from katana450.server.service.identity import Identity
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
-from katana450.server.web.authenticator import Authenticator, Identity
+from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
 
 log = logging.getLogger(__name__)

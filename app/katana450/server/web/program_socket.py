@@ -23,10 +23,11 @@ from katana450.server.service.budget import Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub, Window
+from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import Arm
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import address_of, identity, refuse
-from katana450.server.web.authenticator import NOT_YOU, Authenticator, Identity
+from katana450.server.web.authenticator import NOT_YOU, Authenticator
 from katana450.server.web.channel import NONSENSE, Channel, GoneError, Line, SocketLine
 from katana450.server.web.places import Places
 from katana450.server.web.token_bucket import TokenBucket

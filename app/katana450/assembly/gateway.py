@@ -21,6 +21,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.http11 import Request
 
 from katana450.arm.robot.object_meshes import Meshes
+from katana450.assembly.routes import application
 from katana450.errors import ConfigurationError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
@@ -39,7 +40,6 @@ from katana450.server.web.channel import ARRIVAL
 from katana450.server.web.http_api import RouteProvider
 from katana450.server.web.listen import reaches_beyond
 from katana450.server.web.program_socket import Lines
-from katana450.server.web.routes import application
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)

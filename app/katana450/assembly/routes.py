@@ -20,12 +20,13 @@ from katana450.server.api.fields import LONGEST_PRESS
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub, visiting
+from katana450.server.service.identity import Identity
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web import control_socket, security, static_files
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
-from katana450.server.web.authenticator import Address, Authenticator, Identity
+from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.bodies import body_of
 from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket

@@ -1,0 +1,10 @@
+"""Labels of the controls that the message filter has to tell from the others."""
+
+PACING = ("Motion", "Speed")
+"""Controls that pause, resume and slow down what moves."""
+
+PERSONAL = ("View", "Theme")
+"""Controls that concern only the window in which they are clicked."""
+
+STEERING = ("Script", "Program", "Look at", "Teach", "Name")
+"""Controls of programs. The program runner decides who may use them."""
