@@ -1,4 +1,4 @@
-"""A URDF is read as yourdfpy reads it, once, and without a mesh library."""
+"""A URDF file is read once, by yourdfpy, and nothing of it is lost in plain values."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.robot.description import checked
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.urdf import Urdf, urdf_of
 from katana450.arm.robot.visual import GREY
@@ -62,7 +62,7 @@ def everything(tmp_path: Path) -> Path:
 
 
 def read(path: Path) -> Urdf:
-    return urdf_of(checked(path), path.parent)
+    return urdf_of(path.read_bytes(), path.parent)
 
 
 def paths(tmp_path: Path) -> Iterator[Path]:
@@ -119,23 +119,44 @@ def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         opened.append(args)
         return create(*args, **options)  # type: ignore[arg-type]
 
+    parse = yourdfpy.URDF.load
+
+    def parsed(file: Any, **options: bool) -> yourdfpy.URDF:
+        opened.append(file)
+        return parse(file, **options)
+
     monkeypatch.setattr(expat, "ParserCreate", counted)
+    monkeypatch.setattr(yourdfpy.URDF, "load", parsed)
     robot = load(path)
     values = robot.values(())
     for files in (vrml_files(robot, values), c_files(robot, values), glb_files(robot, values)):
         assert all(files.values())
-    assert len(opened) == 1
+    # Once by the checks, once by yourdfpy.
+    assert len(opened) == 2
 
 
-def test_reading_loads_no_mesh_library() -> None:
+def test_libraries_are_loaded_when_they_are_needed() -> None:
     script = (
-        "import sys; from katana450.arm.robot.loader import load; load();"
-        "print([name for name in ('trimesh', 'yourdfpy', 'coal', 'viser') if name in sys.modules])"
+        "import sys; from katana450.arm.robot.loader import load;"
+        "first = {'trimesh', 'yourdfpy'} & set(sys.modules); load();"
+        "print([*first, *({'coal', 'viser'} & set(sys.modules))])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
     )
     assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    "part",
+    ["<gazebo>" * 300 + "</gazebo>" * 300, f"<gazebo a='{'x' * 11_000_000}'/>"],
+    ids=["deep", "long"],
+)
+def test_file_that_yourdfpy_reads_in_part_is_refused(tmp_path: Path, part: str) -> None:
+    path = tmp_path / "far.urdf"
+    path.write_text(f"<robot name='far'><link name='root'/>{part}</robot>")
+    with pytest.raises(RobotDescriptionError, match=r"far\.urdf cannot be read"):
+        load(path)
 
 
 def test_robot_without_arm_says_why() -> None:

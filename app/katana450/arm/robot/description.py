@@ -60,12 +60,19 @@ SHAPES = ("box", "cylinder", "sphere", "mesh")
 JOINTS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
-def checked(path: Path) -> Element:
-    """Return the outermost element of the URDF file at ``path``, whose every part is sound.
+def checked(path: Path) -> bytes:
+    """Return the contents of the URDF file at ``path``, whose every part is sound.
 
     Raises RobotDescriptionError that names the file, the line and what to do.
     """
-    return _Checks(path).run()
+    if not path.is_file():
+        raise RobotDescriptionError(f"There is no robot description at {path}.")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RobotDescriptionError(f"{path} cannot be opened: {error.strerror}.") from error
+    _Checks(path).run(data)
+    return data
 
 
 @contextmanager
@@ -92,9 +99,9 @@ class _Checks:
         self._path = path
         self._line: dict[Element, int] = {}
 
-    def run(self) -> Element:
-        """Return the outermost element; RobotDescriptionError for the first fault found."""
-        root = self._parsed()
+    def run(self, data: bytes) -> None:
+        """Raise RobotDescriptionError for the first fault in ``data``."""
+        root = self._parsed(data)
         wrong = f"{self._path} is not a robot description:"
         if root.tag != "robot":
             raise RobotDescriptionError(
@@ -112,7 +119,6 @@ class _Checks:
                 "this is xacro, a template that has not been expanded. Expand it first, "
                 f"for instance with: xacro {self._path.name} > robot.urdf",
             ) from error
-        return root
 
     def _check_robot(self, root: Element) -> None:
         if not root.get("name"):
@@ -128,9 +134,7 @@ class _Checks:
             self._check_joint(joint, links)
         self._refuse_loops(links, joints)
 
-    def _parsed(self) -> Element:
-        if not self._path.is_file():
-            raise RobotDescriptionError(f"There is no robot description at {self._path}.")
+    def _parsed(self, data: bytes) -> Element:
         wrong = f"{self._path} is not a robot description:"
         builder = TreeBuilder()
         parser = expat.ParserCreate(namespace_separator="}")
@@ -141,12 +145,8 @@ class _Checks:
         parser.StartElementHandler = start
         parser.EndElementHandler = builder.end
         try:
-            parser.Parse(self._path.read_bytes(), True)
+            parser.Parse(data, True)
             return builder.close()
-        except OSError as error:
-            raise RobotDescriptionError(
-                f"{self._path} cannot be opened: {error.strerror}."
-            ) from error
         except (expat.ExpatError, ValueError, LookupError) as error:
             raise RobotDescriptionError(f"{wrong} its XML is broken, {error}.") from error
 

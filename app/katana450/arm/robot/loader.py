@@ -36,9 +36,9 @@ def load(path: Path = URDF_PATH, tool: str | None = None) -> Robot:
         RobotDescriptionError: the file cannot be read, or there is no arm with that ``tool``;
             names what is wrong and its line.
     """
-    root = checked(path)
+    data = checked(path)
     with explained(path):
-        urdf = urdf_of(root, path.parent)
+        urdf = urdf_of(data, path.parent)
         links, faults = _links_of(urdf, path)
     arm, why = None, ""
     try:

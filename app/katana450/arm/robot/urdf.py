@@ -1,17 +1,15 @@
-"""The elements of a checked URDF file as plain values: links, joints and shapes."""
+"""A URDF file as yourdfpy reads it, in plain values: links, joints and shapes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
-from xml.etree.ElementTree import Element
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.arm.robot.visual import GREY, Color, Visual, box, cylinder, mesh_file, sphere
-from katana450.maths.geometry import se3, so3
+from katana450.arm.robot.visual import GREY, Color, Maker, Visual, box, cylinder, mesh_file, sphere
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
@@ -99,121 +97,102 @@ class Urdf:
         return order
 
 
-def urdf_of(root: Element, folder: Path) -> Urdf:
-    """Return the robot in ``root``, the outermost element of a file that passed the checks.
+class _Stream:
+    """A file that is read once, in one piece.
+
+    After a fault yourdfpy reads a file again, and keeps what its parser makes of the rest.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+
+    def read(self, _: int = -1) -> bytes:
+        data, self._data = self._data, b""
+        return data
+
+
+def urdf_of(data: bytes, folder: Path) -> Urdf:
+    """Return the robot in ``data``, a file that passed the checks.
 
     ``folder``: the folder of the file, which mesh files are named from.
     """
-    colors = {
-        material.get("name"): found
-        for material in root.findall("material")
-        if (found := _color(material)) is not None
-    }
+    # Takes longer to load than to read a file with.
+    import yourdfpy
+
+    options = {"build_scene_graph": False, "load_meshes": False}
+    robot = yourdfpy.URDF.load(_Stream(data), **options).robot
+    colors = {each.name: each.color for each in robot.materials if each.color is not None}
     return Urdf(
-        name=root.attrib["name"],
-        links={e.attrib["name"]: _link(e, colors, folder) for e in root.findall("link")},
-        joints={e.attrib["name"]: _joint(e) for e in root.findall("joint")},
+        name=robot.name,
+        links={link.name: _link(link, colors, folder) for link in robot.links},
+        joints={joint.name: _joint(joint) for joint in robot.joints},
     )
 
 
-def _link(element: Element, colors: Mapping[str | None, Color], folder: Path) -> UrdfLink:
+def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink:
     missing: list[Path] = []
     visuals, collisions = (
         tuple(
             visual
-            for shape in element.findall(tag)
-            if (visual := _visual(shape, known, folder, missing)) is not None
+            for shape in shapes
+            if (visual := _visual(shape, colors, folder, missing)) is not None
         )
-        for tag, known in (("visual", colors), ("collision", {}))
+        for shapes in (link.visuals, link.collisions)
     )
-    inertial = element.find("inertial")
-    mass, center = None, np.zeros(3)
-    if inertial is not None and (mass := inertial.find("mass")) is not None:
-        center = _origin(inertial)[:3, 3]
-    weight = 0.0 if mass is None else max(float(mass.get("value", 0.0)), 0.0)
-    name = element.attrib["name"]
-    return UrdfLink(name, visuals, collisions, weight, frozen(center), tuple(missing))
+    mass, center = 0.0, np.zeros(3)
+    if link.inertial is not None and link.inertial.mass is not None:
+        mass, center = max(link.inertial.mass, 0.0), _origin(link.inertial)[:3, 3]
+    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), tuple(missing))
 
 
-def _joint(element: Element) -> UrdfJoint:
-    axis, limit, mimic = (element.find(tag) for tag in ("axis", "limit", "mimic"))
+def _joint(joint: Any) -> UrdfJoint:
+    limit, mimic = joint.limit, joint.mimic
     return UrdfJoint(
-        name=element.attrib["name"],
-        type=element.attrib["type"],
-        parent=_found(element, "parent").attrib["link"],
-        child=_found(element, "child").attrib["link"],
-        origin=_origin(element),
-        axis=frozen(_numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))),
-        limit=None if limit is None else UrdfLimit(*(_number(limit, k) for k in UrdfLimit._fields)),
-        mimic=None
-        if mimic is None
-        else UrdfMimic(
-            mimic.attrib["joint"],
-            float(mimic.get("multiplier", 1.0)),
-            float(mimic.get("offset", 0.0)),
-        ),
+        name=joint.name,
+        type=joint.type,
+        parent=joint.parent,
+        child=joint.child,
+        origin=_origin(joint),
+        axis=frozen(joint.axis),
+        limit=None if limit is None else UrdfLimit(limit.lower, limit.upper, limit.velocity),
+        mimic=None if mimic is None else UrdfMimic(mimic.joint, mimic.multiplier, mimic.offset),
     )
 
 
 def _visual(
-    element: Element, colors: Mapping[str | None, Color], folder: Path, missing: list[Path]
+    shape: Any, colors: Mapping[str | None, Any], folder: Path, missing: list[Path]
 ) -> Visual | None:
-    """The shape of a <visual> or <collision>; None for a mesh file that joins ``missing``."""
-    material = element.find("material")
-    color = None
-    if material is not None:
-        color = _color(material) or colors.get(material.get("name"))
-    shape = _found(element, "geometry")[0]
-    scale = np.ones(3)
-    match shape.tag:
-        case "box":
-            source = box(_numbers(shape.attrib["size"]))
-        case "cylinder":
-            source = cylinder(float(shape.attrib["radius"]), float(shape.attrib["length"]))
-        case "sphere":
-            source = sphere(float(shape.attrib["radius"]))
-        case _:
-            path = mesh_file(shape.attrib["filename"], folder)
-            if not path.is_file():
-                missing.append(path)
-                return None
-            scale = np.broadcast_to(_numbers(shape.get("scale", "1")), 3)
-            return Visual(_origin(element), frozen(scale), path, color or GREY)
-    return Visual(_origin(element), frozen(scale), source, color or GREY)
+    """The shape of a visual or collision; None for a mesh file that joins ``missing``."""
+    geometry, scale = shape.geometry, np.ones(3)
+    source: Path | Maker
+    if geometry.box is not None:
+        source = box(geometry.box.size)
+    elif geometry.cylinder is not None:
+        source = cylinder(geometry.cylinder.radius, geometry.cylinder.length)
+    elif geometry.sphere is not None:
+        source = sphere(geometry.sphere.radius)
+    else:
+        source = mesh_file(geometry.mesh.filename, folder)
+        if not source.is_file():
+            missing.append(source)
+            return None
+        if geometry.mesh.scale is not None:
+            scale = np.broadcast_to(np.asarray(geometry.mesh.scale, dtype=float), 3)
+    return Visual(_origin(shape), frozen(scale), source, _color(shape, colors))
 
 
-def _color(material: Element) -> Color | None:
-    """Red, green and blue of 255; None for a material that states no color."""
-    color = material.find("color")
+def _color(shape: Any, colors: Mapping[str | None, Any]) -> Color:
+    """Red, green and blue of 255 of its own material, or of that of the robot that it names."""
+    material = getattr(shape, "material", None)
+    if material is None:
+        return GREY
+    color = colors.get(material.name) if material.color is None else material.color
     if color is None:
-        return None
-    red, green, blue = (
-        round(255.0 * min(max(part, 0.0), 1.0))
-        for part in _numbers(color.get("rgba", "1 1 1 1")).tolist()[:3]
-    )
+        return GREY
+    red, green, blue = (round(255.0 * min(max(part, 0.0), 1.0)) for part in color.rgba[:3].tolist())
     return red, green, blue
 
 
-def _origin(element: Element) -> FloatArray:
-    """(4, 4) of the <origin> in ``element`` [m]; the identity without one."""
-    origin = element.find("origin")
-    if origin is None:
-        return frozen(np.eye(4))
-    xyz, rpy = (_numbers(origin.get(name, "0 0 0")).tolist() for name in ("xyz", "rpy"))
-    return frozen(se3.from_rotation_translation(so3.from_rpy(*rpy), xyz))
-
-
-def _found(element: Element, tag: str) -> Element:
-    found = element.find(tag)
-    assert found is not None, f"the checks let a <{element.tag}> without <{tag}> pass"
-    return found
-
-
-def _number(element: Element, name: str) -> float | None:
-    text = element.get(name)
-    return None if text is None else float(text)
-
-
-def _numbers(text: str) -> FloatArray:
-    """The numbers of an attribute; some files put commas between them."""
-    return np.array([float(word) for word in text.replace(",", " ").split()])
+def _origin(element: Any) -> FloatArray:
+    """(4, 4) of its origin [m]; the identity where none is stated."""
+    return frozen(np.eye(4) if element.origin is None else element.origin)

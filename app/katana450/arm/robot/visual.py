@@ -17,7 +17,7 @@ Color = tuple[int, int, int]
 """Red, green and blue of 255."""
 
 Maker = Callable[[], Any]
-"""Returns a new trimesh [m], so that reading a robot loads no mesh library."""
+"""Returns a new trimesh [m]; most robots are read for their joints alone."""
 
 GREY: Color = (150, 156, 163)
 """The color of a shape without one of its own."""

@@ -89,14 +89,7 @@ def rotation_z(theta: float) -> FloatArray:
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> FloatArray:
     """Rz(yaw) Ry(pitch) Rx(roll), angles in rad: URDF's fixed-axis roll, pitch, yaw."""
-    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cp * cy, sp * (sr * cy) - cr * sy, sp * (cr * cy) + sr * sy],
-            [cp * sy, sp * (sr * sy) + cr * cy, sp * (cr * sy) - sr * cy],
-            [-sp + 0.0, cp * sr, cp * cr],
-        ]
-    )
+    return rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
 
 
 def to_rpy(R: FloatArray) -> tuple[float, float, float]:
