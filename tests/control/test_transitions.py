@@ -193,6 +193,8 @@ def test_a_stop_refuses_all_but_what_is_listed(
     command = example(shipped, begun[Jogging], kind)
     after = run(shipped, stopped, [command, cmd.Batch((cmd.SpeedScale(0.9),))])
     assert isinstance(after.mode, Idle)
+    # One command alone ends a stop.
+    assert (after.stopped is None) == (kind is cmd.ClearStop)
     if not kind.traits.while_stopped:
         assert effect_of(command, stopped) is Effect.REFUSED
         idle = run(shipped, stopped, [cmd.SpeedScale(0.9)])
