@@ -40,7 +40,7 @@ def under_way(arm: Client) -> answers.State:
     return state
 
 
-def again(server: AppServer, seconds: float = 20.0) -> answers.State:
+def again(server: AppServer, seconds: float = 60.0) -> answers.State:
     """What the next front says first."""
     end = time.monotonic() + seconds
     while True:

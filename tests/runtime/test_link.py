@@ -64,6 +64,21 @@ def until(true: Callable[[], bool], seconds: float = 5.0) -> None:
         time.sleep(0.005)
 
 
+def test_started_front_has_the_newest_state(ends: Ends) -> None:
+    ours, theirs = multiprocessing.Pipe()
+    arm_end = ArmEnd(ours, ends.loop, ends.mailbox, SILENCE)
+    arm_end.start()
+    slow = FrontEnd(theirs, ends.session.check)
+    ends.front.deliver(cmd.Stop())
+    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
+    until(theirs.poll)
+    time.sleep(0.05)
+    assert slow.board.snapshot.state.stopped is None
+    slow.start()
+    assert slow.board.snapshot.state.stopped is not None
+    arm_end.close()
+
+
 def test_a_command_goes_over_and_its_ticket_comes_back(ends: Ends) -> None:
     tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]

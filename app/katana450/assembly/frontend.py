@@ -27,9 +27,10 @@ from katana450.server.view.view import View, ViewOptions
 def attached(
     gateway: Gateway, outfit: FrontendConfig, meshes: Meshes, pipe: Connection
 ) -> tuple[FrontEnd, Follower]:
-    """The front's end of ``pipe``, and the view, neither running yet; ``gateway`` has the arm.
+    """Connect ``gateway`` to the arm and return the front's end of ``pipe`` and the view.
 
-    ``meshes``: those that things are of. Raises ConfigurationError, EOFError.
+    The link runs by then, so that nobody is answered with a state older than the link; the view is
+    not started. ``meshes``: the meshes of scene objects. Raises ConfigurationError, EOFError.
     """
     settings, layers = outfit.settings, _layers(outfit.options)
     found = recognised(settings, outfit.urdf, outfit.tool)
@@ -40,6 +41,7 @@ def attached(
         for layer in layers:
             if layer.what:
                 raise ConfigurationError(f"{layer.what} {robot.why}")
+        link.start()
         gateway.attach(ArmHandle(robot, session, link, None, nodes))
         return link, _machine_view(gateway, outfit, robot, link)
     besides = ViewOptions(layers, (gateway.steering, Scripts(settings.programs)), meshes)
@@ -47,6 +49,7 @@ def attached(
     view = _view(gateway, outfit, found, link, besides)
     navigator.tell = gateway.announce
     navigator.redirected = gateway.steering.redirected
+    link.start()
     gateway.attach(ArmHandle(robot, session, link, navigator, nodes))
     return link, view
 

@@ -147,7 +147,6 @@ def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> Non
         from katana450.assembly.frontend import attached
 
         link, view = attached(gateway, outfit, kept, pipe)
-        link.start()
         view.start()
         # What is there by now stays: looking through it for garbage would keep STOP waiting.
         gc.collect()

@@ -227,7 +227,14 @@ class FrontEnd:
         self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
 
     def start(self) -> None:
-        """Follow the arm in a thread of its own."""
+        """Take in all states that have arrived, then follow the arm in a thread of its own.
+
+        Between construction and start the arm may have moved, or stopped: after this call
+        ``board`` holds the newest state.
+        """
+        with suppress(*GONE):
+            while readable(self._pipe.fileno()):
+                self._take(self._pipe.recv_bytes())
         self._thread.start()
 
     @property
@@ -298,22 +305,25 @@ class FrontEnd:
     def _listen(self) -> None:
         try:
             while True:
-                data = self._pipe.recv_bytes()
-                self._heard = time.monotonic()
-                if self._unsent:
-                    with self._sending:
-                        self._flush()
-                if data == PULSE:
-                    continue
-                news = _loaded(data, self._plans)
-                self.board.lateness = news.lateness
-                seen = self.board.snapshot
-                if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
-                    self.board.pin(_known(news.snapshot, seen), news.ledger)
-                # After the state: whoever is answered finds one that has the command in it.
-                self.board.outcomes.note(news.outcomes)
+                self._take(self._pipe.recv_bytes())
         except GONE:
             self.cut.set()
+
+    def _take(self, data: bytes) -> None:
+        """Publish what ``data`` from the arm's end reports. Raises EOFError when that hangs up."""
+        self._heard = time.monotonic()
+        if self._unsent:
+            with self._sending:
+                self._flush()
+        if data == PULSE:
+            return
+        news = _loaded(data, self._plans)
+        self.board.lateness = news.lateness
+        seen = self.board.snapshot
+        if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
+            self.board.pin(_known(news.snapshot, seen), news.ledger)
+        # After the state: a client that is answered finds one with its command in it.
+        self.board.outcomes.note(news.outcomes)
 
 
 def _known(news: Snapshot, seen: Snapshot) -> Snapshot:
