@@ -73,11 +73,16 @@ def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What a reader found: the surface in the file's own units and axes, and in words what it
-    left out."""
+    """What a reader found: the surface in the file's own units and axes.
+
+    left_out: in words what was not read. unit: metres a unit of the file, if it tells. up: its axis
+    that points up, y or z, if it tells.
+    """
 
     surface: Surface
     left_out: tuple[str, ...] = ()
+    unit: float | None = None
+    up: str | None = None
 
 
 class MeshBuilder:
