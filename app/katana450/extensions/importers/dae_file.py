@@ -1,8 +1,7 @@
 """COLLADA by pycollada, which trimesh reads it with too.
 
-Source: Khronos Group, COLLADA 1.4.1 (2008). trimesh cuts concave polygons into fans and loads longer
-so the parts of the scene are taken from pycollada. No entity is expanded and no other file
-is opened.
+Source: Khronos Group, COLLADA 1.4.1 (2008). trimesh cuts concave polygons into fans, so the parts
+of the scene are taken from pycollada. No entity is expanded and no other file is opened.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def read_3mf(data: bytes, name: str, most: int) -> Reading:
     _check_archive(data, name, most)
     pile = MeshBuilder(name)
     with failures_in_words(name):
-        found = load_3MF(io.BytesIO(data))
+        found = load_3MF(io.BytesIO(data))  # type: ignore[no-untyped-call]
         surfaces = {key: _surface(mesh, name) for key, mesh in found["geometry"].items()}
         for number, item in enumerate(found["graph"]):
             if number >= MOST_COPIES:
