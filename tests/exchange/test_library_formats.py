@@ -7,6 +7,7 @@ import random
 import resource
 import time
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +90,9 @@ MODEL = (
 )
 
 
-def threemf(unit: str = "millimeter", more: str = "", **files: bytes) -> bytes:
+def threemf(
+    unit: str = "millimeter", more: str = "", files: dict[str, bytes] | None = None
+) -> bytes:
     shape = read_shape(off(), Format.OFF, "l", 1e-3)
     vertices = "".join(
         '<vertex x="{:g}" y="{:g}" z="{:g}"/>'.format(*row) for row in shape.vertices * 1e3
@@ -98,7 +101,7 @@ def threemf(unit: str = "millimeter", more: str = "", **files: bytes) -> bytes:
     model = MODEL.format(unit=unit, vertices=vertices, triangles=triangles, more=more)
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in ({"3D/3dmodel.model": model.encode()} | files).items():
+        for name, content in ({"3D/3dmodel.model": model.encode()} | (files or {})).items():
             archive.writestr(name, content)
     return out.getvalue()
 
@@ -188,8 +191,12 @@ ENTITY = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/pa
         (b"PK", Format.THREEMF, "no .zip"),
         (threemf("league"), Format.THREEMF, "'league' is no unit of 3MF"),
         (threemf(more=' transform="nan 0 0 0 1 0 0 0 1 0 0 0"'), Format.THREEMF, "finite|broken"),
-        (threemf(big=bytes(MOST_BYTES)), Format.THREEMF, "more than 20 MB when unpacked"),
-        (threemf(**{f"f{i}": b"" for i in range(300)}), Format.THREEMF, "more than 256 files"),
+        (
+            threemf(files={"big": bytes(MOST_BYTES)}),
+            Format.THREEMF,
+            "more than 20 MB when unpacked",
+        ),
+        (threemf(files={f"f{i}": b"" for i in range(300)}), Format.THREEMF, "more than 256 files"),
         (b"", Format.OFF, "no OFF"),
         (b"OFF BINARY\n", Format.OFF, "no OFF"),
         (b"OFF\n3 1", Format.OFF, "ends too early"),
@@ -241,20 +248,34 @@ def laughing_archive() -> bytes:
         model = archive.read("3D/3dmodel.model").decode()
     model = model.replace("</resources>", f"{objects}</resources>")
     model = model.replace('<item objectid="2"', '<item objectid="29"')
-    return threemf(**{"3D/3dmodel.model": model.encode()})
+    return threemf(files={"3D/3dmodel.model": model.encode()})
 
 
 def bomb() -> bytes:
     """An archive that declares less than it unpacks to."""
-    data = bytearray(threemf(big=bytes(50_000_000)))
+    data = bytearray(threemf(files={"big": bytes(50_000_000)}))
     for at in (data.index(b"big") - 46 + 24, data.rindex(b"big") - 46 + 24):
         data[at : at + 4] = (100).to_bytes(4, "little")
     return bytes(data)
 
 
-@pytest.mark.parametrize("make", [laughing_archive, bomb], ids=["laughs", "bomb"])
-def test_hostile_archive_ends_in_words_in_time(make: object) -> None:
-    assert callable(make)
+def entities(file: str = "") -> bytes:
+    """An archive whose model calls entities by tens of tens, or the text of another file."""
+    rows = [f'<!ENTITY e0 SYSTEM "{file}">' if file else '<!ENTITY e0 "0123456789">']
+    rows += [f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12)]
+    with zipfile.ZipFile(io.BytesIO(threemf())) as archive:
+        model = archive.read("3D/3dmodel.model").decode()
+    name = "&e0;" if file else "&e11;"
+    model = model.replace('<object id="1"', f'<object id="1" name="{name}"')
+    return threemf(files={"3D/3dmodel.model": f"<!DOCTYPE m [{''.join(rows)}]>{model}".encode()})
+
+
+@pytest.mark.parametrize(
+    "make",
+    [laughing_archive, bomb, entities, lambda: entities("file:///etc/passwd")],
+    ids=["laughs", "bomb", "entities", "other file"],
+)
+def test_hostile_archive_ends_in_words_in_time(make: Callable[[], bytes]) -> None:
     data = make()
     start = time.perf_counter()
     with pytest.raises(InputError):
