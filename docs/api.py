@@ -35,7 +35,7 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
 | **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` with a secret key of 16 to 64 letters and digits, chosen by the program, tells programs apart; `X-Name` is the name that others see |
 | **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `query` tells |
-| **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .glb or .gltf file, to be placed by the key in the answer |
+| **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf file, to be placed by the key in the answer |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | what stands around as a .zip ([scenes](scenes.md)); one that is brought waits for a `load` |
 | **HTTP** `POST /api/v{version}/stop` | STOP |
 | **HTTP** `GET /api/v{version}/openapi.json` | all this as OpenAPI |

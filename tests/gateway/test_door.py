@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 from itsdangerous import URLSafeSerializer
+from starlette.responses import Response
 from websockets.exceptions import ConnectionClosed
 
 from katana450.arm.control.lease import Role
@@ -163,12 +164,16 @@ def test_cookies_are_for_our_pages_alone(file: AccessFile) -> None:
     token = file.give("Anna", Role.VIEWER, time.time() + HOUR)
     for address, secure in ((LOOPBACK, False), (OPEN, True), (PROXIED, True)):
         door = Authenticator(file, 8080, address)
-        cookie = door.welcome(token)
-        assert cookie is not None
-        for part in ("HttpOnly", "SameSite=Strict", "Path=/", "Max-Age=3"):
+        response = Response()
+        assert door.welcome(token, response)
+        cookie = response.headers["set-cookie"].lower()
+        assert cookie.startswith(f"katana450-8080={token.lower()};")
+        for part in ("httponly", "samesite=strict", "path=/", "max-age=3"):
             assert part in cookie
-        assert ("Secure" in cookie) is secure
-        assert door.welcome("other") is None
+        assert ("secure" in cookie) is secure
+        response = Response()
+        assert not door.welcome("other", response)
+        assert "set-cookie" not in response.headers
 
 
 # The whole way

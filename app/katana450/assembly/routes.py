@@ -84,14 +84,14 @@ def application(
             raise HTTPException(400, "A token is asked for.") from error
         if not entry.token and door.visitor(request.cookies) is not None:
             return Response(status_code=204)
-        cookie = door.welcome(entry.token)
-        if cookie is None:
+        response = Response(status_code=204)
+        if not door.welcome(entry.token, response):
             # Who has a good link is let in, however many others guess.
             if entry.token and not tries.take(hub.clock()):
                 raise HTTPException(429, "Too many tries. Wait a moment.")
             log.warning("Somebody came with a link that is no good (any more).")
             raise HTTPException(401, "This link is no good, or no good any more. Ask for another.")
-        return Response(status_code=204, headers={"Set-Cookie": cookie})
+        return response
 
     async def stop(request: Request) -> Response:
         """The same as the button, for a page whose socket is gone."""

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+from katana450.srgb import to_light
 
 Colours = npt.NDArray[np.uint8]
 """(m, 4) sRGB and opacity."""
@@ -90,8 +91,7 @@ def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
     assert shape.colours is not None
     alpha = shape.colours[:, 3:] / 255.0 * opacity
     # Colours of vertices are linear there.
-    srgb = shape.colours[:, :3] / 255.0
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    linear = to_light(shape.colours[:, :3] / 255.0)
     blocks = (
         (shape.vertices, np.float32, FLOAT, "VEC3", ARRAY),
         (_normals(shape), np.float32, FLOAT, "VEC3", ARRAY),

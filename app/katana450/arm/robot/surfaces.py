@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from katana450.arm.robot.visual import Visual, unreadable_mesh
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.srgb import to_srgb
 
 EDGE = math.radians(30.0)
 """Between two triangles, from which on they are shaded apart."""
@@ -128,14 +129,9 @@ def _material(mesh: Any, plain: Material) -> Material:
     if factor is None:
         red, green, blue = (float(part) / 255.0 for part in material.main_color[:3])
         return Material(str(material.name or plain.name), (red, green, blue))
-    red, green, blue = (_srgb(float(part) / 255.0) for part in np.asarray(factor)[:3])
+    red, green, blue = to_srgb(np.asarray(factor)[:3] / 255.0).tolist()
     metallic, rough = (
         default if value is None else float(value)
         for value, default in ((material.metallicFactor, 1.0), (material.roughnessFactor, 1.0))
     )
     return Material(str(material.name or plain.name), (red, green, blue), metallic, rough)
-
-
-def _srgb(linear: float) -> float:
-    """IEC 61966-2-1, for glTF tells colours as light."""
-    return 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1.0 / 2.4) - 0.055

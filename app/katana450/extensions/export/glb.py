@@ -19,6 +19,7 @@ from katana450.extensions.export.names import distinct
 from katana450.extensions.export.trajectory_file import Motion
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.srgb import to_light
 
 ARRAY, ELEMENT = 34962, 34963
 FLOAT, USHORT, UINT = 5126, 5123, 5125
@@ -179,16 +180,11 @@ def _material(material: Material) -> dict[str, Any]:
     return {
         "name": material.name,
         "pbrMetallicRoughness": {
-            "baseColorFactor": [*(_linear(part) for part in material.colour), 1.0],
+            "baseColorFactor": [*to_light(material.colour).tolist(), 1.0],
             "metallicFactor": material.metallic,
             "roughnessFactor": material.rough,
         },
     }
-
-
-def _linear(srgb: float) -> float:
-    """IEC 61966-2-1; glTF tells colours as light."""
-    return srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4
 
 
 def _told(joint: Joint) -> dict[str, Any]:

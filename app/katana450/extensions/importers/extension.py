@@ -31,8 +31,8 @@ def add_serve_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE[@x,y,z]",
-        help="an object besides, of a .wrl, .stl, .obj, .ply, .glb or .gltf file; where it stands "
-        "in mm, else in front of the arm; as often as there are",
+        help="an object besides, of a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf "
+        "file; where it stands in mm, else in front of the arm; as often as there are",
     )
 
 

@@ -22,12 +22,12 @@ from katana450.extensions.importers.surface import (
     Reading,
     Surface,
     check_triangles,
-    display,
     doubles,
     of_polygons,
 )
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+from katana450.srgb import to_srgb
 
 Natural = Annotated[int, msgspec.Meta(ge=0)]
 
@@ -291,7 +291,7 @@ class _File:
             factor = own if factor is None else own * factor
         if factor is None:
             return None
-        shown = np.column_stack((display(factor[:, :3]), factor[:, 3]))
+        shown = np.column_stack((to_srgb(factor[:, :3]), factor[:, 3]))
         return np.broadcast_to(shown, (count, 4))
 
     def _numbers(self, number: int, width: int | None) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Shapes of other programs: .wrl, .stl, .obj, .ply, .glb and .gltf as triangles in metres, z up.
+"""Shapes of other programs as triangles in metres, z up: meshes and worlds in nine formats.
 
 A file is a stranger's. Readers open no other file, run nothing, and stop at bounds of their own;
 `read_shape_guarded` adds those of the system, in a process that can be lost.
@@ -12,7 +12,7 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.gltf_file import read_gltf
 from katana450.extensions.importers.obj_file import read_obj
+from katana450.extensions.importers.off_file import read_off
 from katana450.extensions.importers.ply_file import read_ply
 from katana450.extensions.importers.stl_file import read_stl
 from katana450.extensions.importers.surface import Reading, Surface
@@ -59,6 +60,9 @@ class Format(Enum):
     PLY = "ply"
     GLB = "glb"
     GLTF = "gltf"
+    DAE = "dae"
+    THREEMF = "3mf"
+    OFF = "off"
 
     @classmethod
     def of(cls, file: str) -> Format:
@@ -71,6 +75,10 @@ class Format(Enum):
                 f"{', '.join(f'.{each}' for each in known)}."
             )
         return known[suffix]
+
+
+Y_UP = (Format.WRL, Format.GLB, Format.GLTF)
+"""Formats whose standard has y up."""
 
 
 class Up(Enum):
@@ -126,15 +134,16 @@ def read_shape(
         reading = _read(data, format, file)
     except RecursionError as error:
         raise InputError(f"{file} is broken: its parts lie too deep in each other.") from error
+    reading = _in_known_unit(reading, file)
     surface = reading.surface.tidy()
     if not len(surface.faces):
         without = f" It has {_listed(reading.left_out)}." if reading.left_out else ""
         raise InputError(f"{file} has no triangles.{without}")
     sides = np.ptp(surface.vertices, axis=0)
     longest = float(sides.max())
-    told, why = _unit(format, longest, unit)
+    told, why = _unit(format, longest, unit, reading.unit)
     _check_size(longest, told, file)
-    axis = up or (Up.Z if format in (Format.STL, Format.OBJ, Format.PLY) else Up.Y)
+    axis = up or Up(reading.up or ("y" if format in Y_UP else "z"))
     vertices = surface.vertices * told
     if axis is Up.Y:
         vertices = vertices[:, (0, 2, 1)] * (1.0, -1.0, 1.0)
@@ -237,13 +246,39 @@ def _read(data: bytes, format: Format, file: str) -> Reading:
             return read_obj(data, file)
         case Format.PLY:
             return read_ply(data, file)
+        case Format.OFF:
+            return read_off(data, file)
+        # The libraries of these take as long to load as a file takes to read.
+        case Format.DAE:
+            from katana450.extensions.importers.dae_file import read_dae
+
+            return read_dae(data, file)
+        case Format.THREEMF:
+            from katana450.extensions.importers.threemf_file import read_3mf
+
+            return read_3mf(data, file, MOST_BYTES)
     return read_gltf(data, file)
 
 
-def _unit(format: Format, longest: float, told: float | None) -> tuple[float, str]:
+def _in_known_unit(reading: Reading, file: str) -> Reading:
+    """Return the reading in metres if its file tells a unit that is none of UNITS."""
+    if reading.unit is None or reading.unit in UNITS.values():
+        return reading
+    if not 1e-9 < reading.unit < 1e9:
+        raise InputError(f"{file} is broken: its unit has {reading.unit:g} m.")
+    surface = reading.surface
+    scaled = replace(surface, vertices=surface.vertices * reading.unit)
+    return replace(reading, surface=scaled, unit=1.0)
+
+
+def _unit(
+    format: Format, longest: float, told: float | None, of_file: float | None
+) -> tuple[float, str]:
     """Metres a unit, and why."""
     if told is not None:
         return told, f"the unit is {_sign(told)}, as told"
+    if of_file is not None:
+        return of_file, f"the unit is {_sign(of_file)}, as the file tells"
     if format in (Format.GLB, Format.GLTF):
         return 1.0, "the unit is m, as glTF has it"
     if longest > LARGEST * (1.0 + ROUNDING):

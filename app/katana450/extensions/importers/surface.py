@@ -73,11 +73,16 @@ def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What a reader found: the surface in the file's own units and axes, and in words what it
-    left out."""
+    """What a reader found: the surface in the file's own units and axes.
+
+    left_out: in words what was not read. unit: metres a unit of the file, if it tells. up: its axis
+    that points up, y or z, if it tells.
+    """
 
     surface: Surface
     left_out: tuple[str, ...] = ()
+    unit: float | None = None
+    up: str | None = None
 
 
 class MeshBuilder:
@@ -180,10 +185,3 @@ def as_bytes(colours: Iterable[Sequence[float]] | FloatArray) -> Colours:
     """(m, 4) bytes of colours 0..1; what is beyond is brought in."""
     rows = np.nan_to_num(np.asarray(colours, dtype=np.float64))
     return np.rint(np.clip(rows, 0.0, 1.0) * 255.0).astype(np.uint8).reshape(-1, 4)
-
-
-def display(light: FloatArray) -> FloatArray:
-    """sRGB 0..1 of light 0..1 (..., 3), IEC 61966-2-1; glTF tells colours as light."""
-    light = np.clip(np.nan_to_num(light), 0.0, 1.0)
-    root = 1.055 * np.power(light, 1.0 / 2.4) - 0.055
-    return np.where(light <= 0.0031308, 12.92 * light, root)

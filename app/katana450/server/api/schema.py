@@ -112,7 +112,10 @@ def _mesh() -> dict[str, Any]:
         "summary": "Bring a mesh, to be placed by its key.",
         "parameters": [
             _query("name", "The file's name, with its ending.", required=True),
-            _query("format", "wrl, stl, obj, ply, glb or gltf, where the name has no ending."),
+            _query(
+                "format",
+                "wrl, stl, obj, ply, off, glb, gltf, dae or 3mf, where the name has no ending.",
+            ),
             _query("unit", "mm, cm, in or m; without it that is guessed, and said."),
         ],
         **_brought("application/octet-stream", answers.Mesh),

@@ -12,6 +12,8 @@ from ipaddress import ip_address
 from typing import Any
 from urllib.parse import urlsplit
 
+from starlette.responses import Response
+
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
@@ -145,19 +147,17 @@ class Authenticator:
             with suppress(asyncio.CancelledError):
                 await task
 
-    def welcome(self, token: str) -> str | None:
-        """A Set-Cookie header for the bearer of ``token``, or None for who is not let in."""
+    def welcome(self, token: str, response: Response) -> bool:
+        """Set the cookie of the bearer of ``token``; return whether the token is accepted."""
+        max_age = None
         if self._access is None:
-            return self._set(secrets.token_urlsafe(16))
-        known = self._access.check(token, time.time())
-        if known is None:
-            return None
-        return self._set(token, max_age=int(known[1].expires - time.time()))
-
-    def _set(self, value: str, max_age: int | None = None) -> str:
-        parts = [f"{self._cookie}={value}", "Path=/", "HttpOnly", "SameSite=Strict"]
-        if max_age is not None:
-            parts.append(f"Max-Age={max_age}")
-        if self._secure:
-            parts.append("Secure")
-        return "; ".join(parts)
+            token = secrets.token_urlsafe(16)
+        else:
+            known = self._access.check(token, time.time())
+            if known is None:
+                return False
+            max_age = int(known[1].expires - time.time())
+        response.set_cookie(
+            self._cookie, token, max_age, secure=self._secure, httponly=True, samesite="strict"
+        )
+        return True

@@ -1,0 +1,136 @@
+"""COLLADA by pycollada, which trimesh reads it with too.
+
+Source: Khronos Group, COLLADA 1.4.1 (2008). trimesh cuts concave polygons into fans, so the parts
+of the scene are taken from pycollada. No entity is expanded and no other file is opened.
+"""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from collada import Collada
+from collada.common import DaeError
+from collada.material import Map
+from collada.polylist import BoundPolylist
+from collada.primitive import BoundPrimitive
+from collada.triangleset import BoundTriangleSet
+from lxml import etree
+
+from katana450.errors import InputError
+from katana450.extensions.importers.library_errors import failures_in_words
+from katana450.extensions.importers.surface import (
+    MOST_COPIES,
+    MeshBuilder,
+    Reading,
+    Surface,
+    doubles,
+    of_polygons,
+)
+from katana450.maths.geometry.arrays import FloatArray
+
+LEFT_OUT = {
+    "skin": "bones",
+    "morph": "changes of shape",
+    "animation": "motion",
+    "image": "pictures on the surface",
+    "lines": "lines",
+    "linestrips": "lines",
+}
+"""Elements that say what is not read, and the words for it."""
+
+SURFACES = (BoundTriangleSet, BoundPolylist)
+
+X_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""Rotation from x up to y up."""
+
+
+def read_dae(data: bytes, name: str) -> Reading:
+    """Return all polygons of the scene. Raises InputError if the file has none."""
+    root = _document(data, name)
+    pile = MeshBuilder(name)
+    with failures_in_words(name):
+        document = Collada(
+            io.BytesIO(etree.tostring(root)), ignore=[DaeError], aux_file_loader=_no_file
+        )
+        if document.scene is None:
+            raise InputError(f"{name} has no scene that is shown.")
+        for number, part in enumerate(document.scene.objects("geometry")):
+            if number >= MOST_COPIES:
+                raise InputError(f"{name} shows more than {MOST_COPIES} nodes.")
+            for primitive in part.primitives():
+                if isinstance(primitive, SURFACES) and primitive.vertex is not None:
+                    pile.add(_surface(primitive, np.linalg.det(part.matrix[:3, :3]) < 0.0, name))
+        surface = pile.surface()
+        unit = document.assetInfo.unitmeter
+        up = str(document.assetInfo.upaxis)
+    left_out = [said for tag, said in LEFT_OUT.items() if root.find(f".//{{*}}{tag}") is not None]
+    if document.errors:
+        left_out.append(f"{len(document.errors)} parts that are broken")
+    if up == "X_UP":
+        surface = Surface(surface.vertices @ X_UP.T, surface.faces, surface.colours)
+    return Reading(
+        surface,
+        tuple(dict.fromkeys(left_out)),
+        unit=1.0 if unit is None else float(unit),
+        up="z" if up == "Z_UP" else "y",
+    )
+
+
+def _document(data: bytes, name: str) -> etree._Element:
+    """Return the root of a document without entities. Raises InputError with the line."""
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
+    try:
+        root = etree.fromstring(data, parser)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        said = " ".join(str(error).split())[:120].rstrip(".")
+        raise InputError(f"{name} is broken, or no COLLADA: {said}.") from error
+    if root.getroottree().docinfo.doctype:
+        raise InputError(f"{name} declares entities of its own, which are not read.")
+    if etree.QName(root).localname != "COLLADA":
+        raise InputError(f"{name} is no COLLADA: its first element is another.")
+    return root
+
+
+def _no_file(_path: str) -> None:
+    """Find no other file, whatever the file names."""
+
+
+def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> Surface:
+    corners = np.asarray(primitive.vertex_index, dtype=np.int64)
+    sizes = np.full(len(corners), 3)
+    if isinstance(primitive, BoundPolylist):
+        sizes = np.diff(np.asarray(primitive.polyindex, dtype=np.int64).reshape(-1, 2)).ravel()
+    corners = corners.ravel()
+    if (sizes < 0).any() or sizes.sum() != len(corners):
+        raise InputError(f"{name} is broken: its polygons do not have the corners they say.")
+    surface = of_polygons(
+        doubles(primitive.vertex).reshape(-1, 3),
+        corners,
+        sizes,
+        name,
+        corner_colours=_colours(primitive, len(corners), name),
+    )
+    if is_mirrored:
+        return Surface(surface.vertices, surface.faces[:, ::-1], surface.colours)
+    return surface
+
+
+def _colours(primitive: BoundPrimitive, count: int, name: str) -> FloatArray | None:
+    """Return (count, 4) 0..1 of the corners, else of the material; None without any.
+
+    Programs disagree on what is opaque in COLLADA: every surface is.
+    """
+    listed = primitive.original.sources.get("COLOR")
+    if listed:
+        offset, *_, source = listed[0]
+        colours = doubles(source.data)[np.asarray(primitive.index)[..., offset].ravel()]
+    else:
+        effect = getattr(primitive.material, "effect", None)
+        diffuse = getattr(effect, "diffuse", None)
+        if diffuse is None or isinstance(diffuse, Map):
+            return None
+        colours = np.tile(np.asarray(diffuse, dtype=np.float64), (count, 1))
+    if colours.ndim != 2 or colours.shape[1] < 3 or len(colours) != count:
+        raise InputError(f"{name} is broken: it has colours that do not go with its corners.")
+    return np.column_stack((colours[:, :3], np.ones(count)))
