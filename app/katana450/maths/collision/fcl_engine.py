@@ -48,7 +48,7 @@ class Geometry:
     normals: FloatArray
 
 
-class Pose(NamedTuple):
+class ScaledPose(NamedTuple):
     """Rotation (3, 3), translation (3,) [m], and both as FCL has them."""
 
     R: FloatArray
@@ -94,16 +94,16 @@ class FclEngine:
         """Return everything with z <= 0."""
         return Geometry(None, lambda _: np.zeros(3), AXES[2:3])
 
-    def transform(self, T: FloatArray) -> Pose:
+    def transform(self, T: FloatArray) -> ScaledPose:
         """Return the pose ``T`` (4, 4) [m]."""
         R, t = T[:3, :3], T[:3, 3]
-        return Pose(R, t, fcl.Transform(R, SCALE * t))
+        return ScaledPose(R, t, fcl.Transform(R, SCALE * t))
 
-    def distance(self, one: Geometry, T_one: Pose, other: Geometry, T_other: Pose) -> float:
+    def distance(self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose) -> float:
         """Return the distance between two geometries [m]; negative is their depth."""
         return self.witness(one, T_one, other, T_other).distance
 
-    def witness(self, one: Geometry, T_one: Pose, other: Geometry, T_other: Pose) -> Witness:
+    def witness(self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose) -> Witness:
         """Return the nearest points of two geometries."""
         if one.shape is None:
             return _over(T_one, _placed(other, T_other))
@@ -144,12 +144,12 @@ def _oriented(hull: ConvexHull) -> Any:
     return faces
 
 
-def _placed(geometry: Geometry, pose: Pose) -> Support:
+def _placed(geometry: Geometry, pose: ScaledPose) -> Support:
     R, t, support = pose.R, pose.t, geometry.support
     return lambda n: R @ support(n @ R) + t
 
 
-def _over(ground: Pose, body: Support) -> Witness:
+def _over(ground: ScaledPose, body: Support) -> Witness:
     """Return the nearest points of a half-space and a body."""
     up = ground.R[:, 2]
     lowest = body(-up)
@@ -157,7 +157,7 @@ def _over(ground: Pose, body: Support) -> Witness:
     return Witness(height, frozen((lowest - height * up, lowest)), frozen(up))
 
 
-def _directions(one: Geometry, T_one: Pose, other: Geometry, T_other: Pose) -> Iterator[FloatArray]:
+def _directions(one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose) -> Iterator[FloatArray]:
     """Yield unit directions that may lead the second body out of the first."""
     between = T_other.t - T_one.t
     length = float(np.linalg.norm(between))
