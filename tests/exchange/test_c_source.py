@@ -41,7 +41,7 @@ def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
 def processor() -> float:
     """[s] All ended children have used."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    return float(used.ru_utime + used.ru_stime)
 
 
 @pytest.fixture(scope="module")

@@ -99,11 +99,15 @@ class FclEngine:
         R, t = T[:3, :3], T[:3, 3]
         return ScaledPose(R, t, fcl.Transform(R, SCALE * t))
 
-    def distance(self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose) -> float:
+    def distance(
+        self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose
+    ) -> float:
         """Return the distance between two geometries [m]; negative is their depth."""
         return self.witness(one, T_one, other, T_other).distance
 
-    def witness(self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose) -> Witness:
+    def witness(
+        self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose
+    ) -> Witness:
         """Return the nearest points of two geometries."""
         if one.shape is None:
             return _over(T_one, _placed(other, T_other))
@@ -157,7 +161,9 @@ def _over(ground: ScaledPose, body: Support) -> Witness:
     return Witness(height, frozen((lowest - height * up, lowest)), frozen(up))
 
 
-def _directions(one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose) -> Iterator[FloatArray]:
+def _directions(
+    one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose
+) -> Iterator[FloatArray]:
     """Yield unit directions that may lead the second body out of the first."""
     between = T_other.t - T_one.t
     length = float(np.linalg.norm(between))
