@@ -31,6 +31,8 @@ lint: $(dev_ok)
 
 types: $(dev_ok)
 	$(bin)/mypy
+	$(bin)/mypy --platform win32 app
+	$(bin)/mypy --platform darwin app
 
 contracts: $(dev_ok)
 	$(bin)/lint-imports

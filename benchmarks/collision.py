@@ -4,7 +4,8 @@
 
 Every way measures the same random postures by turns, each posture several times over, and its
 quickest time counts; the tables give the median and the 95th percentile over the postures. Times
-are the thread's own on the processor, so that a busy machine counts little.
+are the thread's own on the processor, so that a busy machine counts little. FCL, which measures
+where coal has no wheel, is compared with coal in the same run.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
+from unittest import mock
 
 import coal
 import numpy as np
@@ -23,6 +26,7 @@ from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.maths.collision import engine as engines
 from katana450.maths.collision.clearance import advance
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import World, obstacle
@@ -56,6 +60,15 @@ class Row(NamedTuple):
     median: float
     most: float
     remark: str
+
+
+@contextmanager
+def without_coal() -> Iterator[None]:
+    """Choose the engine as on a machine without coal."""
+    with mock.patch.object(engines, "find_spec", return_value=None):
+        engines.engine.cache_clear()
+        yield
+    engines.engine.cache_clear()
 
 
 def world_on_table(robot: Robot) -> World:
@@ -126,12 +139,13 @@ def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
     return 1e6 * best
 
 
-def nearest_rows(robot: Robot, world: World, postures: FloatArray) -> list[Row]:
+def nearest_rows(robot: Robot, world: World, by_fcl: World, postures: FloatArray) -> list[Row]:
     """The ways to find the nearest pair."""
     every = np.arange(len(world.first))
     raw = RawMeshes(robot, world)
     ways: dict[str, tuple[Callable[[FloatArray], object], int]] = {
         "katana450 `nearest`": (world.nearest, TURNS),
+        "katana450 `nearest`, by FCL": (by_fcl.nearest, TURNS),
         "coal, the same hulls, every pair": (lambda x: world.at(x).distances(every).min(), TURNS),
         "coal, the visible meshes, without the table": (raw.nearest, 1),
     }
@@ -139,8 +153,10 @@ def nearest_rows(robot: Robot, world: World, postures: FloatArray) -> list[Row]:
     for x in postures:
         for name, (way, turns) in ways.items():
             times[name].append(quickest(lambda way=way, x=x: way(x), turns))  # type: ignore[misc]
+    ours, fcl = (np.array(times[name]) for name in list(times)[:2])
     remarks = (
         f"{len(world.part_of)} bodies, {len(world.first)} pairs",
+        f"{np.median(fcl / ours):.2f} times coal",
         "",
         f"{len(raw._pairs)} pairs of links",
     )
@@ -193,12 +209,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     built = time.perf_counter() - start
     chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
+    with without_coal():
+        by_fcl = world_on_table(robot)
     postures = np.random.default_rng(SEED).uniform(lower, upper, (count, len(lower)))
     print(f"{count} postures of seed {SEED}; load average {os.getloadavg()[0]:.1f}.")
     print(f"Bodies read and pairs found in {built:.2f} s.\n")
-    print(table("the nearest pair", nearest_rows(robot, world, postures)))
+    print(table("the nearest pair", nearest_rows(robot, world, by_fcl, postures)))
     print()
-    print(table("one tick of a drive", tick_rows(arm, world)))
+    ticks = tick_rows(arm, world)
+    print(table("one tick of a drive", ticks))
+    print()
+    slower = [
+        row._replace(remark=f"{row.median / coal.median:.2f} times coal, {row.remark}")
+        for row, coal in zip(tick_rows(arm, by_fcl), ticks, strict=True)
+    ]
+    print(table("one tick of a drive, by FCL", slower))
 
 
 if __name__ == "__main__":

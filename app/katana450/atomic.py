@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from katana450.errors import InputError
+from katana450.platform_support import create_file
 
 Writer = Callable[[BinaryIO], object]
 
@@ -31,7 +32,7 @@ def write_files(writers: Mapping[Path, Writer], mode: int = 0o666) -> None:
             try:
                 temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
                 stack.callback(temporary.unlink, missing_ok=True)
-                opened = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+                opened = create_file(temporary, mode)
                 with os.fdopen(opened, "wb") as file:
                     writer(file)
                     file.flush()

@@ -17,6 +17,8 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Self
 
+from katana450.platform_support import without_interrupts
+
 ROOT = Path(__file__).resolve().parents[2]
 # A machine that runs tests and draws their pictures without a graphics card starves its browsers;
 # what they have to say of being alive comes late then.
@@ -133,7 +135,7 @@ class AppServer:
             encoding="utf-8",
             errors="replace",
             # Its own group, so that kill() also ends what it started.
-            start_new_session=True,
+            **without_interrupts(),
         )
         # A pipe that nobody reads fills up and stops the writer.
         ready: SimpleQueue[str | None] = SimpleQueue()
@@ -157,7 +159,10 @@ class AppServer:
     def stop(self) -> None:
         """End the process as Ctrl-C does. Raises ServerError if it has to be killed instead."""
         if self._process is not None and self.running:
-            os.killpg(self._process.pid, signal.SIGINT)
+            if sys.platform == "win32":
+                self._process.send_signal(signal.CTRL_BREAK_EVENT)
+            else:
+                os.killpg(self._process.pid, signal.SIGINT)
             try:
                 self._process.wait(self._seconds)
             except subprocess.TimeoutExpired as error:
@@ -200,8 +205,10 @@ class AppServer:
     def _collect(self) -> None:
         if self._process is not None:
             self._process.wait()
-            with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+            # On Windows the children see that the process has ended, and end too.
+            if sys.platform != "win32":
+                with suppress(ProcessLookupError):
+                    os.killpg(self._process.pid, signal.SIGKILL)
         if self._reader is not None:
             self._reader.join()
         self._process = self._reader = None

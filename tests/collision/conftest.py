@@ -2,27 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.maths.collision import engine as engines
+from katana450.maths.collision.engine import Engine
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import World, obstacle
 from katana450.maths.geometry.arrays import FloatArray
 
 
-@pytest.fixture(scope="session")
-def bare(robot: Robot) -> World:
+@pytest.fixture(scope="module", autouse=True, params=["coal", "fcl"])
+def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
+    """Every test of this folder runs on coal, and on FCL as on a machine without coal."""
+    pytest.importorskip(request.param)
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "fcl":
+            patch.setattr(engines, "find_spec", lambda _: None)
+        engines.engine.cache_clear()
+        yield engines.engine()
+    engines.engine.cache_clear()
+
+
+@pytest.fixture(scope="module")
+def bare(robot: Robot, engine: Engine) -> World:
     """The arm without anything round it."""
     world, notes = world_of(robot)
     assert world is not None
     assert notes == ()
+    assert world.engine is engine
     return world
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def world(bare: World) -> World:
     """The arm on its table."""
     return bare.with_obstacles([obstacle("table", np.eye(4), half_space())])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -32,21 +33,26 @@ def apart(one: Shape, other: Shape, p: tuple[float, float, float]) -> float:
     return contact.distance
 
 
-@pytest.mark.parametrize("cube", [hull(CUBE), box((1.0, 1.0, 1.0))], ids=["hull", "box"])
+@pytest.mark.parametrize(
+    "cube", [lambda: hull(CUBE), lambda: box((1.0, 1.0, 1.0))], ids=["hull", "box"]
+)
 @pytest.mark.parametrize(
     ("other", "p", "distance"),
     [
-        (box((1.0, 1.0, 1.0)), (1.3, 0.0, 0.0), 0.3),
-        (box((1.0, 1.0, 1.0)), (1.3, 1.4, 0.0), 0.5),
-        (cylinder(0.25, 2.0), (1.0, 0.0, 0.0), 0.25),
-        (cylinder(0.25, 2.0), (0.0, 0.0, 1.7), 0.2),
-        (hull(CUBE + 1.0), (0.0, 0.0, 0.1), 0.1),
+        (lambda: box((1.0, 1.0, 1.0)), (1.3, 0.0, 0.0), 0.3),
+        (lambda: box((1.0, 1.0, 1.0)), (1.3, 1.4, 0.0), 0.5),
+        (lambda: cylinder(0.25, 2.0), (1.0, 0.0, 0.0), 0.25),
+        (lambda: cylinder(0.25, 2.0), (0.0, 0.0, 1.7), 0.2),
+        (lambda: hull(CUBE + 1.0), (0.0, 0.0, 0.1), 0.1),
     ],
 )
 def test_distances(
-    cube: Shape, other: Shape, p: tuple[float, float, float], distance: float
+    cube: Callable[[], Shape],
+    other: Callable[[], Shape],
+    p: tuple[float, float, float],
+    distance: float,
 ) -> None:
-    assert apart(cube, other, p) == pytest.approx(distance, abs=1e-6)
+    assert apart(cube(), other(), p) == pytest.approx(distance, abs=1e-6)
 
 
 def test_shapes_in_each_other_have_a_depth() -> None:

@@ -7,7 +7,6 @@ import json
 import math
 import os
 import random
-import resource
 import struct
 import subprocess
 import sys
@@ -35,6 +34,8 @@ from katana450.extensions.importers.shape_file import (
     read_shape_guarded,
 )
 from katana450.extensions.importers.surface import MOST_TRIANGLES
+
+resource = pytest.importorskip("resource")
 
 FOREIGN = Path(__file__).parent / "foreign"
 

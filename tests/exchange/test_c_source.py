@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import resource
 import time
 from pathlib import Path
 
@@ -20,6 +19,8 @@ from tests.browser.server import APP, AppServer
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import SCREEN, VIEWER, needs, run
+
+resource = pytest.importorskip("resource")
 
 pytestmark = pytest.mark.long
 
@@ -40,7 +41,7 @@ def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
 def processor() -> float:
     """[s] All ended children have used."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+    return float(used.ru_utime + used.ru_stime)
 
 
 @pytest.fixture(scope="module")

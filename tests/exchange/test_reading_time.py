@@ -5,8 +5,6 @@ Processor time is what counts here, for the clock on the wall is that of everybo
 
 from __future__ import annotations
 
-import resource
-
 import numpy as np
 import pytest
 
@@ -15,6 +13,8 @@ from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import SECONDS
 from katana450.extensions.importers.surface import MOST_TRIANGLES
 from katana450.maths.geometry.arrays import FloatArray
+
+resource = pytest.importorskip("resource")
 
 OURS = 1.0
 """[s] That may be left to the process that people talk to."""

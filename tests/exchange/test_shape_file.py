@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import cKDTree  # type: ignore[import-untyped]
+from scipy.spatial import cKDTree
 from trimesh.exchange.gltf import export_gltf
 
 from katana450.arm.control import things

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import gc
 import multiprocessing
-import os
 import signal
 import socket
 from argparse import Namespace
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from katana450.assembly.log_lines import start_log
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import serve_extensions
+from katana450.platform_support import reset_priority
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -58,8 +58,10 @@ class Front:
         """Starts it."""
         spawn = multiprocessing.get_context("spawn")
         self._told, telling = spawn.Pipe(duplex=False)
+        # The ends are of another class on Windows, with the same methods.
+        ends: Any = spawn.Pipe()
         self.pipe: Connection
-        self.pipe, theirs = spawn.Pipe()
+        self.pipe, theirs = ends
         self._process = spawn.Process(
             target=_run,
             args=(outfit, theirs, telling),
@@ -118,8 +120,7 @@ def _run(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
     """What it does, from its start to its end."""
     # Ctrl-C goes to all processes of a terminal; the arm's says when this one is to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(os, "setpriority"):
-        os.setpriority(os.PRIO_PROCESS, 0, 0)
+    reset_priority()
     start_log()
     try:
         _serve(outfit, pipe, telling)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gc
 import logging
-import os
-from contextlib import suppress
 from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -27,12 +25,10 @@ from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.errors import RobotDescriptionError
+from katana450.platform_support import raise_priority
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
-
-PROMPT = -10
-"""Niceness of the process that moves the arm, where the system allows it."""
 
 
 class Described(NamedTuple):
@@ -157,6 +153,4 @@ def _be_prompt() -> None:
     # late.
     gc.collect()
     gc.freeze()
-    if hasattr(os, "setpriority"):
-        with suppress(PermissionError):
-            os.setpriority(os.PRIO_PROCESS, 0, PROMPT)
+    raise_priority()

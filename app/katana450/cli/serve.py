@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from katana450.assembly.frontend_process import OPEN, READY, Front, FrontendConfig
 from katana450.assembly.log_lines import start_log
 from katana450.extension import serve_extensions
+from katana450.platform_support import stop_signals
 from katana450.resources import URDF_PATH
 from katana450.server.web.listen import HERE, listen
 from katana450.settings import Settings
@@ -79,7 +80,7 @@ def serve(
     def stop(_signal: int, _frame: FrameType | None) -> None:
         stopping.set()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in stop_signals():
         signal.signal(number, stop)
     # Held here, so that nobody else takes it while the front is started again.
     listening = listen(settings.host, settings.port)

@@ -14,6 +14,7 @@ from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, KatanaError
 from katana450.extensions.programs.script import Script
+from katana450.platform_support import without_interrupts
 from katana450.server.api import answers, requests
 
 NAME = "Terminal"
@@ -106,7 +107,7 @@ def _server(script: Script, options: Namespace) -> Iterator[str]:
     command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, **without_interrupts())
     try:
         _wait_for(server)
         print(f"Open {options.url} in a browser to see it.", flush=True)

@@ -16,9 +16,7 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.importers.shape_file import MEMORY, SECONDS, Format, Up, read_shape
 from katana450.maths.collision.outer import outer
-
-if sys.platform != "win32":
-    import resource
+from katana450.platform_support import limit_resources
 
 
 def main(words: list[str]) -> None:
@@ -49,20 +47,8 @@ def main(words: list[str]) -> None:
 
 
 def bind() -> None:
-    """Bound memory and time; Windows counts neither, but the parent's clock still does."""
-    if sys.platform == "win32":
-        return
-    limits = [("RLIMIT_AS", MEMORY), ("RLIMIT_CPU", round(SECONDS)), ("RLIMIT_CORE", 0)]
-    for limit, most in limits:
-        kind = getattr(resource, limit, None)
-        if kind is not None:
-            _, hard = resource.getrlimit(kind)
-            soft = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            try:
-                resource.setrlimit(kind, (soft, hard))
-            except (ValueError, OSError):
-                # macOS refuses bounds that are below what it has mapped.
-                continue
+    """Bound the memory and time of this process, as far as the system does."""
+    limit_resources(MEMORY, round(SECONDS))
 
 
 if __name__ == "__main__":

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-import coal
 import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
+from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 MOST = 64
@@ -163,23 +162,9 @@ def _farthest(
     return number, along
 
 
-def _convex(points: FloatArray) -> Any:
-    listed = coal.StdVec_Vec3s()
-    listed.extend(list(points))
-    return coal.Convex.convexHull(listed, True, "Qt")
-
-
-def _triangles(points: FloatArray) -> FloatArray:
-    """The corners of its hull's faces, (m, 3, 3)."""
-    convex = _convex(points)
-    corners = np.array([convex.point(i) for i in range(convex.num_points)])
-    faces = [convex.polygons(i) for i in range(convex.num_polygons)]
-    return np.asarray(corners[np.array([[face[0], face[1], face[2]] for face in faces])])
-
-
 def _faces(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Normals outwards (m, 3), heights (m,) and areas (m,) of the faces of the hull of a few."""
-    a, b, c = _triangles(points).transpose(1, 0, 2)
+    a, b, c = engine().triangles(points).transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     sizes = np.linalg.norm(normals, axis=1)
     real = sizes > EXACT**2

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import coal
 import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
+from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 FAR = 1e6
@@ -25,7 +25,7 @@ class Shape:
     """A convex body in a frame of its own.
 
     Attributes:
-        geometry: what coal measures.
+        geometry: as the engine has it.
         centre, radius: of a ball that holds it, (3,) and scalar [m].
         low, high: corners (3,) of a box along the axes that holds it [m].
         mark: what it is made of; that of another shape is another.
@@ -43,14 +43,12 @@ def hull(points: npt.ArrayLike) -> Shape:
     """The convex hull of ``points`` (n, 3) [m]; InputError when they lie in one plane."""
     points = np.asarray(points, dtype=np.float64)
     corners = np.unique(finite_array(points, (len(points), 3), "The points of a hull"), axis=0)
-    # coal ends the whole program when it is given points without a volume.
+    # The engine ends the whole program when it is given points without a volume.
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
     if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
         raise InputError(f"{len(corners)} points in one plane make no body.")
     low, high = corners.min(axis=0), corners.max(axis=0)
-    listed = coal.StdVec_Vec3s()
-    listed.extend(list(corners))
-    geometry = coal.Convex.convexHull(listed, False, "")
+    geometry = engine().hull(corners)
     centre = 0.5 * (low + high)
     radius = float(np.linalg.norm(corners - centre, axis=1).max())
     return Shape(geometry, frozen(centre), radius, frozen(low), frozen(high), corners.tobytes())
@@ -61,7 +59,7 @@ def box(size: npt.ArrayLike) -> Shape:
     size = _lengths(size, 3, "The size of a box")
     half = frozen(0.5 * size)
     return Shape(
-        coal.Box(*size.tolist()),
+        engine().box(size),
         frozen(np.zeros(3)),
         float(np.linalg.norm(half)),
         -half,
@@ -75,7 +73,7 @@ def cylinder(radius: float, length: float) -> Shape:
     _lengths((radius, length), 2, "Radius and length of a cylinder")
     half = frozen((radius, radius, 0.5 * length))
     return Shape(
-        coal.Cylinder(radius, length),
+        engine().cylinder(radius, length),
         frozen(np.zeros(3)),
         float(np.hypot(radius, 0.5 * length)),
         -half,
@@ -89,7 +87,12 @@ def sphere(radius: float) -> Shape:
     _lengths((radius,), 1, "The radius of a sphere")
     half = frozen((radius, radius, radius))
     return Shape(
-        coal.Sphere(radius), frozen(np.zeros(3)), radius, -half, half, b"sphere" + half.tobytes()
+        engine().sphere(radius),
+        frozen(np.zeros(3)),
+        radius,
+        -half,
+        half,
+        b"sphere" + half.tobytes(),
     )
 
 
@@ -97,7 +100,7 @@ def half_space() -> Shape:
     """Everything with z <= 0."""
     far = np.full(3, FAR)
     return Shape(
-        coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0),
+        engine().half_space(),
         frozen((0.0, 0.0, -FAR)),
         FAR,
         frozen(-far),

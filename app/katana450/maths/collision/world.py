@@ -8,19 +8,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import coal
 import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.engine import engine
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.shape import Shape
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
-
-SIGNED = coal.DistanceRequest()
-"""Of bodies that are in each other it asks how deep: a distance below zero."""
 
 FEW = 8
 """Pairs that are measured as quickly as the boxes round their bodies are compared."""
@@ -82,6 +79,7 @@ class World:
     ) -> None:
         """``pairs``: indices of the parts that may meet, the smaller first."""
         self.linkage = linkage
+        self.engine = engine()
         self.parts = tuple(parts)
         self.pairs = tuple(pairs)
         bodies = [
@@ -120,7 +118,7 @@ class World:
         for a, b in self.pairs:
             met[a, b] = True
         self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
-        # Of each pair what coal needs: both geometries, each with the number of its frame.
+        # What the engine needs for each pair: both geometries, each with the number of its frame.
         self.measured = [
             (shapes[a].geometry, frame_of[a], shapes[b].geometry, frame_of[b])
             for a, b in zip(self.first.tolist(), self.second.tolist(), strict=True)
@@ -285,36 +283,27 @@ class Placed:
 
     def distances(self, pairs: IndexArray) -> FloatArray:
         """Between the bodies of each of ``pairs`` (k,), as ``distance``, (k,) [m]."""
-        return np.array([self._measure(pair).min_distance for pair in pairs.tolist()])
+        return np.array([self.distance(pair) for pair in pairs.tolist()])
 
     def distance(self, pair: int) -> float:
         """Between the bodies of a pair [m]; negative is how deep they are in each other."""
-        return float(self._measure(pair).min_distance)
+        return self._world.engine.distance(*self._placed(pair))
 
     def contact(self, pair: int) -> Contact:
         """Where the bodies of a pair are nearest."""
-        world, result = self._world, self._measure(pair)
+        world, found = self._world, self._world.engine.witness(*self._placed(pair))
         bodies = world.first[pair], world.second[pair]
         one, other = (world.parts[world.part_of[body]].name for body in bodies)
-        return Contact(
-            (one, other),
-            float(result.min_distance),
-            frozen((result.getNearestPoint1(), result.getNearestPoint2())),
-            frozen(result.normal),
-        )
+        return Contact((one, other), found.distance, found.points, found.normal)
 
-    def _measure(self, pair: int) -> Any:
+    def _placed(self, pair: int) -> tuple[Any, Any, Any, Any]:
         one, frame, other, other_frame = self._world.measured[pair]
-        result = coal.DistanceResult()
-        coal.distance(
-            one, self._transform(frame), other, self._transform(other_frame), SIGNED, result
-        )
-        return result
+        return one, self._transform(frame), other, self._transform(other_frame)
 
     def _transform(self, frame: int) -> Any:
         found = self._transforms.get(frame)
         if found is None:
             mover, T_mover_body = self._world.frames[frame]
-            T = self._T[mover] @ T_mover_body
-            found = self._transforms[frame] = coal.Transform3s(T[:3, :3], T[:3, 3])
+            found = self._world.engine.transform(self._T[mover] @ T_mover_body)
+            self._transforms[frame] = found
         return found

@@ -11,13 +11,14 @@ from __future__ import annotations
 import asyncio
 import errno
 import logging
-import resource
 import socket
 import ssl
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+
+from katana450.platform_support import raise_open_file_limit
 
 log = logging.getLogger(__name__)
 
@@ -54,17 +55,12 @@ NO_ROOM = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 
 def raise_descriptor_limit() -> None:
     """Let this process open WANTED_DESCRIPTORS files, or as many as the system allows."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = WANTED_DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, WANTED_DESCRIPTORS)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        with suppress(OSError, ValueError):
-            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
-            soft = wanted
-    if soft != resource.RLIM_INFINITY and soft < DESCRIPTORS:
+    limit = raise_open_file_limit(WANTED_DESCRIPTORS)
+    if limit is not None and limit < DESCRIPTORS:
         log.warning(
             "Only %d files can be open at once: a crowd can use them up, and STOP from a new "
             "connection fails then. Raise the limit to %d (`ulimit -n`).",
-            soft,
+            limit,
             DESCRIPTORS,
         )
 

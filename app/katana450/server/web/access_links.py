@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import secrets
-import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from itsdangerous import BadSignature, URLSafeSerializer
 from katana450.arm.control.lease import Role
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
+from katana450.platform_support import readable_by_others
 
 log = logging.getLogger(__name__)
 
@@ -131,7 +131,7 @@ class AccessFile:
         read_at = (about.st_mtime_ns, about.st_size, about.st_ino)
         if read_at == self._read_at:
             return
-        if stat.S_IMODE(about.st_mode) & 0o077:
+        if readable_by_others(about):
             raise ConfigurationError(
                 f"Others can read the access file {self.path}: chmod 600 {self.path}, and if "
                 "somebody may have read it, delete it and give new links."

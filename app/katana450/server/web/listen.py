@@ -7,6 +7,7 @@ import socket
 from ipaddress import ip_address
 
 from katana450.errors import ConfigurationError
+from katana450.platform_support import claim_port
 
 BACKLOG = 128
 
@@ -29,8 +30,7 @@ def listen(host: str, port: int) -> socket.socket:
         ) from error
     listening = socket.socket(family, socket.SOCK_STREAM)
     try:
-        # A port that is only closing down is free.
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        claim_port(listening)
         listening.bind(address)
         listening.listen(BACKLOG)
     except OSError as error:

@@ -1,0 +1,134 @@
+"""Calls that only some operating systems have, each with its alternative on the others.
+
+Everything else in the package runs on Linux, macOS and Windows alike. ``tests/packaging`` checks
+that no other module uses these calls.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import stat
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+if sys.platform != "win32":
+    import resource
+else:
+    import ctypes
+
+PROMPT = -10
+"""Niceness of a process that must run on time, where the system allows it."""
+
+NORMAL_CLASS, HIGH_CLASS = 0x20, 0x80
+"""Priority classes of Windows."""
+
+TIMER_MS = 1
+"""[ms] Resolution of the timers of a process that must run on time, on Windows; otherwise 15.6."""
+
+
+def raise_priority() -> None:
+    """Run this process before others, where the system allows it."""
+    if sys.platform == "win32":
+        _set_priority_class(HIGH_CLASS)
+        ctypes.windll.winmm.timeBeginPeriod(TIMER_MS)
+    else:
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, PROMPT)
+
+
+def reset_priority() -> None:
+    """Run this process like any other, whatever its parent runs like."""
+    if sys.platform == "win32":
+        _set_priority_class(NORMAL_CLASS)
+    else:
+        os.setpriority(os.PRIO_PROCESS, 0, 0)
+
+
+def raise_open_file_limit(wanted: int) -> int | None:
+    """Let this process open ``wanted`` files, or as many as the system allows.
+
+    Returns:
+        how many it may open then; None without a limit, as on Windows.
+    """
+    if sys.platform == "win32":
+        return None
+    else:  # noqa: RET505 - so that mypy follows either system
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if soft == resource.RLIM_INFINITY:
+            return None
+        wanted = wanted if hard == resource.RLIM_INFINITY else min(hard, wanted)
+        if soft < wanted:
+            with suppress(OSError, ValueError):
+                resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+                soft = wanted
+        return soft
+
+
+def limit_resources(memory: int, seconds: int) -> None:
+    """Bound the memory [bytes] and the processor time [s] of this process.
+
+    Windows bounds neither and macOS no memory; whoever starts the process bounds its time besides.
+    """
+    if sys.platform != "win32":
+        limits = [("RLIMIT_AS", memory), ("RLIMIT_CPU", seconds), ("RLIMIT_CORE", 0)]
+        for name, maximum in limits:
+            kind = getattr(resource, name, None)
+            if kind is not None:
+                _, hard = resource.getrlimit(kind)
+                soft = maximum if hard == resource.RLIM_INFINITY else min(maximum, hard)
+                # macOS refuses bounds below what the process has mapped.
+                with suppress(ValueError, OSError):
+                    resource.setrlimit(kind, (soft, hard))
+
+
+def stop_signals() -> list[signal.Signals]:
+    """Return the signals that ask a process to end: of the terminal, and of other programs."""
+    names = ("SIGINT", "SIGTERM", "SIGBREAK")
+    return [getattr(signal, name) for name in names if hasattr(signal, name)]
+
+
+def without_interrupts() -> dict[str, Any]:
+    """Return arguments of Popen for a process that the terminal's Ctrl-C does not reach."""
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    else:  # noqa: RET505 - so that mypy follows either system
+        return {"start_new_session": True}
+
+
+def claim_port(sock: socket.socket) -> None:
+    """Let ``sock`` bind a port whose last connections are closing, and none that is in use."""
+    if sys.platform == "win32":
+        # There SO_REUSEADDR would take the port from the program that listens on it.
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+    else:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+
+def readable_by_others(about: os.stat_result) -> bool:
+    """Return whether other users can read a file, by its mode.
+
+    Always False on Windows, whose modes do not tell: a user's own folder is closed to others there.
+    """
+    return sys.platform != "win32" and bool(stat.S_IMODE(about.st_mode) & 0o077)
+
+
+def create_file(path: Path, mode: int) -> int:
+    """Create ``path`` for writing bytes and return its descriptor. Raises OSError if it exists.
+
+    ``mode``: who may read and write it, less what the umask takes away; without effect on Windows.
+    """
+    # Windows replaces line ends in a descriptor that is not binary.
+    binary: int = getattr(os, "O_BINARY", 0)
+    return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | binary, mode)
+
+
+def _set_priority_class(priority: int) -> None:
+    if sys.platform == "win32":
+        kernel = ctypes.windll.kernel32
+        # GetCurrentProcess returns the handle -1, which is as wide as a pointer.
+        kernel.SetPriorityClass(ctypes.c_void_p(-1), priority)

@@ -1,0 +1,232 @@
+"""Calls that only some systems have stand in one module, and their alternatives work."""
+
+from __future__ import annotations
+
+import ast
+import os
+import signal
+import socket
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import katana450
+from katana450 import platform_support
+
+APP = Path(katana450.__file__).parent
+ALLOWED = {
+    "platform_support.py": None,
+    # Asks the kernel about one socket, and says what it answers where it cannot.
+    "arm/runtime/readiness.py": {"TCP_INFO", "poll", "POLLIN", "POLLOUT"},
+}
+MODULES = {"curses", "fcntl", "grp", "msvcrt", "pty", "pwd", "resource", "syslog", "termios", "tty"}
+MODULES |= {"ctypes", "winreg", "_winapi"}
+NAMES = {
+    "O_BINARY",
+    "O_NOFOLLOW",
+    "POLLIN",
+    "POLLOUT",
+    "SO_EXCLUSIVEADDRUSE",
+    "SO_REUSEADDR",
+    "SO_REUSEPORT",
+    "TCP_INFO",
+    "AF_UNIX",
+    "add_reader",
+    "add_signal_handler",
+    "add_writer",
+    "chown",
+    "creationflags",
+    "epoll",
+    "fork",
+    "forkserver",
+    "getloadavg",
+    "getrlimit",
+    "geteuid",
+    "getuid",
+    "killpg",
+    "kqueue",
+    "mkfifo",
+    "nice",
+    "poll",
+    "preexec_fn",
+    "sched_getaffinity",
+    "sched_setaffinity",
+    "sched_setscheduler",
+    "setpriority",
+    "setsid",
+    "start_new_session",
+    "symlink_to",
+    "uname",
+    "windll",
+}
+PATHS = ("/tmp", "/proc", "/dev", "/etc")
+
+SIGNALS = {"SIGINT", "SIG_IGN", "signal"}
+"""Attributes of the module ``signal`` that every system has."""
+
+
+def used_names(source: str) -> Iterator[str]:
+    """Yield the modules, names and paths of ``source`` that not every system has."""
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Import(names=names):
+                yield from MODULES & {name.name.partition(".")[0] for name in names}
+            case ast.ImportFrom(module=str(module)):
+                yield from MODULES & {module.partition(".")[0]}
+            case ast.Attribute(value=ast.Name(id="signal"), attr=attr) if attr not in SIGNALS:
+                yield attr
+            case ast.Attribute(value=ast.Name(id="self")):
+                continue
+            # Polling a pipe or a process has nothing to do with select.
+            case ast.Attribute(value=value, attr="poll") if ast.unparse(value) != "select":
+                continue
+            case ast.Attribute(attr=attr) if attr in NAMES:
+                yield attr
+            case ast.keyword(arg=str(arg)) if arg in NAMES:
+                yield arg
+            case ast.Constant(value=str(text)) if text in NAMES - {"poll", "nice"}:
+                yield text
+            case ast.Constant(value=str(text)) if text.startswith(
+                ("/tmp", "/proc", "/dev", "/etc")
+            ):
+                yield text
+
+
+def test_one_module_makes_calls_that_only_some_systems_have() -> None:
+    for path in sorted(APP.rglob("*.py")):
+        allowed = ALLOWED.get(path.relative_to(APP).as_posix(), set())
+        if allowed is not None:
+            found = set(used_names(path.read_text(encoding="utf-8")))
+            assert found <= allowed, f"{path}: put this into platform_support.py"
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [
+        ("import resource", "resource"),
+        ("from fcntl import flock", "fcntl"),
+        ("os.setpriority(0, 0, 1)", "setpriority"),
+        ("signal.signal(signal.SIGTERM, f)", "SIGTERM"),
+        ("select.poll()", "poll"),
+        ("getattr(socket, 'TCP_INFO', None)", "TCP_INFO"),
+        ("Popen(x, start_new_session=True)", "start_new_session"),
+        ("open('/proc/cpuinfo')", "/proc/cpuinfo"),
+        ("get_context('fork')", "fork"),
+    ],
+)
+def test_such_calls_are_found(source: str, name: str) -> None:
+    assert name in set(used_names(source))
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, tuple[Any, ...]]]:
+    """Pretend to be Windows; return the calls of its libraries that are made, with arguments."""
+    calls: list[tuple[str, tuple[Any, ...]]] = []
+
+    class Library:
+        def __getattr__(self, name: str) -> Any:
+            return lambda *words: calls.append((name, words))
+
+    library = SimpleNamespace(kernel32=Library(), winmm=Library())
+    loaded = SimpleNamespace(windll=library, c_void_p=lambda value: value)
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(platform_support, "ctypes", loaded, raising=False)
+    monkeypatch.delattr(platform_support, "resource", raising=False)
+    monkeypatch.delattr(os, "setpriority", raising=False)
+    monkeypatch.setattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0x200, raising=False)
+    return calls
+
+
+def test_priorities_on_windows(windows: list[tuple[str, tuple[Any, ...]]]) -> None:
+    platform_support.raise_priority()
+    platform_support.reset_priority()
+    assert windows == [
+        ("SetPriorityClass", (-1, platform_support.HIGH_CLASS)),
+        ("timeBeginPeriod", (1,)),
+        ("SetPriorityClass", (-1, platform_support.NORMAL_CLASS)),
+    ]
+
+
+@pytest.mark.usefixtures("windows")
+def test_windows_has_no_limits() -> None:
+    platform_support.limit_resources(1, 1)
+    assert platform_support.raise_open_file_limit(10**9) is None
+
+
+@pytest.mark.usefixtures("windows")
+def test_windows_keeps_the_terminal_from_a_process() -> None:
+    assert platform_support.without_interrupts() == {"creationflags": 0x200}
+
+
+@pytest.mark.usefixtures("windows")
+def test_windows_claims_a_port_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(socket, "SO_EXCLUSIVEADDRUSE", -5, raising=False)
+    options: list[tuple[int, int, int]] = []
+    platform_support.claim_port(
+        SimpleNamespace(setsockopt=lambda *words: options.append(words))  # type: ignore[arg-type]
+    )
+    assert options == [(socket.SOL_SOCKET, -5, 1)]
+
+
+def test_modes_do_not_tell_on_windows_who_can_read_a_file(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    path = tmp_path / "links.json"
+    path.touch()
+    path.chmod(0o644)
+    about = path.stat()
+    if sys.platform != "win32":
+        assert platform_support.readable_by_others(about)
+    request.getfixturevalue("windows")
+    assert not platform_support.readable_by_others(about)
+
+
+def test_files_are_created_as_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    create = os.open
+
+    def opened(path: Path, flags: int, mode: int) -> int:
+        asked.append(flags)
+        return create(path, flags & ~(1 << 20), mode)
+
+    monkeypatch.setattr(os, "O_BINARY", 1 << 20, raising=False)
+    monkeypatch.setattr(os, "open", opened)
+    path = tmp_path / "file"
+    os.close(platform_support.create_file(path, 0o600))
+    assert asked[0] & (1 << 20)
+    if sys.platform != "win32":
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    with pytest.raises(FileExistsError):
+        platform_support.create_file(path, 0o600)
+
+
+def test_stop_signals_are_those_of_the_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert set(platform_support.stop_signals()) >= {signal.SIGINT, signal.SIGTERM}
+    monkeypatch.setattr(signal, "SIGBREAK", 21, raising=False)
+    assert 21 in platform_support.stop_signals()
+
+
+def test_the_collision_engine_of_windows_is_the_other_one() -> None:
+    """A process without coal builds the arm's world and measures it."""
+    program = """
+import sys
+sys.modules["coal"] = None
+import importlib.util
+find = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *_: None if name == "coal" else find(name)
+import katana450
+arm = katana450.load()
+print(arm.circle((0.15, 0.0, -0.11), 0.1).end.shape)
+assert "fcl" in sys.modules
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "(5,)"
