@@ -90,7 +90,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
     assert told[0].axis == 2
     assert told[1].parts == ("finger_left_link", "table")
     assert told[2].seconds == 0.3
-    assert "Clear stop in the bar" in told[2].said
+    assert "press Clear stop" in told[2].said
 
 
 def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
