@@ -2,29 +2,24 @@
 // Here what is typed is a draft that viser does not see before Enter or before the box is left.
 "use strict";
 const Fields = (() => {
-  const BOX = "input.mantine-NumberInput-input";
   const UNFINISHED = /^-?\.?$/;
   const STEPS = { ArrowUp: 1, ArrowDown: -1 };
 
   const controls = new Map(); // the range and step of each control, by its id
-  const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   let box = null; // the box that has the focus
   let sending = false;
   let tell = () => {};
 
-  const isBox = (target) => target instanceof Element && target.matches(BOX);
+  const isBox = (target) => target instanceof Element && target.matches(Viser.NUMBER_BOX);
   const stopped = () => window.parent.document.body.dataset.mood === "stopped";
 
-  // The value that viser shows is the element's default value.
-  const changed = (field) => field.value !== field.defaultValue;
+  const changed = (field) => field.value !== Viser.shownIn(field);
 
   function range(field) {
-    const row = field.closest(":has(label[for])");
-    const label = row?.querySelector("label[for]");
-    const { min = null, max = null, step = 1 } = controls.get(label?.htmlFor) ?? {};
-    const index = row ? [...row.querySelectorAll(BOX)].indexOf(field) : 0;
+    const { id, label, index } = Viser.controlOf(field);
+    const { min = null, max = null, step = 1 } = controls.get(id) ?? {};
     const [low, high] = [min, max].map((end) => (Array.isArray(end) ? end[index] : end));
-    return { label: label?.textContent ?? "", low: low ?? -Infinity, high: high ?? Infinity, step };
+    return { label, low: low ?? -Infinity, high: high ?? Infinity, step };
   }
 
   // Why the draft cannot be sent; empty when it can.
@@ -41,7 +36,7 @@ const Fields = (() => {
   }
 
   function restore(field) {
-    field.value = field.defaultValue;
+    field.value = Viser.shownIn(field);
     mark(field, false);
   }
 
@@ -51,11 +46,7 @@ const Fields = (() => {
     mark(field, why);
     if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}, and was not sent.`);
     sending = true;
-    // Emptied first: viser's box takes what differs from before for a single edit at the caret.
-    for (const text of ["", field.value]) {
-      write.call(field, text);
-      field.dispatchEvent(new Event("input", { bubbles: true }));
-    }
+    Viser.type(field, field.value);
     sending = false;
   }
 
@@ -68,11 +59,10 @@ const Fields = (() => {
 
   function step(field, sign) {
     const { low, high, step } = range(field);
-    const from = Number(field.value.trim() === "" || objection(field) ? field.defaultValue : field.value);
+    const from = Number(field.value.trim() === "" || objection(field) ? Viser.shownIn(field) : field.value);
     const decimals = Math.max(...[from, step].map((x) => String(x).split(".")[1]?.length ?? 0));
     const next = Math.min(high, Math.max(low, from + sign * step));
-    // Unseen by viser, which compares with what it wrote last by the element's own property.
-    write.call(field, String(Number(next.toFixed(decimals))));
+    Viser.fill(field, String(Number(next.toFixed(decimals))));
     mark(field, false);
   }
 
@@ -108,12 +98,7 @@ const Fields = (() => {
 
   return {
     // Keep what the server says of the controls.
-    hear(messages) {
-      for (const { uuid, props, updates } of messages) {
-        if (props && "step" in props) controls.set(uuid, { ...props });
-        else if (updates && controls.has(uuid)) Object.assign(controls.get(uuid), updates);
-      }
-    },
+    hear: (messages) => Viser.keepControls(controls, messages),
     // `say` shows a sentence to the person.
     begin: (say) => (tell = say),
   };

@@ -17,8 +17,8 @@ const Fit = (() => {
   let riding = false; // on the tool, with a new view at every step
   let begun = false;
 
-  const viewer = () => window.__viserMutable;
-  const root = () => viewer().nodeRefFromName[""].matrixWorld;
+  const { viewer, node } = Viser;
+  const root = () => node("").matrixWorld;
   const vector = (xyz) => viewer().camera.position.clone().set(...xyz);
   const same = (a, b) =>
     ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < SAME));
@@ -28,7 +28,7 @@ const Fit = (() => {
     const found = [];
     const inverse = root().clone().invert();
     for (const name of NODES)
-      viewer().nodeRefFromName[name]?.traverseVisible((object) => {
+      node(name)?.traverseVisible((object) => {
         const { geometry } = object;
         if (!geometry?.attributes?.position) return;
         if (!geometry.boundingBox) geometry.computeBoundingBox();
@@ -90,8 +90,7 @@ const Fit = (() => {
   return {
     // Note the views that the server asks for, and fit those that a person chose before viser sees them.
     hear(messages) {
-      const of = (type) => messages.findLast((each) => each.type === type);
-      const [position, target] = [of("SetCameraPositionMessage"), of("SetCameraLookAtMessage")];
+      const [position, target] = Viser.viewsIn(messages);
       if (position?.initial ?? target?.initial) {
         if (chosen || given) return;
         if (position) base = { ...base, position: position.position };
@@ -113,7 +112,7 @@ const Fit = (() => {
       let [count, steady, tries] = [0, 0, 0];
       const timer = setInterval(() => {
         const before = count;
-        count = viewer()?.cameraControl && viewer().nodeRefFromName[""] ? corners().length : 0;
+        count = viewer()?.cameraControl && node("") ? corners().length : 0;
         steady = count && count === before ? steady + 1 : 0;
         if (steady < STEADY && ++tries < TRIES) return;
         clearInterval(timer);

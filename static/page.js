@@ -9,9 +9,7 @@
   const NOT_YOU = 4401;
   const QUIETLY = "quietly"; // the id of what is asked again until it is had
   const OPEN = "katana450.instruments.open";
-  // What of the address is for viser; anything else would be a stranger's wish.
   const ORDERS = { pause: "Pause", resume: "Resume", end: "Cancel" };
-  const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
 
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
@@ -306,7 +304,8 @@
 
   enter().then((mayEnter) => {
     if (!mayEnter) return;
-    const query = [...new URLSearchParams(location.search)].filter(([key]) => CAMERA.test(key));
+    // Nothing else of the address: viser's page obeys some of its parameters to the server's harm.
+    const query = [...new URLSearchParams(location.search)].filter(([key]) => Viser.PARAMETER.test(key));
     scene.src = `viser/?${new URLSearchParams([["page", page], ...query])}`;
     const { protocol, host } = location;
     worker.postMessage({ open: `${protocol.replace("http", "ws")}//${host}/control?page=${page}` });

@@ -2,23 +2,20 @@
 // which keeps the rest of the height, and it starts folded.
 "use strict";
 (() => {
-  // viser's own breakpoint, and the box and handle of its panel below that.
-  const NARROW = "(max-width: 36em)";
-  const PANEL = '.mantine-Paper-root[style*="position: fixed"]';
-  const HANDLE = `${PANEL} [style*="height: 3.5em"]`;
+  const { NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT } = Viser;
   const sheet = new CSSStyleSheet();
   sheet.replaceSync(`@media ${NARROW} {
     :has(> ${PANEL}) { flex-direction: column; }
     :has(> ${PANEL}) > :not(${PANEL}) { min-height: 0; }
     ${PANEL} { position: static !important; flex: none; width: 100% !important; max-height: 55% !important; }
-    ${PANEL} [style*="width: 20em"] { width: 100% !important; }
-    ${HANDLE}::after { content: "Controls"; font-size: 0.9em; opacity: 0.7; }
+    ${PANEL_CONTENT} { width: 100% !important; }
+    ${PANEL_HANDLE}::after { content: "Controls"; font-size: 0.9em; opacity: 0.7; }
   }`);
   document.adoptedStyleSheets.push(sheet);
 
   let folded = null; // the panel that was folded already; a person may open it
   const fold = () => {
-    const handle = document.querySelector(HANDLE);
+    const handle = document.querySelector(PANEL_HANDLE);
     if (handle && handle !== folded) handle.click();
     folded = handle;
   };

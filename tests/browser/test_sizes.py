@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import FloatRect
 
 from katana450.arm.control.state import Status
 from katana450.client import connect
@@ -29,6 +30,16 @@ PHONE = {"has_touch": True, "is_mobile": True}
 
 MOODS = {*(status.value for status in Status), "moving", "stopped"}
 """All that the server sends of an arm whose state is known."""
+
+LEAST_FINGER = 40.0
+"""Pixels of a button, across and down."""
+
+PRESSABLE = """() => Object.fromEntries(
+    [...document.querySelectorAll("header button, #stage button")]
+        .map((each) => [each.id || each.textContent, each.getBoundingClientRect()])
+        .filter(([, { width }]) => width)
+        .map(([name, { x, y, width, height }]) => [name, [x, y, width, height]]))"""
+"""Place and size of all buttons of our page, in pixels."""
 
 LEAST_CONTRAST = 3.0
 """Of a lamp to what it lies on, as WCAG 2.2 (1.4.11) asks for."""
@@ -281,6 +292,42 @@ def test_buttons_of_the_lease_fit_on_a_phone(server: AppServer, open_page: OpenP
         other.ask(requests.Take())
         page.wait_until(lambda: page.page.get_by_text("Take over").count(), "who drives")
         assert overhang(page) <= 0.0
+
+
+@pytest.mark.parametrize("size", [PORTRAIT, LANDSCAPE])
+def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
+    server: AppServer, open_page: OpenPage, size: tuple[int, int], artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=size, **PHONE)
+    take(page)
+    page.press_in_bar("STOP")
+    page.page.wait_for_selector("#clear-stop:not([hidden])")
+    for opener in ("jog-button", "objects-button"):
+        page.page.tap(f"#{opener}")
+        page.page.evaluate("katana.toast('Axis 2: 300 is not between -124.25 and 7.75, not sent.')")
+        page.page.wait_for_selector("#toast.shown")
+        found: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
+        assert {"stop", "clear-stop", opener} <= found.keys()
+        assert min(min(box[2:]) for box in found.values()) >= LEAST_FINGER, found
+        toast, reason = (page.page.locator(each).bounding_box() for each in ("#toast", "#why"))
+        assert toast is not None
+        assert reason is not None
+        for name, (x, y, width, height) in found.items():
+            assert not overlap(toast, x, y, width, height), name
+            assert not overlap(reason, x, y, width, height), name
+        assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+        page.keep(artefacts / f"finger-{size[0]}-{opener}.png")
+    # The help lies over Clear stop.
+    page.page.tap("#help-button")
+    page.page.tap("#help button")
+    assert not page.page.get_by_role("dialog").is_visible()
+    page.press_in_bar("Clear stop")
+
+
+def overlap(box: FloatRect, x: float, y: float, width: float, height: float) -> bool:
+    """Whether a box and a rectangle share a pixel."""
+    across = min(box["x"] + box["width"], x + width) - max(box["x"], x)
+    return across > 0 and min(box["y"] + box["height"], y + height) > max(box["y"], y)
 
 
 def overhang(page: ViserPage) -> float:

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 import viser
-from viser import _messages as wire
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
@@ -28,6 +27,7 @@ from katana450.server.viser_bridge.gestures import Gestures, _Browser
 from katana450.server.viser_bridge.guard import Guard
 from tests.browser.server import free_port
 from tests.gateway.test_hub import PAGES, FakeArm, Table
+from tests.viser_bridge import internals
 
 CLIENT = 7
 
@@ -90,7 +90,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
     assert told[0].axis == 2
     assert told[1].parts == ("finger_left_link", "table")
     assert told[2].seconds == 0.3
-    assert "Clear stop in the bar" in told[2].said
+    assert "press Clear stop" in told[2].said
 
 
 def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
@@ -185,7 +185,7 @@ class Hooked:
         connection: Any = SimpleNamespace(queue_message=self.corrections.append)
         self.gestures._browsers[CLIENT] = _Browser(connection, self.slot)
         client: Any = SimpleNamespace(add_notification=lambda *_, **__: None)
-        server._connected_clients[CLIENT] = client
+        internals.pretend_client(server, CLIENT, client)
 
     def receive(self) -> None:
         """The gateway receives a message and passes it on."""
@@ -201,7 +201,7 @@ class Hooked:
 def viser_server() -> Iterator[viser.ViserServer]:
     server = viser.ViserServer(port=free_port(), verbose=False)
     yield server
-    server._connected_clients.clear()
+    internals.forget_clients(server)
     server.stop()
 
 
@@ -215,7 +215,7 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
         hooked = Hooked(table, viser_server, driver)
         slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
         listener(hooked.gestures)(slider, lambda: cmd.SetJoint(0, slider.value))
-        moved = wire.GuiUpdateMessage(slider._impl.uuid, {"value": 0.5})
+        moved = internals.value_change(slider, 0.5)
         hooked.receive()
         table.stop("Vera")
         table.hub.clear_stop(driver)
@@ -244,11 +244,11 @@ def test_slider_of_another_than_the_driver_changes_nothing_for_anybody(
         hooked = Hooked(table, viser_server, other)
         slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
         listener(hooked.gestures)(slider, lambda: cmd.SetJoint(0, slider.value))
-        told = viser_server._websock_server.get_message_buffer().message_from_id
-        before = len(told)
+        before = len(internals.sent(viser_server))
         hooked.receive()
-        await hooked.handle(wire.GuiUpdateMessage(slider._impl.uuid, {"value": 0.5}))
-        assert (table.arm.commands, slider.value, len(told)) == ([], 0.0, before)
+        await hooked.handle(internals.value_change(slider, 0.5))
+        assert (table.arm.commands, slider.value) == ([], 0.0)
+        assert len(internals.sent(viser_server)) == before
         assert hooked.refusals == ["Window 1 holds the arm: ask for it."]
 
     asyncio.run(slide())

@@ -24,6 +24,7 @@ from katana450.server.viser_bridge.labels import PERSONAL, STEERING
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 from tests.view.gestures import RecordedGestures
+from tests.viser_bridge import internals
 
 
 @pytest.fixture
@@ -44,7 +45,7 @@ def shown(server: viser.ViserServer, path: str) -> FloatArray:
     T, name = np.eye(4), ""
     for part in path.split("/")[1:]:
         name += f"/{part}"
-        node: Any = server.scene._handle_from_node_name[name]
+        node: Any = internals.nodes(server)[name]
         T = T @ se3.from_rotation_translation(so3.from_quaternion(node.wxyz), node.position)
     return T
 
@@ -65,7 +66,7 @@ def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
     blue = Looks().having("cart", Trait.COLOUR, (0.0, 0.0, 1.0))
     PaintNodes(server, nodes).follow(replace(standing(robot), looks=blue))
     assert not nodes.shapes["cart"][0].visible
-    coat: Any = server.scene._handle_from_node_name[f"{nodes.path['cart']}/paint0"]
+    coat: Any = internals.nodes(server)[f"{nodes.path['cart']}/paint0"]
     assert tuple(coat.color) == (0, 0, 255)
 
 
@@ -75,7 +76,7 @@ def test_the_panel_has_a_slider_a_joint_and_says_why(
     state = standing(robot)
     MachinePanel(server.gui, robot.joint_group, RecordedGestures(), state)
     controls = {
-        handle.label: handle for handle in server.gui._gui_input_handle_from_uuid.values()
+        handle.label: handle for handle in internals.controls(server)
         if isinstance(handle, viser.GuiSliderHandle)
     }  # fmt: skip
     joints = robot.joint_group
@@ -89,6 +90,5 @@ def test_the_panel_has_a_slider_a_joint_and_says_why(
         # A joint may be called anything, and is nobody's alone for that.
         assert label not in (*PERSONAL, *STEERING)
     assert "mm" in page(joints, state)
-    root: Any = server.gui._container_handle_from_uuid["root"]
-    texts = [h.content for h in root._children.values() if isinstance(h, viser.GuiHtmlHandle)]
+    texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
     assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)

@@ -21,11 +21,12 @@ from katana450.server.view.branches import INTERVAL, BranchList
 from katana450.server.view.conduit import poses
 from katana450.server.view.controls import Clickable
 from katana450.server.view.scene import FrameTree
+from tests.viser_bridge.internals import nodes
 
 
 def test_every_link_is_turned_as_its_joint_is(robot: Robot, server: viser.ViserServer) -> None:
     tree = FrameTree(server, "/tree", robot)
-    node = {handle.name: handle for handle in server.scene._handle_from_node_name.values()}
+    node = nodes(server)
     random = np.random.default_rng(450)
     for _ in range(20):
         angles = robot.joint_values(random.uniform(-4.0, 4.0, 5), random.uniform(-1.0, 1.0))

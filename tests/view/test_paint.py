@@ -15,6 +15,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.resources import URDF_PATH
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.scene import ArmNodes
+from tests.viser_bridge.internals import nodes
 
 
 class Shown:
@@ -33,10 +34,9 @@ class Shown:
         return self.state
 
     def painted(self) -> dict[str, tuple[int, int, int]]:
-        nodes = self.server.scene._handle_from_node_name
         return {
             name: node.color
-            for name, node in nodes.items()
+            for name, node in nodes(self.server).items()
             if isinstance(node, viser.MeshHandle) and "paint" in name and node.visible
         }
 
@@ -62,9 +62,7 @@ def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
     robot = load(URDF_PATH)
     (link,) = (link for link in robot.links if link.name == "pan_link")
     assert set(shown.painted().values()) == {tuple(round(255.0 * part) for part in link.colour)}
-    node = shown.server.scene._handle_from_node_name[
-        "/".join((shown.arm.path["pan_link"], "paint0"))
-    ]
+    node = nodes(shown.server)["/".join((shown.arm.path["pan_link"], "paint0"))]
     assert isinstance(node, viser.MeshHandle)
     assert node.opacity == 0.25
     shown.show(looks=Looks().having("pan_link", Trait.CHOICE, -1))

@@ -26,6 +26,7 @@ from katana450.server.view.objects import NOTHING, ObjectsPanel
 from katana450.server.view.things import ThingNodes
 from katana450.server.view.tint import Tint
 from tests.view.gestures import RecordedGestures
+from tests.viser_bridge import internals
 
 PATH = "/things/1"
 
@@ -59,7 +60,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
 
     def node(name: str = "shape") -> viser.SceneNodeHandle:
-        return server.scene._handle_from_node_name[f"{PATH}/{name}"]
+        return internals.nodes(server)[f"{PATH}/{name}"]
 
     nodes.follow(seen(state, thing))
     own = node()
@@ -76,7 +77,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
     assert (tuple(one.color), one.opacity) == ((4, 5, 6), None)
 
     def shown(path: str = PATH) -> bool:
-        return bool(server.scene._handle_from_node_name[path].visible)
+        return bool(internals.nodes(server)[path].visible)
 
     nodes.follow(seen(state, replace(thing, look=Look((4, 5, 6), hidden=True))))
     assert not shown()
@@ -89,7 +90,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
     nodes.follow(seen(state, replace(thing, look=Look((4, 5, 6)), scale=1.5)))
     assert not shown(f"{PATH}/contact")
     nodes.follow(seen(state))
-    assert not [each for each in server.scene._handle_from_node_name if each.startswith(PATH)]
+    assert not [each for each in internals.nodes(server) if each.startswith(PATH)]
 
 
 def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
@@ -99,7 +100,7 @@ def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
     state = session.begin(session.ready, 0.0, 0.0)
     thing = Thing("it", Form.MESH, (), np.eye(4), solid=mesh.solid)
     nodes.follow(seen(state, thing))
-    shape = server.scene._handle_from_node_name[f"{PATH}/shape"]
+    shape = internals.nodes(server)[f"{PATH}/shape"]
     assert isinstance(shape, viser.MeshHandle)
     np.testing.assert_allclose(np.ptp(shape.vertices, axis=0), mesh.solid.size, atol=1e-6)
     nodes.follow(seen(state))

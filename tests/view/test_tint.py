@@ -15,6 +15,7 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.tint import Tint
 from katana450.server.view.workcell import Workcell
+from tests.viser_bridge.internals import nodes
 
 
 @dataclass
@@ -87,4 +88,4 @@ def test_viser_takes_the_coats(robot: Robot, state: State, server: viser.ViserSe
     tint = Tint(server, robot, paths, load_props())
     tint.follow(touching(state, "wrist_link", "cup"))
     tint.follow(state)
-    assert not server.scene._handle_from_node_name["/cup/contact0"].visible
+    assert not nodes(server)["/cup/contact0"].visible

@@ -16,6 +16,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.water.flow import Flow
 from katana450.maths.water.puddle import THICKNESS
 from katana450.server.view.water import WORTH_SENDING, WaterNodes
+from tests.viser_bridge.internals import nodes, outlet
 from tests.water.motions import UPRIGHT, over_basin, placed, poured, turned_to
 
 FLOW = Flow(around_of(load_props()))
@@ -28,7 +29,7 @@ class Told:
         self.server = server
         self.nodes = WaterNodes(server, FLOW.around)
         self._messages: list[Any] = []
-        interface = server.scene._websock_interface
+        interface = outlet(server)
         queue = interface.queue_message
 
         def told(message: Any, *rest: Any) -> Any:
@@ -42,7 +43,7 @@ class Told:
         return said
 
     def node(self, name: str) -> Any:
-        return self.server.scene._handle_from_node_name[f"/water/{name}"]
+        return nodes(self.server)[f"/water/{name}"]
 
 
 @pytest.fixture
@@ -126,7 +127,7 @@ def test_a_puddle_lies_where_water_fell_and_grows(told: Told) -> None:
 
 
 def test_hidden_water_comes_back(told: Told) -> None:
-    root = told.server.scene._handle_from_node_name["/water"]
+    root = nodes(told.server)["/water"]
     seen = [root.visible]
     water = FLOW.begin(2e-4, placed(0.3, 0.1, 0.2))
     told.nodes.show(water)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from urllib.parse import urlsplit
 
 import msgspec
 from starlette.applications import Starlette
@@ -58,7 +57,7 @@ def application(
     index = static.pop("index.html")
     viser = viser_page.load()
     viser_file = static_files.File.of(viser.html, static_files.TYPES[".html"])
-    page_policy, viser_policy = security.page_policy(), security.viser_policy(viser.script_hashes)
+    page_policy, viser_policy = security.page_policy(), viser_page.policy(viser.script_hashes)
     tries = TokenBucket(TRIES, AT_ONCE, hub.clock())
 
     async def page(request: Request) -> Response:
@@ -73,7 +72,11 @@ def application(
 
     async def viser_index(request: Request) -> Response:
         _known(door, request)
-        _check_query(request, address)
+        scheme = "wss" if address.cookies_are_secure else "ws"
+        origin = f"{scheme}://{request.headers['host']}"
+        why = viser_page.objection(request.query_params, origin)
+        if why is not None:
+            raise HTTPException(400, why)
         return viser_file.answer(request, viser_policy)
 
     async def enter(request: Request) -> Response:
@@ -127,14 +130,3 @@ def _known(door: Authenticator, request: Request) -> Identity:
     if visitor is None:
         raise HTTPException(401, "Come in by the front page.")
     return visitor
-
-
-def _check_query(request: Request, address: Address) -> None:
-    """viser's page would run what any server named here sends it."""
-    if "playbackPath" in request.query_params:
-        raise HTTPException(400, "Recordings are not played here.")
-    for url in request.query_params.getlist("websocket"):
-        scheme = "wss:" if address.cookies_are_secure else "ws:"
-        parts = urlsplit(url)
-        if f"{parts.scheme}:" != scheme or parts.netloc != request.headers["host"]:
-            raise HTTPException(400, "The page may speak to this server alone.")

@@ -72,7 +72,7 @@ def _lopsided(finding: Finding) -> str:
 REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.STOPPED: lambda f: (
         f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
-        "press Clear stop in the bar, then say afresh where to go"
+        "press Clear stop, then give a new target"
     ),
     Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
     Reason.CONTACT: _contact,

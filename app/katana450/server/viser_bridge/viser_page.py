@@ -6,18 +6,22 @@ import base64
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import numpy.typing as npt
 import viser
 import zstandard
+from starlette.datastructures import QueryParams
 
 from katana450.errors import ConfigurationError
 from katana450.png import png
 from katana450.server.viser_bridge.themes import THEMES, gradient
+from katana450.server.web.security import content_policy
 
 INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"
 
@@ -28,7 +32,7 @@ LOADER = re.compile(
 
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
 
-OUR_SCRIPTS = ("theme", "fields", "fit", "sheet", "frame")
+OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "frame")
 """Names of our files in the order in which they run; the last one is given the themes."""
 
 
@@ -49,7 +53,7 @@ def load() -> ViserPage:
     html = INDEX.read_text(encoding="utf-8")
     found = LOADER.search(html)
     if found is None or html.count("<script") != 1:
-        raise ConfigurationError(f"{INDEX} is not the page of viser 1.1.1: install that version.")
+        raise ConfigurationError(f"{INDEX} is not built as that of the pinned viser: install it.")
     packed, style, program, loader = found.groups()
     unpacked = zstandard.ZstdDecompressor().decompress(
         _bytes(packed), max_output_size=int(style) + int(program)
@@ -57,6 +61,40 @@ def load() -> ViserPage:
     ours = html[: found.start()] + _our_scripts() + html[found.start() :]
     hashes = (_hash(loader.encode()), _hash(unpacked[int(style) :]))
     return ViserPage(ours.encode(), hashes)
+
+
+def policy(script_hashes: Sequence[str]) -> str:
+    """Return the content security policy of viser's page.
+
+    It allows the page's two scripts, known by their hashes, and what they make.
+    """
+    return content_policy(
+        default=("'none'",),
+        script=("'self'", "'wasm-unsafe-eval'", "blob:", *script_hashes),
+        # The loader makes the style sheet.
+        style=("'unsafe-inline'",),
+        img=("'self'", "data:", "blob:"),
+        font=("data:",),
+        media=("data:", "blob:"),
+        connect=("'self'", "data:", "blob:"),
+        worker=("blob:", "data:"),
+        ends=("base-uri 'none'", "form-action 'none'", "frame-ancestors 'self'"),
+    )
+
+
+def objection(query: QueryParams, origin: str) -> str | None:
+    """Return why viser's page is not served with ``query``, or None if it is.
+
+    viser's page plays the recording and runs the messages of the server that its address names.
+    Only the server at ``origin``, such as ``ws://localhost:8080``, may be named.
+    """
+    if "playbackPath" in query:
+        return "Recordings are not played here."
+    for url in query.getlist("websocket"):
+        parts = urlsplit(url)
+        if f"{parts.scheme}://{parts.netloc}" != origin:
+            return "The page may speak to this server alone."
+    return None
 
 
 def _our_scripts() -> str:

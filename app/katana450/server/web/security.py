@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
@@ -29,7 +29,7 @@ TLS_ONLY = "max-age=31536000"
 
 def page_policy() -> str:
     """Content security policy of our own page: nothing but its own files."""
-    return _policy(
+    return content_policy(
         default=("'none'",),
         script=("'self'",),
         style=("'self'",),
@@ -41,23 +41,8 @@ def page_policy() -> str:
     )
 
 
-def viser_policy(script_hashes: Sequence[str]) -> str:
-    """That of viser's page: its own two scripts, known by their hashes, and what they make."""
-    return _policy(
-        default=("'none'",),
-        script=("'self'", "'wasm-unsafe-eval'", "blob:", *script_hashes),
-        # The style sheet is one of the things that the loader makes.
-        style=("'unsafe-inline'",),
-        img=("'self'", "data:", "blob:"),
-        font=("data:",),
-        media=("data:", "blob:"),
-        connect=("'self'", "data:", "blob:"),
-        worker=("blob:", "data:"),
-        ends=("base-uri 'none'", "form-action 'none'", "frame-ancestors 'self'"),
-    )
-
-
-def _policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
+def content_policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
+    """Return a content security policy: ``sources`` by their kind, then ``ends`` as they are."""
     parts = [f"{kind}-src {' '.join(each)}" for kind, each in sources.items()]
     return "; ".join((*parts, *ends))
 

@@ -10,6 +10,7 @@ from viser import _messages as wire
 
 from katana450.server.view.conduit import ring
 from katana450.server.viser_bridge.posing import arrange, place, turn
+from tests.viser_bridge.internals import sent
 
 TURN = (0.6, 0.0, -0.8, 0.0)
 POINT = (0.1, -0.2, 0.3)
@@ -17,8 +18,7 @@ POINT = (0.1, -0.2, 0.3)
 
 def told(server: viser.ViserServer, kind: type[Any], node: str) -> list[Any]:
     """What a browser that opens the page now is told of a node."""
-    buffer = server._websock_server.get_message_buffer().message_from_id
-    return [each for each in buffer.values() if isinstance(each, kind) and each.name == node]
+    return [each for each in sent(server) if isinstance(each, kind) and each.name == node]
 
 
 def test_a_pose_goes_as_viser_sends_it(server: viser.ViserServer) -> None:

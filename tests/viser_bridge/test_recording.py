@@ -9,7 +9,7 @@ import numpy as np
 import viser
 import zstandard
 
-from katana450.server.view.recording import KEEP_LIGHT
+from katana450.server.viser_bridge.recording_page import KEEP_LIGHT
 
 PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 

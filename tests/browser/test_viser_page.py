@@ -1,0 +1,279 @@
+"""Each part of viser's page that static/viser.js relies on, tried on a real page of viser."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.resources import STATIC
+from tests.browser.conftest import OpenPage, Windows
+from tests.browser.page import Camera, ViserPage
+from tests.browser.server import AppServer
+from tests.browser.viser_parts_app import EYE
+from tests.viser_bridge.parts import part
+
+APP = (sys.executable, str(Path(__file__).with_name("viser_parts_app.py")), "--port", "{port}")
+NODES = ("/box", "/floor")
+CAMERA = Camera((1.5, -0.5, 0.75), (0.0, 0.0, 0.25))
+PORTRAIT = (390, 844)
+
+TAPPED = """
+    Viser.forgoCode();
+    const style = new CSSStyleSheet();
+    style.replaceSync(Viser.STEADY);
+    document.adoptedStyleSheets.push(style);
+    window.tapped = { sends: [], views: [], choices: [], sets: [], connected: 0, replayed: 0,
+                      painted: new Map(), controls: new Map(), withheld: null };
+    Viser.tap({
+        server(address, line) {
+            Object.assign(tapped, { address, line });
+            return address;
+        },
+        sends(message) {
+            tapped.sends.push(message.type);
+            if (Viser.viewOf(message)) tapped.views.push(Viser.viewOf(message));
+            if (Viser.choiceOf(message)) tapped.choices.push(Viser.choiceOf(message));
+            return message.type !== tapped.withheld;
+        },
+        connected: () => (tapped.connected += 1),
+        hears(messages) {
+            Viser.keepControls(tapped.controls, messages);
+            tapped.replayed += Viser.replayed(messages);
+            const [position, target] = Viser.viewsIn(messages);
+            if (position && target) tapped.sets.push([position, target]);
+            for (const each of Viser.paint(structuredClone(messages), { sky: "", dark: false }))
+                tapped.painted.set(each.type, messages.find(({ type }) => type === each.type));
+        },
+    });
+    window.Viser = Viser;
+"""
+
+
+def script(more: str = "") -> str:
+    return f"{(STATIC / 'viser.js').read_text(encoding='utf-8')}\n{TAPPED}\n{more}"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer(APP) as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def page(windows: Windows, server: AppServer) -> Iterator[ViserPage]:
+    """A window of viser's page with our file in front of its own program."""
+    with windows.open(server.url, nodes=NODES, camera=CAMERA, script=script()) as page:
+        yield page
+        assert page.errors == []
+
+
+def ask(page: ViserPage, what: str) -> Any:
+    """Evaluate ``what`` in viser's document."""
+    return page.frame.evaluate(f"() => {what}")
+
+
+def eye(page: ViserPage) -> list[float]:
+    """Where the camera stands, in viser's world."""
+    place: list[float] = ask(
+        page,
+        "Viser.viewer().camera.position.clone()"
+        ".applyMatrix4(Viser.node('').matrixWorld.clone().invert()).toArray()",
+    )
+    return place
+
+
+def height(page: ViserPage) -> float:
+    return float(page.node_pose("/box")[2, 3])
+
+
+def test_page_takes_camera_and_resolution_from_its_address(page: ViserPage) -> None:
+    with part("PARAMETER"):
+        names = [each.partition("=")[0] for each in CAMERA.query(0.5).split("&")]
+        assert all(ask(page, f"Viser.PARAMETER.test('{name}')") for name in names)
+        assert eye(page) == pytest.approx(CAMERA.position, abs=1e-3)
+        assert ask(page, "Viser.viewer().canvas.width / Viser.viewer().canvas.clientWidth") == 0.5
+
+
+def test_page_offers_its_scene(page: ViserPage) -> None:
+    with part("viewer"):
+        assert ask(page, "Viser.viewer().canvas.matches('canvas')")
+        names = ("getPosition", "getTarget", "setPosition", "setTarget")
+        for name in names:
+            assert ask(page, f"typeof Viser.viewer().cameraControl.{name}") == "function"
+        assert ask(page, "Viser.viewer().camera.fov") == pytest.approx(np.degrees(CAMERA.fov))
+    with part("node"):
+        assert ask(page, "Viser.node('/box').isObject3D && Viser.node('').isObject3D")
+        assert ask(page, "Viser.node('/none') === undefined")
+
+
+def test_page_speaks_to_its_worker_as_the_tap_expects(page: ViserPage, server: AppServer) -> None:
+    with part("tap"):
+        assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
+        assert ask(page, "tapped.connected") == 1
+        assert "ViewerCameraMessage" in ask(page, "tapped.sends")
+        # A message that is ours alone, in either direction.
+        (slider,) = page.messages("GuiSliderMessage")
+        page.frame.evaluate(
+            """(uuid) => tapped.line.say(
+                { type: "GuiUpdateMessage", uuid, updates: { value: 0.4 } })""",
+            slider.body["uuid"],
+        )
+        page.wait_until(lambda: abs(height(page) - 0.4) < 1e-6, "what was said to the server")
+        page.frame.evaluate(
+            """() => tapped.line.show(
+                [{ type: "SetPositionMessage", name: "/box", position: [0, 0, 0.9] }])"""
+        )
+        page.wait_until(lambda: abs(height(page) - 0.9) < 1e-6, "what was shown to the page")
+        ask(page, "tapped.withheld = 'GuiUpdateMessage'")
+        page.type_number("Height", 1.5)
+        page.page.wait_for_timeout(300)
+        ask(page, "tapped.withheld = null")
+        assert height(page) == pytest.approx(0.9)
+    with part("replayed"):
+        assert ask(page, "tapped.replayed") == 1
+
+
+def test_page_tells_and_takes_views(page: ViserPage) -> None:
+    with part("viewOf"):
+        view = ask(page, "tapped.views.at(-1)")
+        assert [len(view[key]) for key in ("position", "look_at", "up_direction")] == [3, 3, 3]
+    with part("viewsIn"):
+        position, _ = ask(page, "tapped.sets[0]")
+        assert (position["initial"], position["position"]) == (True, list(EYE))
+        page.click_button("Front")
+        page.wait_until(lambda: ask(page, "tapped.sets.length") == 2, "the view of the server")
+        position, target = ask(page, "tapped.sets[1]")
+        assert (position["initial"], position["position"]) == (False, [2.0, 0.0, 0.5])
+        assert len(target["look_at"]) == 3
+    with part("choiceOf"):
+        assert ask(page, "tapped.choices") == [{"label": "View", "value": "Front"}]
+    with part("viewing"):
+        view = {"position": [0.0, 1.5, 1.0], "look_at": [0, 0, 0], "up_direction": [0, 0, 1]}
+        page.frame.evaluate("(view) => tapped.line.show(Viser.viewing(view))", view)
+        page.wait_until(
+            lambda: np.allclose(eye(page), view["position"], atol=1e-3), "the view that was shown"
+        )
+
+
+def test_page_is_painted_by_changed_messages(page: ViserPage) -> None:
+    scheme = "document.documentElement.dataset.mantineColorScheme"
+    with part("paint"):
+        kinds = {"ThemeConfigurationMessage", "GridMessage", "BackgroundImageMessage"}
+        assert set(ask(page, "[...tapped.painted.keys()]")) == kinds
+        for name in ("cell_color", "section_color", "plane_color", "shadow_opacity"):
+            assert ask(page, f"'{name}' in tapped.painted.get('GridMessage').props"), name
+        assert ask(page, "'rgb_data' in tapped.painted.get('BackgroundImageMessage')")
+        assert ask(page, scheme) == "light"
+        for dark in ("true", "false"):
+            ask(
+                page,
+                "tapped.line.show(Viser.paint([structuredClone("
+                f"tapped.painted.get('ThemeConfigurationMessage'))], {{ dark: {dark}, sky: '' }}))",
+            )
+            wanted = "dark" if dark == "true" else "light"
+            page.wait_until(lambda wanted=wanted: ask(page, scheme) == wanted, wanted)  # type: ignore[misc]
+    with part("STEADY"):
+        faint = "(Viser.viewer().canvas.style.opacity = '0.05', Viser.viewer().canvas)"
+        assert ask(page, f"getComputedStyle({faint}).opacity") == "1"
+        assert ask(page, "document.querySelector('#root').childElementCount") > 0
+
+
+def test_number_boxes_are_found_and_filled(page: ViserPage) -> None:
+    boxes = "[...document.querySelectorAll(Viser.NUMBER_BOX)]"
+    (slider,) = page.messages("GuiSliderMessage")
+    (vector,) = page.messages("GuiVector3Message")
+    with part("NUMBER_BOX"):
+        assert ask(page, f"{boxes}.length") == 4
+    with part("controlOf"):
+        found = ask(page, f"{boxes}.map(Viser.controlOf)")
+        expected = [(slider.body["uuid"], "Height", 0)]
+        expected += [(vector.body["uuid"], "Point", index) for index in range(3)]
+        assert [(each["id"], each["label"], each["index"]) for each in found] == expected
+    with part("keepControls"):
+        kept = ask(page, "[...tapped.controls.values()]")
+        assert [(each["min"], each["max"], each["step"]) for each in kept] == [
+            (-1.0, 2.0, 0.1),
+            ([-5.0, -6.0, -7.0], [5.0, 6.0, 7.0], 0.5),
+        ]
+    with part("shownIn"):
+        shown = ask(page, f"{boxes}.slice(1).map(Viser.shownIn)")
+        assert [float(each) for each in shown] == [1.0, 2.0, 3.0]
+    with part("fill"):
+        before = len(page.sent("GuiUpdateMessage"))
+        ask(page, f"Viser.fill({boxes}[0], '1.9')")
+        page.page.wait_for_timeout(300)
+        assert len(page.sent("GuiUpdateMessage")) == before
+    with part("type"):
+        ask(page, f"Viser.type({boxes}[0], '1.2')")
+        page.wait_until(lambda: abs(height(page) - 1.2) < 1e-6, "the number that was typed")
+        assert float(ask(page, f"Viser.shownIn({boxes}[0])")) == 1.2
+
+
+def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, nodes=NODES, window=PORTRAIT, script=script())
+    count = "document.querySelectorAll(Viser.{}).length"
+    with part("NARROW"):
+        assert ask(page, "matchMedia(Viser.NARROW).matches")
+    with part("PANEL"):
+        assert ask(page, count.format("PANEL")) == 1
+    with part("PANEL_HANDLE"):
+        assert ask(page, count.format("PANEL_HANDLE")) == 1
+        slider = page.frame.get_by_text("Height", exact=True)
+        assert slider.is_visible()
+        tall = ask(page, "document.querySelector(Viser.PANEL).clientHeight")
+        ask(page, "document.querySelector(Viser.PANEL_HANDLE).click()")
+        page.wait_until(
+            lambda: ask(page, "document.querySelector(Viser.PANEL).clientHeight") < tall / 2,
+            "the panel to fold",
+        )
+    with part("PANEL_CONTENT"):
+        assert ask(page, count.format("PANEL_CONTENT")) >= 1
+    page.page.set_viewport_size({"width": 1280, "height": 800})
+    with part("NARROW"):
+        page.wait_until(lambda: ask(page, count.format("PANEL")) == 0, "the docked panel")
+
+
+def test_page_connects_again_only_with_the_focus(open_page: OpenPage) -> None:
+    blurred = "document.hasFocus = () => false;"
+    with AppServer(APP) as server, part("keepFocus"):
+        left = open_page(server.url, nodes=NODES, script=script(blurred))
+        kept = open_page(server.url, nodes=NODES, script=script(f"{blurred} Viser.keepFocus();"))
+        server.kill()
+        left.wait_lost()
+        kept.wait_lost()
+        server.start()
+        kept.wait_ready(NODES)
+        assert not left.connected
+
+
+def test_page_needs_no_code_from_text(server: AppServer, open_page: OpenPage) -> None:
+    with part("forgoCode"):
+        page = open_page(server.url, nodes=NODES, script=script())
+        refused = "(() => { try { Function('1'); } catch (error) { return error.name; } })()"
+        assert ask(page, refused) == "EvalError"
+        assert page.errors == []
+
+
+def test_page_obeys_a_server_that_its_address_names(server: AppServer, open_page: OpenPage) -> None:
+    with AppServer(APP) as other, part("websocket"):
+        address = f"{other.url}/?websocket={server.url.replace('http', 'ws', 1)}"
+        page = open_page(other.url, nodes=NODES, script=script())
+        page.page.goto(address)
+        page.wait_until(lambda: ask(page, "window.tapped?.address"), "its server")
+        assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
+
+
+def test_page_plays_the_recording_that_its_address_names(
+    server: AppServer, open_page: OpenPage
+) -> None:
+    with part("playbackPath"):
+        page = open_page(server.url, nodes=NODES, script=script())
+        asked: list[str] = []
+        page.page.on("request", lambda request: asked.append(request.url))
+        page.page.goto(f"{server.url}/?playbackPath=/run.viser")
+        page.wait_until(lambda: f"{server.url}/run.viser" in asked, "the recording to be asked for")

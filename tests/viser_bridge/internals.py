@@ -1,0 +1,52 @@
+"""viser's private parts that tests read or write: the only place in `tests` that names them.
+
+docs/viser.md lists each of them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import viser
+from viser import _messages as wire
+
+
+def nodes(server: viser.ViserServer) -> dict[str, viser.SceneNodeHandle]:
+    """Return the handles of the scene by their names."""
+    return dict(server.scene._handle_from_node_name)
+
+
+def controls(server: viser.ViserServer) -> list[Any]:
+    """Return the handles of all controls that take an input."""
+    return list(server.gui._gui_input_handle_from_uuid.values())
+
+
+def panel(server: viser.ViserServer) -> list[Any]:
+    """Return the handles at the top level of the panel."""
+    root: Any = server.gui._container_handle_from_uuid["root"]
+    return list(root._children.values())
+
+
+def sent(server: viser.ViserServer) -> list[Any]:
+    """Return the messages that a browser gets that connects now."""
+    return list(server._websock_server.get_message_buffer().message_from_id.values())
+
+
+def outlet(server: viser.ViserServer) -> Any:
+    """Return the object whose ``queue_message`` every message of the scene passes."""
+    return server.scene._websock_interface
+
+
+def value_change(handle: Any, value: object) -> wire.GuiUpdateMessage:
+    """Return the message of a browser that sets a control to ``value``."""
+    return wire.GuiUpdateMessage(handle._impl.uuid, {"value": value})
+
+
+def pretend_client(server: viser.ViserServer, client_id: int, client: Any) -> None:
+    """Have the server take ``client`` for the handle of a connected browser."""
+    server._connected_clients[client_id] = client
+
+
+def forget_clients(server: viser.ViserServer) -> None:
+    """Remove what `pretend_client` put in."""
+    server._connected_clients.clear()

@@ -1,0 +1,219 @@
+"""docs/viser.md lists all of viser's private parts that the code names, each with a test."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import viser
+
+ROOT = Path(__file__).resolve().parents[2]
+LIST = ROOT / "docs" / "viser.md"
+BRIDGE = ROOT / "app" / "katana450" / "server" / "viser_bridge"
+STATIC = ROOT / "static"
+OURS = STATIC / "viser.js"
+SERVER_TESTS = "tests/viser_bridge/test_server_parts.py"
+PAGE_TESTS = "tests/browser/test_viser_page.py"
+
+PRIVATE_IN_SCRIPTS = re.compile(
+    r"__viser\w+|mantine[\w-]*|\b[A-Z]\w+Message\b|message_batch|set_server|data-p\b"
+)
+"""Names of viser's page, as scripts and style sheets write them."""
+
+
+class Part(NamedTuple):
+    """A row of the list: its parts, the files that use them, and the tests of them."""
+
+    names: tuple[str, ...]
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+def listed(section: str = "") -> list[Part]:
+    """Return the rows of the list, or those of the section that begins with ``section``."""
+    found = []
+    for part in LIST.read_text(encoding="utf-8").split("\n## ")[1:]:
+        if not part.startswith(section):
+            continue
+        for line in part.splitlines():
+            cells = [re.findall(r"`([^`]+)`", cell) for cell in line.split("|")[1:-1]]
+            if cells and cells[0]:
+                tests = PAGE_TESTS if part.startswith("Page, as our scripts") else SERVER_TESTS
+                named = cells[-1] if len(cells) == 5 else []
+                full = tuple(each if "::" in each else f"{tests}::{each}" for each in named)
+                found.append(Part(tuple(cells[0]), tuple(cells[1]), full))
+    return found
+
+
+def names() -> set[str]:
+    return {name for row in listed() for name in row.names}
+
+
+def trees(*folders: Path) -> Iterator[tuple[Path, ast.Module]]:
+    """Parse the files below ``folders`` that name viser at all."""
+    for folder in folders:
+        for path in sorted(folder.rglob("*.py")):
+            text = path.read_text(encoding="utf-8")
+            if "viser" in text:
+                yield path, ast.parse(text)
+
+
+def private_modules(tree: ast.Module) -> set[str]:
+    """Return the private modules of viser that ``tree`` imports."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            modules = {each for each in inner if each.rpartition(".")[2].startswith("_")}
+            found |= modules or {node.module}
+    return {each for each in found if re.match(r"viser\.(_|infra\b)", each)}
+
+
+def private_names(tree: ast.Module) -> set[str]:
+    """Return the attributes with an underscore that ``tree`` uses of objects of others.
+
+    Names that a module defines itself, or that viser does not have, are its own.
+    """
+    own = _defined(tree)
+    found = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(value=ast.Name(id="wire"), attr=name) if name != "Message":
+                found.add(name)
+            case ast.Attribute(value=ast.Name(id="self" | "cls")):
+                pass
+            case ast.Attribute(attr=name) if re.match("_[a-z]", name) and name not in own:
+                found.add(name)
+    return found & VISERS
+
+
+def _defined(tree: ast.Module) -> set[str]:
+    """Return the names of functions, and of attributes of ``self``, in ``tree``."""
+    found = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+                found.add(name)
+            case ast.Attribute(value=ast.Name(id="self" | "cls"), attr=name):
+                found.add(name)
+    return found
+
+
+def _of_viser() -> set[str]:
+    """Return all words of viser's own modules."""
+    assert viser.__file__ is not None
+    text = "".join(path.read_text("utf-8") for path in Path(viser.__file__).parent.rglob("*.py"))
+    return set(re.findall(r"\w+", text))
+
+
+VISERS = _of_viser()
+
+
+def test_only_the_bridge_names_private_parts_of_the_server() -> None:
+    for path, tree in trees(ROOT / "app"):
+        if path.is_relative_to(BRIDGE):
+            continue
+        modules = private_modules(tree)
+        assert not modules, f"{path} imports {modules}: move that into {BRIDGE.name}"
+        if imports_viser(tree):
+            used = private_names(tree)
+            assert not used, f"{path} uses {used} of viser: move that into {BRIDGE.name}"
+
+
+def imports_viser(tree: ast.Module) -> bool:
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(names=found) if any(each.name.startswith("viser") for each in found):
+                return True
+            case ast.ImportFrom(module=str(module)) if module.partition(".")[0] == "viser":
+                return True
+    return False
+
+
+def test_private_parts_of_the_server_are_listed() -> None:
+    for path, tree in trees(BRIDGE):
+        for name in private_modules(tree) | private_names(tree):
+            assert name in names(), f"{path} relies on viser's {name}: list it in {LIST.name}"
+
+
+def test_private_parts_in_tests_are_listed_and_in_one_folder() -> None:
+    here = Path(__file__).parent
+    view = BRIDGE.parent / "view"
+    ours = {name for _, tree in trees(view) for name in _defined(tree)}
+    for path, tree in trees(ROOT / "tests", ROOT / "benchmarks", ROOT / "examples", ROOT / "docs"):
+        modules = private_modules(tree)
+        used = private_names(tree) - ours if imports_viser(tree) else set()
+        if path.is_relative_to(here):
+            for name in modules | used:
+                assert name in names(), f"{path} relies on viser's {name}: list it in {LIST.name}"
+        else:
+            assert not modules | used, f"{path}: use tests.viser_bridge.internals"
+
+
+def test_only_one_script_names_private_parts_of_the_page() -> None:
+    for path in sorted(STATIC.rglob("*")):
+        if path.is_file() and path != OURS:
+            found = PRIVATE_IN_SCRIPTS.findall(path.read_text(encoding="utf-8"))
+            assert not found, f"{path} names {found}: move that into {OURS.name}"
+
+
+def test_what_that_script_offers_is_listed() -> None:
+    text = OURS.read_text(encoding="utf-8")
+    offered = text[text.rindex("return {") :]
+    offered = re.sub(r"//.*", "", offered)
+    found = set(re.findall(r"^\s+(\w+):", offered, re.MULTILINE))
+    found |= {
+        name.strip()
+        for line in offered.splitlines()
+        if "=>" not in line and ":" not in line
+        for name in line.split(",")
+        if re.fullmatch(r"\s*\w+", name)
+    }
+    found -= {"viser"}
+    rows = {name for row in listed("Page, as our scripts") for name in row.names}
+    assert found == rows
+
+
+def test_private_parts_in_browser_tests_are_listed() -> None:
+    scripts = [*(ROOT / "tests").rglob("*.js"), *(ROOT / "tests").rglob("*.py")]
+    scripts += (ROOT / "benchmarks").rglob("*.js")
+    known = " ".join(names())
+    for path in scripts:
+        if path == Path(__file__):
+            continue
+        for name in re.findall(r"__viser\w+|\.mantine-[\w-]+", path.read_text(encoding="utf-8")):
+            assert name in known, f"{path} relies on viser's {name}: list it in {LIST.name}"
+
+
+def test_every_part_is_used_where_the_list_says() -> None:
+    for row in listed():
+        for name in row.files:
+            places = [BRIDGE / name, STATIC / name, ROOT / name]
+            assert any(place.exists() for place in places), f"{row.names}: there is no {name}"
+
+
+def test_every_part_has_a_test_that_names_it() -> None:
+    for section in ("Server", "Messages", "Page"):
+        for row in listed(section):
+            assert row.tests, f"{row.names} has no test"
+            for test in row.tests:
+                path, _, function = test.partition("::")
+                source = (ROOT / path).read_text(encoding="utf-8")
+                assert f"def {function}(" in source, f"{row.names}: there is no {test}"
+    sources = "".join(
+        (ROOT / path).read_text(encoding="utf-8") for path in (SERVER_TESTS, PAGE_TESTS)
+    )
+    for row in (*listed("Server"), *listed("Page, as our scripts")):
+        for name in row.names:
+            assert f'part("{name}")' in sources, f"no test of {name} names it when it fails"
+
+
+def test_version_is_exact_and_installed() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert f"viser=={viser.__version__}" in project["dependencies"]
