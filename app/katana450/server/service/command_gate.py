@@ -169,7 +169,11 @@ class CommandGate:
 
     def _stop(self, stopped: Stopped, actor: Actor) -> int:
         self._revoke()
-        self.on_stop()
+        try:
+            self.on_stop()
+        except Exception:
+            # Nothing keeps a stop from the arm, least of all an extension.
+            log.exception("Noting a stop met an error.")
         if self.stopped is None:
             self.stopped = stopped
             log.warning("Stopped: %s", stopped.why)
