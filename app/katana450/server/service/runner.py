@@ -39,7 +39,7 @@ class Runner:
 
     def __init__(self, hub: Hub, options: Namespace) -> None:  # noqa: ARG002
         """``options``: of ``katana450 serve``."""
-        self._hub = hub
+        self.hub = hub
 
     def handle(self, window: Window, request: Request) -> answers.Answer | None:
         """Execute ``request`` and return its answer; None for one that is not in ``request_types``.

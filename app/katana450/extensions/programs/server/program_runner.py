@@ -114,7 +114,7 @@ class ProgramRunner(Runner):
             self._parts[key] = text
             return
         self._check_free()
-        arm = self._hub.present()
+        arm = self.hub.present()
         if arm.state.moving:
             raise LeaseError("The arm moves: a program is planned from where it stands.")
         self._check_may_drive(window.person)
@@ -130,15 +130,15 @@ class ProgramRunner(Runner):
 
     def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
         """Plan ``text`` from the present state; ``changed`` is why an earlier plan is not kept."""
-        arm = self._hub.present()
+        arm = self.hub.present()
         note = f"Planned anew: {changed}." if changed else ""
         context = PlanContext(arm.session, arm.arm.T_base_shoulder)
-        self._planning = Planning(text, speed, context, arm.state, self._hub.clock, note)
+        self._planning = Planning(text, speed, context, arm.state, self.hub.clock, note)
         self._own(window)
 
     def _own(self, window: Window) -> None:
         self._owner, self._run, self._then = window, None, None
-        self._seen = self._hub.clock()
+        self._seen = self.hub.clock()
 
     def steer(self, window: Window, order: Order) -> None:
         """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
@@ -172,12 +172,12 @@ class ProgramRunner(Runner):
     def _steer_planning(self, planning: Planning, window: Window, order: Order) -> None:
         match order:
             case Order.RUN | Order.STEP:
-                self._hub.gate.check_not_stopped()
+                self.hub.gate.check_not_stopped()
                 self._then, planning.note = order, ""
             case Order.PAUSE:
-                self._hub.move(window, cmd.Pause())
+                self.hub.move(window, cmd.Pause())
             case Order.RESUME:
-                self._hub.move(window, cmd.Resume())
+                self.hub.move(window, cmd.Resume())
             case Order.END:
                 self._then = None
                 planning.cancel(f"{window.person.name} cancelled the planning.")
@@ -202,7 +202,7 @@ class ProgramRunner(Runner):
             self._end(f"{window.person.name} left.")
 
     def tick(self) -> None:
-        hub, t = self._hub, self._hub.clock()
+        hub, t = self.hub, self.hub.clock()
         if self._then is not None and self._owner_is_silent(t):
             self._forget_run("whoever asked for it is gone")
         if self.program is not None and self._then is not None:
@@ -240,7 +240,7 @@ class ProgramRunner(Runner):
         planning, owner = self._planning, self._owner
         if planning is None or owner is None:
             return None
-        program, run, arm = planning.program, self._run, self._hub.arm
+        program, run, arm = planning.program, self._run, self.hub.arm
         if program is None or run is None or arm is None or planning.refused is not None:
             return planning.progress(owner.person.name)
         now = runner.progress(program, run, arm.state)
@@ -261,10 +261,10 @@ class ProgramRunner(Runner):
         return state_line.status_line(state, line, self.progress(), waits=self.waits)
 
     def orders(self, window: Window) -> tuple[str, ...]:
-        arm = self._hub.arm
+        arm = self.hub.arm
         if arm is None or not self.owns(window):
             return ()
-        stopped = self._hub.stopped is not None
+        stopped = self.hub.stopped is not None
         offered = state_line.orders(arm.state, self.progress(), stopped=stopped, waits=self.waits)
         return tuple(order.value for order in offered)
 
@@ -283,13 +283,13 @@ class ProgramRunner(Runner):
     def _begin(self, window: Window, order: Order) -> None:
         """Run the program that is planned; where the arm or the scene is not as it was planned for,
         plan it anew first."""
-        planning, hub = self._planning, self._hub
+        planning, hub = self._planning, self.hub
         if planning is None or planning.program is None:
             raise LeaseError("There is no program that is planned; send one first.")
         arm = hub.present()
         changed = planning.changed_to(arm.state)
         if changed:
-            self._hub.gate.check_not_stopped()
+            self.hub.gate.check_not_stopped()
             if arm.state.moving:
                 raise LeaseError("The arm moves: a program is planned from where it stands.")
             if hub.lease.holder != window.person:
@@ -325,7 +325,7 @@ class ProgramRunner(Runner):
     def _tell(self, *commands: cmd.Command) -> None:
         assert self._self is not None
         for command in commands:
-            self._hub.move(self._self, self._as_allowed(command))
+            self.hub.move(self._self, self._as_allowed(command))
 
     def _as_allowed(self, command: cmd.Command) -> cmd.Command:
         """``command``, no faster than a person has allowed since the program began."""
@@ -347,14 +347,14 @@ class ProgramRunner(Runner):
         assert self._self is not None
         assert self._run is not None
         joined, self._self = self._self, None
-        self._hub.gate.program = None
+        self.hub.gate.program = None
         self._run = runner.ended(self._run, phase, why)
         # A program's speed is its own.
         with suppress(InputError):
-            self._hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
-        if self._hub.lease.holder == joined.person:
-            self._hub.release_lease(joined)
-        self._hub.leave(joined, for_good=True)
+            self.hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
+        if self.hub.lease.holder == joined.person:
+            self.hub.release_lease(joined)
+        self.hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
     def _check_free(self) -> None:
@@ -363,17 +363,17 @@ class ProgramRunner(Runner):
         planning = self._planning
         if planning is None or not planning.busy:
             return
-        if not self._owner_is_silent(self._hub.clock()):
+        if not self._owner_is_silent(self.hub.clock()):
             raise LeaseError("Another program is being planned: cancel that first, or wait for it.")
         planning.cancel("Whoever asked for it is gone.")
 
     def _owner_is_here(self) -> bool:
         owner = self._owner
-        return owner is not None and self._hub.window(owner.person.key) is not None
+        return owner is not None and self.hub.window(owner.person.key) is not None
 
     def _owner_is_silent(self, t: float) -> bool:
         """Return whether no heartbeat of the owner was received for the heartbeat timeout."""
-        window = None if self._owner is None else self._hub.window(self._owner.person.key)
+        window = None if self._owner is None else self.hub.window(self._owner.person.key)
         if window is not None:
             self._seen = max(self._seen, window.heartbeat.newest)
         return t - self._seen > self._owner_silence
