@@ -45,8 +45,6 @@ def runner():
         request_types = (Nod,)
 
         def handle(self, window, request):
-            if not isinstance(request, Nod):
-                return None
             seen.append(window.person.name)
             return Done(ticket=self.hub.move(window, cmd.Nudge(3, request.by)))
 

@@ -76,9 +76,8 @@ class Dispatcher:
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.Named(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
-        answer = hub.runner.handle(window, request)
-        if answer is not None:
-            return answer
+        if isinstance(request, hub.runner.request_types):
+            return hub.runner.handle(window, request)
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
         command = self._command(request)

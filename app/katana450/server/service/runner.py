@@ -41,11 +41,12 @@ class Runner:
         """``options``: of ``katana450 serve``."""
         self.hub = hub
 
-    def handle(self, window: Window, request: Request) -> answers.Answer | None:
-        """Execute ``request`` and return its answer; None for one that is not in ``request_types``.
+    def handle(self, window: Window, request: Request) -> answers.Answer:
+        """Execute ``request``, one of ``request_types``, and return its answer.
 
         Raises LeaseError and InputError with the reason for a refusal.
         """
+        raise NotImplementedError
 
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError where ``actor`` must not touch ``controls``. Called in any thread."""

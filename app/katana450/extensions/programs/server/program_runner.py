@@ -86,14 +86,12 @@ class ProgramRunner(Runner):
         if self.running:
             self._check_owns(actor.person)
 
-    def handle(self, window: Window, request: Request) -> answers.Answer | None:
+    def handle(self, window: Window, request: Request) -> answers.Answer:
         match request:
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(window, text, more=more, speed=speed)
             case requests.Steer(order=order):
                 self.steer(window, order)
-            case _:
-                return None
         return answers.Done()
 
     def then(self, order: Order | None) -> None:
