@@ -241,7 +241,11 @@ def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) 
 def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
-    shown = bar(table, window)
+    due = time.monotonic() + 10.0
+    # The thread of the planning may not have begun.
+    while (shown := bar(table, window))["headline"] == "Planning the script 0%":
+        assert time.monotonic() < due
+        time.sleep(0.005)
     assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20%")
     assert shown["why"] == "Step 1 of 2: timing paths, 20%. It does not run by itself."
     table.arm.moves = True
