@@ -52,7 +52,10 @@ def runner():
             return Progress(name="nods", by=seen[-1], status="done") if seen else None
 
         def stopped(self):
-            raise ValueError("a fault of the extension")
+            raise ValueError("a fault in stopped")
+
+        def redirected(self):
+            raise ValueError("a fault in redirected")
 
     return Nodder
 
@@ -170,7 +173,7 @@ def test_option_of_the_missing_extension_is_refused(option: str, tmp_path: Path)
 
 
 def test_another_distribution_provides_the_runner(tmp_path: Path) -> None:
-    """Its request, progress and folder are there, and its fault keeps no stop from the arm."""
+    """Its request, progress and folder are there, and its faults keep no stop from the arm."""
     distribution(tmp_path, "station:EXTENSION", STATION)
     with (
         without(tmp_path, "programs"),
@@ -189,4 +192,5 @@ def test_another_distribution_provides_the_runner(tmp_path: Path) -> None:
         watcher.ask(requests.Stop())
         state = wait(watcher, lambda state: state.stop == "confirmed")
         assert state.stopped == "Watcher pressed STOP."
-        assert "a fault of the extension" in server.output
+        for name in ("stopped", "redirected"):
+            assert f"a fault in {name}" in server.output

@@ -17,6 +17,7 @@ from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.nodes import Nodes
+from katana450.server.service.runner import guarded
 from katana450.server.view.follower import Follower
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
@@ -47,7 +48,7 @@ def attached(
     if outfit.options is not None:
         _add_folders(view, gateway, outfit.options, robot, link)
     navigator.tell = gateway.announce
-    navigator.redirected = gateway.hub.runner.redirected
+    navigator.redirected = guarded(gateway.hub.runner.redirected)
     gateway.attach(ArmHandle(robot, session, link, navigator, nodes))
     return link, view
 

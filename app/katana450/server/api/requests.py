@@ -289,7 +289,7 @@ AnyRequest = (
 
 class _Named(msgspec.Struct):
     id: Id = None
-    do: str = ""
+    do: Any = None
 
 
 _names = msgspec.json.Decoder(_Named)
@@ -312,7 +312,7 @@ class RequestDecoder:
             return self._decoder.decode(text)
         except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
             name = _named(text).do
-            if name and name not in self._known:
+            if isinstance(name, str) and name not in self._known:
                 raise InputError(
                     f"This server has no request {name!r}. {ROOT}/openapi.json lists those it has."
                 ) from error

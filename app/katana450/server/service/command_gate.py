@@ -169,11 +169,7 @@ class CommandGate:
 
     def _stop(self, stopped: Stopped, actor: Actor) -> int:
         self._revoke()
-        try:
-            self.on_stop()
-        except Exception:
-            # Nothing keeps a stop from the arm, least of all an extension.
-            log.exception("Noting a stop met an error.")
+        self.on_stop()
         if self.stopped is None:
             self.stopped = stopped
             log.warning("Stopped: %s", stopped.why)

@@ -25,7 +25,7 @@ from katana450.server.service.event_log import Journal
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import Arm, Behind
-from katana450.server.service.runner import Runner
+from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_state import Presses, Stopped
 from katana450.settings import Settings
@@ -72,7 +72,7 @@ class Hub:
         self.journal = Journal()
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
         self.requests = RequestDecoder(self.runner.request_types)
-        self.gate.on_stop = self.runner.stopped
+        self.gate.on_stop = guarded(self.runner.stopped)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from argparse import Namespace
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from katana450.arm.control.actor import Actor
@@ -12,6 +14,8 @@ from katana450.server.api.fields import Request
 
 if TYPE_CHECKING:
     from katana450.server.service.hub import Hub, Window
+
+log = logging.getLogger(__name__)
 
 
 class StatusLine(NamedTuple):
@@ -79,3 +83,18 @@ class Runner:
     def orders(self, window: Window) -> tuple[str, ...]:  # noqa: ARG002
         """Return the orders that the bar of the page offers to ``window``."""
         return ()
+
+
+def guarded(note: Callable[[], None]) -> Callable[[], None]:
+    """Return ``note`` with its errors logged and not raised.
+
+    For ``stopped`` and ``redirected``, which are on the path of a stop to the arm.
+    """
+
+    def noted() -> None:
+        try:
+            note()
+        except Exception:
+            log.exception("The runner met an error.")
+
+    return noted
