@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from katana450.extension import extensions
 from katana450.server.api import answers, requests, schema
-from katana450.server.api.fields import tag_of
+from katana450.server.api.fields import Request, tag_of
 
 PAGE = Path(__file__).with_name("api.md")
 
@@ -111,6 +113,14 @@ def page() -> str:
     ):
         parts.append(f"## {title}\n")
         parts += [_kind(kind, tag) for kind in schema.kinds(union)]
+        if tag == "do":
+            for name, kinds in added_requests().items():
+                module = kinds[0].__module__
+                parts.append(f"## Requests of the extension `{name}`\n")
+                parts.append(
+                    f"A server without that extension refuses them. From Python: `{module}`.\n"
+                )
+                parts += [_kind(kind, tag) for kind in kinds]
     parts.append("### In requests\n")
     parts += [_kind(kind, None) for kind in (requests.Named, requests.Setting)]
     parts.append("### In answers\n")
@@ -122,6 +132,15 @@ def page() -> str:
         )
     ]
     return "\n".join(parts)
+
+
+def added_requests() -> dict[str, tuple[type[Request], ...]]:
+    """Return the requests that extensions add, by the names of these."""
+    return {
+        each.name: each.serve.runner().request_types
+        for each in extensions()
+        if each.serve is not None and each.serve.runner is not None
+    }
 
 
 def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
@@ -150,8 +169,10 @@ def _json(value: Any) -> str:
 def _shape(schema: dict[str, Any]) -> str:
     if "$ref" in schema:
         name: str = schema["$ref"].rpartition("/")[2]
-        kind = getattr(requests, name, None) or getattr(answers, name, None)
-        if kind is not None and hasattr(kind, "__members__"):
+        added = (sys.modules[kinds[0].__module__] for kinds in added_requests().values())
+        places = (requests, answers, *added)
+        kind: Any = next((vars(each)[name] for each in places if name in vars(each)), None)
+        if hasattr(kind, "__members__"):
             return " or ".join(f'`"{each.value}"`' for each in kind)
         return name
     if "anyOf" in schema:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from katana450.client import Client, connect
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
-from katana450.server.api import answers, requests
+from katana450.extensions.programs.requests import Order, Program, Steer
+from katana450.server.api import answers
 from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
@@ -116,15 +117,15 @@ def pouring(page: ViserPage) -> None:
     with connect(url, "Pictures") as arm:
         send(arm, PourDemo().text)
         program(arm, lambda told: told.status in ("ready", "refused"))
-        arm.ask(requests.Steer(order=requests.Order.RUN))
+        arm.ask(Steer(order=Order.RUN))
         for task, share in STAGES:
             program(arm, lambda told, t=task, s=share: told.task == t and told.share >= s)  # type: ignore[misc]
-            arm.ask(requests.Steer(order=requests.Order.PAUSE))
+            arm.ask(Steer(order=Order.PAUSE))
             page.page.wait_for_timeout(700)
             page.wait_drawn()
             pictures.append(tile(page))
-            arm.ask(requests.Steer(order=requests.Order.RESUME))
-        arm.ask(requests.Steer(order=requests.Order.END))
+            arm.ask(Steer(order=Order.RESUME))
+        arm.ask(Steer(order=Order.END))
     sheet = np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
     imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
 
@@ -138,12 +139,12 @@ def instruments(page: ViserPage) -> None:
         page.press_in_bar("Instruments")
         send(arm, CircleDemo(tool="tcp").text)
         program(arm, lambda told: told.status in ("ready", "refused"))
-        arm.ask(requests.Steer(order=requests.Order.RUN))
+        arm.ask(Steer(order=Order.RUN))
         # The way to its start counts as a share of its own.
         program(arm, lambda told: told.task == "circle" and told.share > 0.75)
         program(arm, lambda told: told.task == "circle" and 0.05 < told.share < 0.3)
         program(arm, lambda told: told.share > 0.75)
-        arm.ask(requests.Steer(order=requests.Order.PAUSE))
+        arm.ask(Steer(order=Order.PAUSE))
         page.page.locator("#instruments").get_by_role("button", name="Pause").click()
         page.page.wait_for_timeout(3000)
         page.screenshot(IMAGES / "instruments.png")
@@ -153,7 +154,7 @@ def send(arm: Client, text: str) -> None:
     """Have a script planned."""
     parts = [text[at : at + 600] for at in range(0, len(text), 600)]
     for number, part in enumerate(parts, start=1):
-        arm.ask(requests.Program(text=part, more=number < len(parts), speed=UNHURRIED))
+        arm.ask(Program(text=part, more=number < len(parts), speed=UNHURRIED))
 
 
 def program(arm: Client, wanted: Callable[[answers.Progress], bool]) -> answers.Progress:

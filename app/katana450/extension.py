@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -28,13 +29,15 @@ if TYPE_CHECKING:
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.server.service.nodes import Nodes
+    from katana450.server.service.runner import Runner
     from katana450.server.view.layer import ViewLayer
+    from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
 
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
-BUILT_IN = ("importers", "reachability", "export", "experiments", "render")
+BUILT_IN = ("programs", "importers", "reachability", "export", "experiments", "render")
 """Built-in extensions, in the order of their commands in the help."""
 
 log = logging.getLogger(__name__)
@@ -72,6 +75,11 @@ class ServeExtension:
             view.
         nodes: Returns what of a robot and the objects around it can be read and set by name.
             Called in the process of the view; the first extension that has it is asked.
+        runner: Returns the class of what drives the arm over time, with its requests. Called in the
+            process of the view; the first extension that has it is asked.
+        folder: Returns a folder of the panel of an arm, or None. Called in the process of the view.
+            Raises KatanaError.
+        needs: Built-in extensions without which this part is left out.
     """
 
     add_options: Callable[[ArgumentParser], None] | None = None
@@ -79,6 +87,9 @@ class ServeExtension:
     view_layer: Callable[[Namespace], ViewLayer | None] | None = None
     routes: Callable[[RouteContext], list[BaseRoute]] | None = None
     nodes: Callable[[Robot, Environment], Nodes] | None = None
+    runner: Callable[[], type[Runner]] | None = None
+    folder: Callable[[FolderContext], PanelFolder | None] | None = None
+    needs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,7 +119,15 @@ def extensions() -> tuple[Extension, ...]:
 
 def serve_extensions() -> tuple[ServeExtension, ...]:
     """Return what the installed extensions add to ``katana450 serve``."""
-    return tuple(each.serve for each in extensions() if each.serve is not None)
+    parts = (each.serve for each in extensions() if each.serve is not None)
+    return tuple(part for part in parts if all(map(_is_installed, part.needs)))
+
+
+def _is_installed(name: str) -> bool:
+    try:
+        return find_spec(f"{PACKAGE}.{name}") is not None
+    except ImportError:
+        return False
 
 
 def missing_extension(error: ImportError) -> str | None:

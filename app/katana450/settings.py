@@ -22,13 +22,11 @@ class Settings:
         frame_rate: most view updates a second [Hz].
         ready: posture the arm starts in and Home returns to [rad].
         silence: time without a sign of life of whoever drives that stops an arm that moves [s].
-        owner_silence: heartbeat timeout of a program's owner, after which the program ends [s].
         access: file of the links by which people come in; without it nobody is asked.
         insecure: other machines may come in unasked.
         tls_cert, tls_key: files of a certificate and its key, for https.
         public_url: what people type when a reverse proxy stands in front.
         bare: whether the arm is without its gripper.
-        programs: folder of scripts that the panel offers besides those that come along.
         lines: TCP port of this machine for programs that speak JSON lines; None without.
     """
 
@@ -38,7 +36,6 @@ class Settings:
     frame_rate: float = 60.0
     ready: tuple[float, ...] = tuple(math.radians(angle) for angle in READY_POSTURE_DEG)
     silence: float = 0.25
-    owner_silence: float = 1.0
     access: Path | None = None
     insecure: bool = False
     tls_cert: Path | None = None
@@ -46,4 +43,3 @@ class Settings:
     public_url: str | None = None
     lines: int | None = None
     bare: bool = False
-    programs: Path | None = None

@@ -5,9 +5,14 @@ from __future__ import annotations
 import json
 from typing import get_args
 
-from docs.api import PAGE, page
+from docs.api import PAGE, added_requests, page
 from katana450.server.api import answers, requests, schema
 from katana450.server.api.fields import Request, RequestTraits, tag_of
+
+ADDED = tuple(kind for kinds in added_requests().values() for kind in kinds)
+"""Requests of the built-in extensions."""
+
+EVERY_REQUEST: tuple[type[Request], ...] = (*get_args(requests.AnyRequest), *ADDED)
 
 
 def test_the_page_is_what_the_shapes_say() -> None:
@@ -16,14 +21,15 @@ def test_the_page_is_what_the_shapes_say() -> None:
 
 def test_every_message_is_on_it_with_a_sentence() -> None:
     said = PAGE.read_text(encoding="utf-8")
-    for union, tag in ((requests.AnyRequest, "do"), (answers.AnyAnswer, "is")):
-        for kind in schema.kinds(union):
+    every = ((EVERY_REQUEST, "do"), (schema.kinds(answers.AnyAnswer), "is"))
+    for kinds, tag in every:
+        for kind in kinds:
             assert f'### `"{tag}": "{tag_of(kind.__name__)}"`' in said
             assert len(schema.summary(kind)) > 5, kind
 
 
 def test_the_description_for_tools_holds_together() -> None:
-    described = json.loads(schema.openapi_json())
+    described = json.loads(schema.openapi_json(ADDED))
     text = json.dumps(described)
     named = text.split("#/components/schemas/")[1:]
     assert len(named) > 20
@@ -32,17 +38,15 @@ def test_the_description_for_tools_holds_together() -> None:
 
 
 def test_every_request_class_is_a_request_and_declares_its_traits() -> None:
-    kinds: tuple[type[Request], ...] = get_args(requests.AnyRequest)
-    assert set(Request.__subclasses__()) == set(kinds)
-    for kind in kinds:
+    assert set(Request.__subclasses__()) == set(EVERY_REQUEST)
+    for kind in EVERY_REQUEST:
         assert isinstance(vars(kind).get("traits"), RequestTraits), f"{kind.__name__}: no traits"
-        assert kind.__name__ in requests.__all__
-    assert [kind for kind in kinds if kind.traits.safety] == [requests.Stop]
+        assert (kind.__name__ in requests.__all__) != (kind in ADDED)
+    assert [kind for kind in EVERY_REQUEST if kind.traits.safety] == [requests.Stop]
 
 
 def test_who_holds_the_arm_and_heartbeats_cost_nothing() -> None:
-    every: tuple[type[Request], ...] = get_args(requests.AnyRequest)
-    kinds = [kind for kind in every if kind.traits.free]
+    kinds = [kind for kind in EVERY_REQUEST if kind.traits.free]
     assert {kind.__name__ for kind in kinds} == {
         *("Stop", "ClearStop", "Heartbeat"),
         *("Acquire", "Take", "Ask", "Withdraw", "Give", "ReleaseLease"),

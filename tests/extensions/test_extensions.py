@@ -16,21 +16,10 @@ from katana450.extension import BUILT_IN, extensions
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT as ROOT_PATH
 from tests.browser.server import AppServer, free_port
+from tests.extensions.environments import distribution, write_blocking
 
 ROOT = Path(__file__).resolve().parents[2]
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
-
-BLOCKING = """
-import os, sys
-
-class Blocked:
-    def find_spec(self, name, path=None, target=None):
-        for blocked in os.environ["BLOCKED"].split():
-            if name == blocked or name.startswith(blocked + "."):
-                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-sys.meta_path.insert(0, Blocked())
-"""
 
 STATION = """
 from katana450.extension import CliCommand, Extension
@@ -90,20 +79,8 @@ def katana450(*options: str, folder: Path | None = None, blocked: str = "", text
 @pytest.fixture
 def blocking(tmp_path: Path) -> Path:
     """Return a folder that makes the packages in the variable BLOCKED impossible to import."""
-    (tmp_path / "sitecustomize.py").write_text(BLOCKING, encoding="utf-8")
+    write_blocking(tmp_path)
     return tmp_path
-
-
-def distribution(folder: Path, entry: str, module: str) -> Path:
-    """Write another distribution into ``folder``, with ``module`` and its entry point."""
-    information = folder / "weather-1.0.dist-info"
-    information.mkdir(parents=True)
-    lines = ("Metadata-Version: 2.1", "Name: weather", "Version: 1.0", "")
-    (information / "METADATA").write_text("\n".join(lines), encoding="utf-8")
-    points = f"[katana450.extensions]\nweather = {entry}\n"
-    (information / "entry_points.txt").write_text(points, encoding="utf-8")
-    (folder / "station.py").write_text(module, encoding="utf-8")
-    return folder
 
 
 def test_every_built_in_extension_is_found() -> None:
@@ -116,6 +93,7 @@ def test_every_built_in_extension_is_found() -> None:
         ("reachability", ["workspace"]),
         ("export", ["export", "render"]),
         ("experiments", ["run", "demo"]),
+        ("programs", ["run", "demo"]),
         ("render", ["render"]),
     ],
 )

@@ -23,13 +23,13 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import LeaseError
-from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub, Window, key_of, visiting
 from katana450.server.service.identity import Identity
 from katana450.server.service.nodes import Nodes
+from katana450.server.service.runner import Runner
 from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")
@@ -46,7 +46,7 @@ class FakeArm:
     lateness: LoopTiming
     surroundings: Environment
     pouring: Pouring | None
-    rig: PlanContext
+    session: Session
     outcome: Any
     margins: Margins
     holding: FloatArray | None
@@ -119,9 +119,9 @@ class FakeArm:
 class Table:
     """A hub, its arm, and the hands of a clock."""
 
-    def __init__(self, state: State) -> None:
+    def __init__(self, state: State, runner: Callable[[Hub], Runner] | None = None) -> None:
         self.t = 100.0
-        self.hub = Hub(lambda: self.t)
+        self.hub = Hub(lambda: self.t, runner=runner)
         self.arm = self.hub.gate.arm = FakeArm(state)
         self.told: dict[str, list[dict[str, Any]]] = {}
 

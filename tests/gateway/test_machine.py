@@ -17,6 +17,7 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
+from katana450.extensions.programs.requests import Program
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer
 from tests.exchange.trees import tree
@@ -94,7 +95,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         requests.Pose(T=eye), requests.Position(p=(0.1, 0, 0)), requests.Turn(pitch=0, roll=0),
         requests.Jog(rates=(0.1, 0, 0, 0, 0)), requests.Branch(shoulder="front", elbow="up"),
         requests.Gripper(angle=0.1), requests.Tool(name="tcp"), requests.Fill(ml=1.0),
-        requests.Program(text="steps: []"), requests.Remove(name="cup"),
+        Program(text="steps: []"), requests.Remove(name="cup"),
         requests.Place(name="a", T=eye, form=requests.Form.SPHERE, size=[0.1]),
     ]  # fmt: skip
     for request in cartesian:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from argparse import Namespace
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,10 +14,12 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
-from katana450.extensions.programs.bench import PlanContext
+from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.extensions.programs.order import PATIENCE
-from katana450.server.api.fields import Order
-from katana450.server.service.hub import Window
+from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.server.panel_access import PanelAccess
+from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.server.service.hub import Hub, Window
 from tests.gateway.test_hub import PAGES, Table
 
 NOBODY = Person("nobody", "Nobody", Role.ADMIN)
@@ -23,21 +27,29 @@ NOBODY = Person("nobody", "Nobody", Role.ADMIN)
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 
+def made(hub: Hub) -> ProgramRunner:
+    """Make the runner as ``katana450 serve`` does."""
+    return ProgramRunner(hub, Namespace(owner_silence=OWNER_SILENCE))
+
+
 class Staged(Table):
     """A table whose arm can be planned for."""
 
     def __init__(self, session: Session) -> None:
-        super().__init__(session.begin(session.ready, 0.0, 0.0))
-        self.arm.rig = PlanContext(session, np.eye(4))
+        super().__init__(session.begin(session.ready, 0.0, 0.0), made)
+        self.arm.session, self.arm.arm = session, Mock(T_base_shoulder=np.eye(4))
+        assert isinstance(self.hub.runner, ProgramRunner)
+        self.programs = self.hub.runner
+        self.panel = PanelAccess(self.programs, self.hub, lambda act: act())
 
     @property
     def status(self) -> str:
-        told = self.hub.performer.told()
+        told = self.programs.progress()
         return "" if told is None else told.status
 
     def plan(self, window: Window, script: str = SCRIPT) -> None:
         """And wait for the thread that does it."""
-        self.hub.performer.script(window, script, more=False, speed=1.0)
+        self.programs.script(window, script, more=False, speed=1.0)
         due = time.monotonic() + 10.0
         while self.status == "planning" and time.monotonic() < due:
             time.sleep(0.005)
@@ -53,7 +65,7 @@ def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
     table.touch(window.person.key)
     table.plan(window)
     assert table.status == "ready"
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     holder = table.hub.lease.holder
     assert holder is not None
     assert (holder.name, holder.role) == ("Wave", Role.OPERATOR)
@@ -68,7 +80,7 @@ def test_time_passes_for_it_while_the_arm_tells_nothing_new(table: Staged) -> No
     """An arm at rest shows the state in which it came to rest, its time included."""
     window = table.join(PAGES[0])
     table.plan(window)
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     table.wait(29.0, window)
     assert not any(isinstance(command, cmd.Follow) for command in table.arm.commands)
     table.wait(2.0, window)
@@ -78,7 +90,7 @@ def test_time_passes_for_it_while_the_arm_tells_nothing_new(table: Staged) -> No
 def test_a_pause_takes_nobodys_patience(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window, "steps:\n  - gripper: open\n")
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     rest = table.arm.rest
     table.arm.rest = replace(rest, gripper_goal=rest.gripper_goal + 0.5)
     table.wait(0.1, window)
@@ -96,7 +108,7 @@ def test_a_pause_takes_nobodys_patience(table: Staged) -> None:
 def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> None:
     owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     viewer, admin = table.join("third", Role.VIEWER), table.join("fourth", Role.ADMIN)
-    performer = table.hub.performer
+    performer = table.programs
     with pytest.raises(LeaseError, match="watch"):
         performer.script(viewer, SCRIPT, more=False, speed=1.0)
     table.plan(owner)
@@ -119,7 +131,7 @@ def test_it_does_not_take_the_arm_from_somebody(table: Staged) -> None:
     table.plan(owner)
     table.touch(other.person.key)
     with pytest.raises(LeaseError, match="Window 2 holds the arm"):
-        table.hub.performer.steer(owner, Order.RUN)
+        table.programs.steer(owner, Order.RUN)
     assert len(table.hub.windows) == 2
     assert table.hub.lease.holder == other.person
 
@@ -127,13 +139,13 @@ def test_it_does_not_take_the_arm_from_somebody(table: Staged) -> None:
 def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window)
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     table.stop("Somebody")
     table.wait(0.1, window)
     assert table.status == "stopped"
     table.hub.clear_stop(window)
     table.hub.release_lease(window)
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     table.wait(0.5, window)
     table.hub.leave(window)
     table.wait(0.5)
@@ -145,12 +157,11 @@ def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
 
 def test_what_the_panel_asked_for_is_done_once_it_is_planned(table: Staged) -> None:
     window = table.join(PAGES[0])
-    performer = table.hub.performer
     with pytest.raises(LeaseError, match="front page"):
-        performer.plan(SCRIPT, Order.RUN, replace(window.actor, person=NOBODY))
-    performer.plan(SCRIPT, Order.RUN, window.actor)
+        table.panel.plan(SCRIPT, Order.RUN, replace(window.actor, person=NOBODY))
+    table.panel.plan(SCRIPT, Order.RUN, window.actor)
     with pytest.raises(LeaseError, match="being planned"):
-        performer.plan(SCRIPT, Order.RUN, window.actor)
+        table.panel.plan(SCRIPT, Order.RUN, window.actor)
     due = time.monotonic() + 10.0
     while table.status in ("planning", "ready") and time.monotonic() < due:
         table.wait(0.02, window)
@@ -160,16 +171,16 @@ def test_what_the_panel_asked_for_is_done_once_it_is_planned(table: Staged) -> N
 
 def test_what_was_asked_for_before_a_stop_is_not_done_after_it(table: Staged) -> None:
     window = table.join(PAGES[0])
-    performer = table.hub.performer
-    performer.plan(SCRIPT, Order.RUN, window.actor)
+    performer = table.programs
+    table.panel.plan(SCRIPT, Order.RUN, window.actor)
     clicked = table.hub.at_scene(window.person.key, table.hub.gate.revocations)
     table.stop("Anybody")
     table.hub.clear_stop(window)
     # A click that was on its way meanwhile.
     with pytest.raises(LeaseError, match="Do it again"):
-        performer.plan(SCRIPT, Order.RUN, clicked)
+        table.panel.plan(SCRIPT, Order.RUN, clicked)
     with pytest.raises(LeaseError, match="Do it again"):
-        performer.order(Order.RUN, clicked)
+        table.panel.steer(Order.RUN, clicked)
     due = time.monotonic() + 10.0
     while table.status == "planning" and time.monotonic() < due:
         time.sleep(0.005)

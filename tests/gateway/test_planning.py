@@ -18,10 +18,11 @@ from katana450.arm.control.things import Form, Thing
 from katana450.errors import LeaseError
 from katana450.extensions.programs.layout import TIMING, PlanningStage
 from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.server import program_planning
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
-from katana450.server.api.fields import Order
-from katana450.server.service import program_planning, status
+from katana450.server.service import status
 from katana450.server.service.hub import Window
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_performer import SCRIPT, Staged
@@ -61,7 +62,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
 
 def ask(table: Staged, window: Window, then: Order | None = Order.RUN) -> None:
     """Run ``SCRIPT`` as the panel of the page asks for it."""
-    table.hub.performer.plan(SCRIPT, then, window.actor)
+    table.panel.plan(SCRIPT, then, window.actor)
     table.wait(0.1, window)
 
 
@@ -84,7 +85,7 @@ def bar(table: Staged, window: Window) -> dict[str, Any]:
 def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window)
-    table.hub.performer.steer(window, Order.PAUSE)
+    table.programs.steer(window, Order.PAUSE)
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     table.arm.rest = replace(table.arm.rest, paused=True)
     shown = bar(table, window)
@@ -96,7 +97,7 @@ def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: 
     assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
     table.wait(60.0, window)
     assert not followed(table)
-    table.hub.performer.steer(window, Order.RESUME)
+    table.programs.steer(window, Order.RESUME)
     assert isinstance(table.arm.commands[-1], cmd.Resume)
     table.arm.rest = replace(table.arm.rest, paused=False)
     table.wait(0.1, window)
@@ -107,7 +108,7 @@ def test_run_of_a_finished_plan_does_not_end_a_pause(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window)
     table.arm.rest = replace(table.arm.rest, paused=True)
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     table.wait(60.0, window)
     assert table.status == "paused"
     assert not followed(table)
@@ -118,25 +119,25 @@ def test_other_commands_during_planning_keep_the_program_from_running(
 ) -> None:
     window = table.join(PAGES[0])
     ask(table, window)
-    table.hub.performer.redirected()
+    table.programs.redirected()
     assert "does not run by itself" in bar(table, window)["why"]
     finish(table, window, slow)
-    told = table.hub.performer.told()
+    told = table.programs.progress()
     assert told is not None
     assert told.status == "ready"
     assert told.why.startswith("Not run: the arm was told something else")
-    assert not table.hub.performer.running
+    assert not table.programs.running
 
 
 def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
     table.stop("Anybody")
-    performer = table.hub.performer
+    performer = table.programs
     with pytest.raises(LeaseError, match="clear the stop first"):
         performer.steer(window, Order.RUN)
     with pytest.raises(LeaseError, match="clear the stop first"):
-        performer.plan(SCRIPT, Order.RUN, window.actor)
+        table.panel.plan(SCRIPT, Order.RUN, window.actor)
     finish(table, window, slow)
     q = table.arm.rest.setpoint + 0.01
     motion = replace(table.arm.rest.motion, q=q)
@@ -156,8 +157,8 @@ def test_a_run_asked_for_while_planning_is_done_after_it(table: Staged, slow: Sl
     assert bar(table, other)["orders"] == []
     for order in Order:
         with pytest.raises(LeaseError, match="is Window 1's"):
-            table.hub.performer.steer(other, order)
-    table.hub.performer.steer(window, Order.RUN)
+            table.programs.steer(other, order)
+    table.programs.steer(window, Order.RUN)
     finish(table, window, slow)
     assert table.status == "running"
 
@@ -165,19 +166,19 @@ def test_a_run_asked_for_while_planning_is_done_after_it(table: Staged, slow: Sl
 def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, slow: Slow) -> None:
     window, other = (table.join(page) for page in PAGES)
     ask(table, window)
-    job = table.hub.performer._planning
+    job = table.programs._planning
     assert job is not None
     with pytest.raises(LeaseError, match="being planned"):
-        table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
-    table.hub.performer.steer(window, Order.END)
+        table.programs.script(other, SCRIPT, more=False, speed=1.0)
+    table.programs.steer(window, Order.END)
     assert table.status == "cancelled"
-    table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
+    table.programs.script(other, SCRIPT, more=False, speed=1.0)
     assert table.status == "planning"
     job.thread.join(PROMPT)
     assert not job.thread.is_alive()
     finish(table, other, slow)
     assert table.status == "ready"
-    assert not table.hub.performer.running
+    assert not table.programs.running
 
 
 def test_planning_of_an_owner_who_is_gone_makes_way(table: Staged, slow: Slow) -> None:
@@ -185,10 +186,10 @@ def test_planning_of_an_owner_who_is_gone_makes_way(table: Staged, slow: Slow) -
     ask(table, window)
     table.hub.leave(window)
     table.wait(2.0, other)
-    assert not table.hub.performer.waits
-    table.hub.performer.script(other, SCRIPT, more=False, speed=1.0)
+    assert not table.programs.waits
+    table.programs.script(other, SCRIPT, more=False, speed=1.0)
     finish(table, other, slow)
-    told = table.hub.performer.told()
+    told = table.programs.progress()
     assert told is not None
     assert (told.status, told.by) == ("ready", other.person.name)
 
@@ -198,13 +199,13 @@ def test_a_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) ->
     window = table.join(PAGES[0])
     ask(table, window, None)
     finish(table, window, slow)
-    before = table.hub.performer.program
+    before = table.programs.program
     ask(table, window)
     assert table.status == "running"
-    assert table.hub.performer.program is before
+    assert table.programs.program is before
     assert slow.begun == 1
-    table.hub.performer.steer(window, Order.END)
-    table.hub.performer.script(window, SCRIPT, more=False, speed=0.5)
+    table.programs.steer(window, Order.END)
+    table.programs.script(window, SCRIPT, more=False, speed=0.5)
     finish(table, window, slow)
     assert slow.begun == 2
 
@@ -227,8 +228,8 @@ def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) 
             box = Thing("box", Form.BOX, (0.05, 0.05, 0.05), T)
             table.arm.rest = replace(rest, things=(box,))
     slow.released.clear()
-    table.hub.performer.steer(window, Order.RUN)
-    told = table.hub.performer.told()
+    table.programs.steer(window, Order.RUN)
+    told = table.programs.progress()
     assert told is not None
     assert told.status == "planning"
     assert moved in told.why
@@ -240,7 +241,11 @@ def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) 
 def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window, None)
-    shown = bar(table, window)
+    due = time.monotonic() + 10.0
+    # The thread of the planning may not have begun.
+    while (shown := bar(table, window))["headline"] == "Planning the script 0%":
+        assert time.monotonic() < due
+        time.sleep(0.005)
     assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20%")
     assert shown["why"] == "Step 1 of 2: timing paths, 20%. It does not run by itself."
     table.arm.moves = True
@@ -258,7 +263,7 @@ def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> No
 def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES)
     table.plan(owner)
-    performer, hub = table.hub.performer, table.hub
+    performer, hub = table.programs, table.hub
     performer.steer(owner, Order.RUN)
     hub.move(owner, cmd.Pause())
     assert isinstance(table.arm.commands[-1], cmd.Pause)
@@ -279,7 +284,7 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
 def test_a_persons_speed_holds_to_the_end_of_the_program(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
-    table.hub.performer.steer(window, Order.RUN)
+    table.programs.steer(window, Order.RUN)
     table.wait(0.5, window)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
     table.wait(3.0, window)

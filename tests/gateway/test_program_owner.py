@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.settings import Settings
+from katana450.extensions.programs.extension import OWNER_SILENCE
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
 from tests.gateway.client import ask, websocket
 from tests.gateway.lines import post
@@ -71,7 +71,7 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
     ) as owner:
         try:
             wait(server, "running")
-            time.sleep(1.5 * Settings.owner_silence)
+            time.sleep(1.5 * OWNER_SILENCE)
             # While its heartbeats come the program runs.
             assert wait(server, "running", 1.0)["moving"]
             os.kill(owner.pid, signal.SIGSTOP)
@@ -81,7 +81,7 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
         finally:
             os.kill(owner.pid, signal.SIGCONT)
             owner.kill()
-    assert took < Settings.owner_silence + BRAKING
+    assert took < OWNER_SILENCE + BRAKING
     why = "Terminal fell silent: a program ends with its owner's heartbeats."
     assert state["program"]["why"] == why
     # At rest on its way, neither stopped for good nor held by anybody.
@@ -107,6 +107,6 @@ def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> N
             return time.monotonic() - began, state
 
     took, state = asyncio.run(act())
-    assert Settings.owner_silence <= took < Settings.owner_silence + BRAKING
+    assert OWNER_SILENCE <= took < OWNER_SILENCE + BRAKING
     assert "Owner fell silent" in state["program"]["why"]
     clear_stop(server)

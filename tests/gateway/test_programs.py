@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
+from katana450.extensions.programs.requests import Order, Program, Steer
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Order
 from tests.browser.server import AppServer
 
 pytestmark = pytest.mark.long
@@ -44,7 +44,7 @@ def arm(server: AppServer) -> Iterator[Client]:
         yield arm
         state = arm.query(answers.State)
         if state.program is not None and state.program.status in ("running", "paused"):
-            arm.ask(requests.Steer(order=Order.END))
+            arm.ask(Steer(order=Order.END))
         arm.ask(requests.ClearStop())
         arm.go(requests.Resume())
         arm.go(requests.Home())
@@ -55,7 +55,7 @@ def planned(arm: Client, text: str) -> answers.Progress:
     """Once it is, or refused."""
     for at in range(0, len(text), 100):
         more = at + 100 < len(text)
-        arm.ask(requests.Program(text=text[at : at + 100], more=more))
+        arm.ask(Program(text=text[at : at + 100], more=more))
     return wait(arm, lambda program: program.status != "planning")
 
 
@@ -74,7 +74,7 @@ def wait(
 
 def run(arm: Client, order: Order = Order.RUN) -> None:
     assert planned(arm, THERE_AND_BACK).status == "ready"
-    arm.ask(requests.Steer(order=order))
+    arm.ask(Steer(order=order))
 
 
 def test_a_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
@@ -106,17 +106,17 @@ def test_stop_ends_it_in_the_middle(arm: Client) -> None:
     assert not state.moving
     assert np.abs(state.qd).max() == 0.0
     with pytest.raises(RefusedError, match="clear the stop first"):
-        arm.ask(requests.Steer(order=Order.RUN))
+        arm.ask(Steer(order=Order.RUN))
 
 
 def test_it_pauses_steps_and_is_ended(arm: Client) -> None:
     run(arm, Order.STEP)
     assert wait(arm, lambda program: program.status == "paused").line == 4
-    arm.ask(requests.Steer(order=Order.RESUME))
+    arm.ask(Steer(order=Order.RESUME))
     wait(arm, lambda program: program.line == 5 and program.share > 0.1)
-    arm.ask(requests.Steer(order=Order.PAUSE))
+    arm.ask(Steer(order=Order.PAUSE))
     assert wait(arm, lambda program: program.status == "paused").line == 5
-    arm.ask(requests.Steer(order=Order.END))
+    arm.ask(Steer(order=Order.END))
     state = arm.query(answers.State)
     assert state.program is not None
     assert state.program.status == "stopped"
@@ -155,15 +155,15 @@ def test_what_is_wrong_is_told_with_its_lines(arm: Client) -> None:
     program = planned(arm, "gripper: none\nsteps: [home]\n")
     assert "--bare" in program.why
     with pytest.raises(RefusedError, match="no program"):
-        arm.ask(requests.Steer(order=Order.RUN))
+        arm.ask(Steer(order=Order.RUN))
 
 
 def test_a_script_that_is_too_long_is_refused(arm: Client) -> None:
     part = "#" * 900 + "\n"
     for _ in range(72):
-        arm.ask(requests.Program(text=part, more=True))
+        arm.ask(Program(text=part, more=True))
     with pytest.raises(RefusedError, match="at most 64 KB"):
-        arm.ask(requests.Program(text=part, more=True))
+        arm.ask(Program(text=part, more=True))
 
 
 @pytest.mark.parametrize("interrupted", [False, True])

@@ -15,12 +15,13 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel, page
 from katana450.server.view.paint import PaintNodes
-from katana450.server.viser_bridge.labels import PERSONAL, STEERING
+from katana450.server.viser_bridge.labels import PERSONAL
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 from tests.view.gestures import RecordedGestures
@@ -88,7 +89,7 @@ def test_the_panel_has_a_slider_a_joint_and_says_why(
         assert controls[label].min >= unit * joints.lower[axis] - 1e-9
         assert controls[label].max <= unit * joints.upper[axis] + 1e-9
         # A joint may be called anything, and is nobody's alone for that.
-        assert label not in (*PERSONAL, *STEERING)
+        assert label not in (*PERSONAL, *ProgramRunner.controls)
     assert "mm" in page(joints, state)
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
     assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)

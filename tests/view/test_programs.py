@@ -15,14 +15,14 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.program import Program, compiled
+from katana450.extensions.programs.requests import Order
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
+from katana450.extensions.programs.server.panel import ProgramsPanel, _page
+from katana450.extensions.programs.server.preview import GHOSTS
 from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.kinematics.forward import forward
-from katana450.server.api.answers import Progress as Told
-from katana450.server.api.fields import Order
-from katana450.server.view.preview import GHOSTS
-from katana450.server.view.programs import ProgramsPanel, _page
+from katana450.server.api.answers import Progress
 from tests.browser.server import free_port
 from tests.view.gestures import ANNA, RecordedGestures
 
@@ -31,7 +31,7 @@ class ProgramRunner:
     """Remembers what was asked."""
 
     def __init__(self) -> None:
-        self.told: Told | None = None
+        self.progress: Progress | None = None
         self.program: Program | None = None
         self.asked: list[tuple[str, Order | None]] = []
 
@@ -50,12 +50,16 @@ def server() -> Iterator[viser.ViserServer]:
 
 
 def test_what_is_said_is_text_and_no_markup() -> None:
-    page = _page(Told(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"), 2)
+    page = _page(
+        Progress(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"), 2
+    )
     assert "&lt;b&gt;x" in page
     assert "<script>" not in page
     assert "2 poses" in page
-    assert "a while" in _page(Told(name="", by="me", status="planning"), 0)
-    told = Told(name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", share=0.5)
+    assert "a while" in _page(Progress(name="", by="me", status="planning"), 0)
+    told = Progress(
+        name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", share=0.5
+    )
     assert "Step 2 of 3, line 7: line, 50%" in _page(told, 0)
     assert _page(None, 0) == ""
 
@@ -83,7 +87,7 @@ def test_it_previews_steers_and_teaches(
 
     panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
-    performer.told = Told(name="x", by="me", status="running")
+    performer.progress = Progress(name="x", by="me", status="running")
     for said in ("Wait", "Run", "End"):
         panel._orders.value = said  # type: ignore[misc]  # likewise
         panel._order(ANNA)
@@ -125,7 +129,7 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     panel._orders.value = "Preview"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
     performer.program = compiled(parse(text), rig, state)
-    performer.told = Told(name="x", by="me", status="ready")
+    performer.progress = Progress(name="x", by="me", status="ready")
     panel.follow()
     assert ghosts()
     assert preview._sweep is not None
@@ -145,7 +149,7 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     preview.look(0.0)
     assert not looked_at()
     preview.look(1.0)
-    performer.told = Told(name="x", by="me", status="running")
+    performer.progress = Progress(name="x", by="me", status="running")
     panel.follow()
     assert not ghosts()
     assert not looked_at()

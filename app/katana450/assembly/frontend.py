@@ -15,12 +15,13 @@ from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import Described, recognised
 from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
-from katana450.extensions.programs.script_files import Scripts
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.nodes import Nodes
+from katana450.server.service.runner import guarded
 from katana450.server.view.follower import Follower
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
+from katana450.server.view.panel_folder import FolderContext
 from katana450.server.view.view import View, ViewOptions
 
 
@@ -44,11 +45,12 @@ def attached(
         link.start()
         gateway.attach(ArmHandle(robot, session, link, None, nodes))
         return link, _machine_view(gateway, outfit, robot, link)
-    besides = ViewOptions(layers, (gateway.steering, Scripts(settings.programs)), meshes)
     navigator = PlanningWorker(session, link.board, link)
-    view = _view(gateway, outfit, found, link, besides)
+    view = _view(gateway, outfit, found, link, ViewOptions(layers, meshes))
+    if outfit.options is not None:
+        _add_folders(view, gateway, outfit.options, robot, link)
     navigator.tell = gateway.announce
-    navigator.redirected = gateway.steering.redirected
+    navigator.redirected = guarded(gateway.hub.runner.redirected)
     link.start()
     gateway.attach(ArmHandle(robot, session, link, navigator, nodes))
     return link, view
@@ -83,6 +85,25 @@ def _view(
         outfit.settings.frame_rate,
         besides,
     )
+
+
+def _add_folders(
+    view: View, gateway: Gateway, options: Namespace, robot: Robot, link: FrontEnd
+) -> None:
+    """Add the folders of the extensions to the panel. Raises KatanaError."""
+    context = FolderContext(
+        gateway.viser,
+        robot,
+        gateway.gestures,
+        lambda: link.board.snapshot.state,
+        gateway.hub,
+        gateway.call,
+        options,
+    )
+    for part in serve_extensions():
+        folder = None if part.folder is None else part.folder(context)
+        if folder is not None:
+            view.add(folder)
 
 
 def _machine_view(

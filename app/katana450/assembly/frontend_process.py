@@ -10,6 +10,7 @@ import socket
 from argparse import Namespace
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -138,9 +139,18 @@ def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> Non
 
     kept = Meshes()
     kept.put(outfit.meshes, ())
-    taking_part = () if outfit.options is None else serve_extensions()
+    options = outfit.options
+    taking_part = () if options is None else serve_extensions()
     routes = [part.routes for part in taking_part if part.routes is not None]
-    gateway = Gateway(outfit.settings, outfit.listening, outfit.lines, kept, routes)
+    runners = [part.runner() for part in taking_part if part.runner is not None]
+    gateway = Gateway(
+        outfit.settings,
+        outfit.listening,
+        outfit.lines,
+        kept,
+        routes,
+        partial(runners[0], options=options) if runners and options is not None else None,
+    )
     gateway.start()
     telling.send(OPEN)
     try:

@@ -10,7 +10,8 @@ import ssl
 import threading
 import time
 from asyncio import BaseTransport, Transport
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
 from http import HTTPStatus
 from typing import Any, cast
@@ -22,12 +23,12 @@ from websockets.http11 import Request
 
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.routes import application
-from katana450.errors import ConfigurationError
+from katana450.errors import ConfigurationError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival, keep_alive
 from katana450.server.service.hub import TICK, Hub
-from katana450.server.service.steering import Steering
+from katana450.server.service.runner import Runner
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import LARGEST
@@ -57,6 +58,9 @@ UNREAD_TLS = 65_536
 START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
 
+ANSWER_SECONDS = 2.0
+"""[s] Until a thread of the view gives up on an answer of the server's thread."""
+
 
 class Gateway:
     """Owns the port, and viser behind it."""
@@ -68,10 +72,11 @@ class Gateway:
         lines: socket.socket | None = None,
         meshes: Meshes | None = None,
         routes: Sequence[RouteProvider] = (),
+        runner: Callable[[Hub], Runner] | None = None,
     ) -> None:
         """``listening``: the port; ``lines``: that for programs which speak JSON lines.
         ``meshes``: those that things are of, where uploaded ones are kept too. ``routes``: of the
-        extensions.
+        extensions. ``runner``: see ``Hub``.
 
         Raises ConfigurationError when it must not be served there as ``settings`` say.
         """
@@ -89,17 +94,14 @@ class Gateway:
                 if each is not None:
                     keep_alive(each)
             self.address = _address(settings, self._listening)
-            self._hub = Hub(
-                time.monotonic, settings.silence, meshes, owner_silence=settings.owner_silence
-            )
-            self.steering = Steering(self._hub.performer, lambda: self._loop)
+            self.hub = Hub(time.monotonic, settings.silence, meshes, runner)
             door = Authenticator(access, self.port, self.address)
             guard = Guard(self.viser)
-            self.gestures = Gestures(self.viser, guard, self._hub)
-            proxy = Proxy(self._hub, door, guard, self.viser.get_port(), key)
-            acceptor, budgets = Acceptor(listening), Budgets(self._hub.clock)
-            app = application(self._hub, door, budgets, proxy, self.address, acceptor, routes)
-            self._lines = Lines(self._hub, door, budgets)
+            self.gestures = Gestures(self.viser, guard, self.hub)
+            proxy = Proxy(self.hub, door, guard, self.viser.get_port(), key)
+            acceptor, budgets = Acceptor(listening), Budgets(self.hub.clock)
+            app = application(self.hub, door, budgets, proxy, self.address, acceptor, routes)
+            self._lines = Lines(self.hub, door, budgets)
         except BaseException:
             self._listening.close()
             raise
@@ -132,13 +134,36 @@ class Gateway:
 
     def attach(self, arm: ArmHandle) -> None:
         """From now on the arm can be driven."""
-        self._hub.gate.arm = arm
+        self.hub.gate.arm = arm
 
     def announce(self, why: str) -> None:
         """Tell everybody why something that was asked is not done. For any thread."""
         loop = self._loop
         if loop is not None:
-            loop.call_soon_threadsafe(self._hub.announce, why)
+            loop.call_soon_threadsafe(self.hub.announce, why)
+
+    def call(self, act: Callable[[], None]) -> None:
+        """Run ``act`` in the server's thread, and return afterwards. For any other thread.
+
+        Raises what ``act`` raises, and LeaseError where the server does not answer.
+        """
+        loop, future = self._loop, Future[None]()
+        if loop is None:
+            raise LeaseError("The server is not there yet.")
+
+        def done() -> None:
+            try:
+                act()
+            except Exception as error:
+                future.set_exception(error)
+            else:
+                future.set_result(None)
+
+        loop.call_soon_threadsafe(done)
+        try:
+            future.result(ANSWER_SECONDS)
+        except TimeoutError as error:
+            raise LeaseError("The server does not answer. See how the arm stands.") from error
 
     def stop(self) -> None:
         """Close every socket and the port; viser is left to ``close_server``."""
@@ -167,7 +192,7 @@ class Gateway:
             if self._server.started:
                 self._started.set()
             try:
-                self._hub.tick()
+                self.hub.tick()
             except Exception:
                 # Whatever went wrong, the watch over the arm goes on.
                 log.exception("The watch over who drives met an error.")

@@ -46,7 +46,6 @@ def serve_with(options: Namespace) -> int:
         host=options.host,
         port=options.port,
         silence=options.silence,
-        owner_silence=options.owner_silence,
         access=options.access,
         insecure=options.insecure,
         tls_cert=options.tls_cert,
@@ -54,7 +53,6 @@ def serve_with(options: Namespace) -> int:
         public_url=options.public_url,
         lines=options.lines,
         bare=options.bare,
-        programs=options.programs,
     )
     # Sent to another process, which has no use for the command itself.
     values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})

@@ -9,8 +9,8 @@ from katana450.cli.arm_options import add_arm_options
 from katana450.extension import serve_extensions
 from katana450.settings import Settings
 
-SHORTEST_SILENCE, LONGEST_SILENCE, LONGEST_OWNER_SILENCE = 0.2, 2.0, 10.0
-"""[s] Signs of life are 0.1 s apart, and after 3 s the arm is anybody's."""
+SHORTEST_SILENCE, LONGEST_SILENCE = 0.2, 2.0
+"""[s] Heartbeats are 0.1 s apart, and after 3 s the arm is anybody's."""
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
@@ -33,14 +33,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         f"gives ten a second ({SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
-        "--owner-silence",
-        type=_owner_silence,
-        default=Settings.owner_silence,
-        metavar="SECONDS",
-        help="heartbeat timeout of a program's owner, after which the program ends "
-        f"({SHORTEST_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
-    )
-    parser.add_argument(
         "--access",
         type=Path,
         metavar="FILE",
@@ -57,12 +49,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "--public-url",
         metavar="URL",
         help="what people type when a reverse proxy stands in front, e.g. https://arm.example.org",
-    )
-    parser.add_argument(
-        "--programs",
-        type=Path,
-        metavar="DIR",
-        help="a folder of scripts for the panel, where taught ones are saved too",
     )
     parser.add_argument(
         "--bare",
@@ -82,14 +68,14 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _silence(text: str) -> float:
-    return _seconds(text, LONGEST_SILENCE)
+    return heartbeat_timeout(text, LONGEST_SILENCE)
 
 
-def _owner_silence(text: str) -> float:
-    return _seconds(text, LONGEST_OWNER_SILENCE)
+def heartbeat_timeout(text: str, longest: float) -> float:
+    """Return the number of seconds in ``text``, from SHORTEST_SILENCE to ``longest``.
 
-
-def _seconds(text: str, longest: float) -> float:
+    Raises ArgumentTypeError for any other text.
+    """
     try:
         seconds = float(text)
     except ValueError:

@@ -13,9 +13,10 @@ from urllib.parse import urlsplit
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, KatanaError
+from katana450.extensions.programs.requests import Order, Program, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
-from katana450.server.api import answers, requests
+from katana450.server.api import answers
 
 NAME = "Terminal"
 """As which others see who started the program."""
@@ -37,12 +38,12 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
     with _server(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             _send(arm, text, options.speed)
-            arm.ask(requests.Steer(order=requests.Order.RUN))
+            arm.ask(Steer(order=Order.RUN))
             return _follow(arm)
         except KeyboardInterrupt:
             # Before all of the script is sent there is nothing to end.
             with suppress(RefusedError):
-                arm.ask(requests.Steer(order=requests.Order.END))
+                arm.ask(Steer(order=Order.END))
             print("\nkatana450: the program is ended; the arm holds.", file=sys.stderr)
             return 130
 
@@ -51,8 +52,8 @@ def _send(arm: Client, text: str, speed: float) -> None:
     """Have it planned. Raises KatanaError with what is wrong with it."""
     parts = [text[at : at + PART] for at in range(0, len(text), PART)] or [""]
     for part in parts[:-1]:
-        arm.ask(requests.Program(text=part, more=True))
-    arm.ask(requests.Program(text=parts[-1], speed=speed))
+        arm.ask(Program(text=part, more=True))
+    arm.ask(Program(text=parts[-1], speed=speed))
     while (now := arm.query(answers.State).program) is not None and now.status == "planning":
         if now.steps and sys.stderr.isatty():
             line = f"{now.task}, step {now.step} of {now.steps}, {now.share:4.0%}"

@@ -52,5 +52,10 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
 
 EXTENSION = Extension(
     "importers",
-    serve=ServeExtension(add_serve_options, initial_scene=_initial_scene, routes=_routes),
+    serve=ServeExtension(
+        add_serve_options,
+        initial_scene=_initial_scene,
+        routes=_routes,
+        needs=("programs", "scene", "export"),
+    ),
 )

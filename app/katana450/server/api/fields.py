@@ -27,9 +27,6 @@ FASTEST_ANGULAR = 3.0
 SLOWEST, FASTEST = 0.05, 1.0
 """Share of full speed."""
 
-LEAST_SHARE = 0.01
-"""Of its own speed that a program can be run at."""
-
 MOST_STATES = 100
 """States a second that one can be told: as many as there are."""
 
@@ -81,18 +78,6 @@ class Mount(Enum):
     """It stays where it is."""
     TABLE = "table"
     """Likewise, once it is put down upright on the table below."""
-
-
-class Order(Enum):
-    """What a program can be told."""
-
-    RUN = "run"
-    STEP = "step"
-    """Run one step, then wait."""
-    PAUSE = "pause"
-    RESUME = "resume"
-    END = "end"
-    """Come to rest and end it."""
 
 
 def tag_of(name: str) -> str:

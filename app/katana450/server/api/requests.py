@@ -7,7 +7,7 @@ shoulder or in the base frame on the table.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args
 
 import msgspec
 from msgspec import Meta
@@ -18,9 +18,9 @@ from katana450.server.api.fields import (
     COMMAND,
     FASTEST,
     LARGEST,
-    LEAST_SHARE,
     MOST_JOINTS,
     MOST_STATES,
+    ROOT,
     SLOWEST,
     VERSION,
     Form,
@@ -28,10 +28,10 @@ from katana450.server.api.fields import (
     Id,
     Mount,
     Name,
-    Order,
     Press,
     Request,
     RequestTraits,
+    tag_of,
 )
 from katana450.server.api.lease_requests import (
     Acquire,
@@ -94,30 +94,27 @@ __all__ = [
     "Mount",
     "Named",
     "Nudge",
-    "Order",
     "Pause",
     "Place",
     "Pose",
     "Position",
-    "Program",
     "Query",
     "Read",
     "ReleaseLease",
     "Remove",
     "Request",
+    "RequestDecoder",
     "Resume",
     "Servo",
     "Set",
     "Setting",
     "Speed",
-    "Steer",
     "Stop",
     "Take",
     "Tool",
     "Turn",
     "Watch",
     "Withdraw",
-    "decoded",
     "id_of",
 ]
 
@@ -227,37 +224,6 @@ class Resume(Request, frozen=True):
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
 
-class Program(Request, frozen=True, kw_only=True):
-    """A part of a script, of docs/programs.md; after the last one it is planned.
-
-    All but the last say ``more``. ``speed``: share of the script's own. The state tells how far the
-    planning is, when it is done, or what is wrong with the script, line by line. The last plan is
-    kept: the same script is ready at once while posture, gripper, tool, scene and water are the
-    same.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    text: Annotated[str, Meta(max_length=LARGEST)]
-    more: bool = False
-    speed: Annotated[float, Meta(ge=LEAST_SHARE, le=1.0)] = 1.0
-
-
-class Steer(Request, frozen=True, kw_only=True):
-    """Run, step, pause, resume or end the program that is planned.
-
-    It drives by itself, under its own name; its owner has to stay connected. While it is being
-    planned, ``run`` and ``step`` take effect afterwards, unless the arm is told to move, hold or
-    stop in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program
-    that is to run from another posture or scene than it was planned for is planned anew first. An
-    arm that is paused when a program begins stays paused until ``resume``.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    order: Order
-
-
 class Watch(Request, frozen=True, kw_only=True):
     """Tell the state so many times a second, from now on; 0 ends it. A slow line is told less.
 
@@ -316,35 +282,51 @@ AnyRequest = (
     | Fill
     | Set
     | Get
-    | Program
-    | Steer
     | Watch
     | Query
 )
 
-_decoder: msgspec.json.Decoder[AnyRequest] = msgspec.json.Decoder(AnyRequest)
-
 
 class _Named(msgspec.Struct):
     id: Id = None
+    do: Any = None
 
 
 _names = msgspec.json.Decoder(_Named)
 
 
-def decoded(text: str | bytes) -> AnyRequest:
-    """The request that ``text`` is. Raises InputError for one that it is not."""
-    if len(text) > LARGEST:
-        raise InputError(f"A request has at most {LARGEST} bytes.")
-    try:
-        return _decoder.decode(text)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise InputError(f"That is no request: {error}.") from error
+class RequestDecoder:
+    """Decodes the requests of the core, and those that an extension adds."""
+
+    def __init__(self, added: tuple[type[Request], ...] = ()) -> None:
+        """``added``: classes of an extension."""
+        kinds: Any = Union[(AnyRequest, *added)]
+        self._decoder: msgspec.json.Decoder[Request] = msgspec.json.Decoder(kinds)
+        self._known = {tag_of(kind.__name__) for kind in get_args(kinds)}
+
+    def decoded(self, text: str | bytes) -> Request:
+        """Return the request in ``text``. Raises InputError with the reason where it holds none."""
+        if len(text) > LARGEST:
+            raise InputError(f"A request has at most {LARGEST} bytes.")
+        try:
+            return self._decoder.decode(text)
+        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            name = _named(text).do
+            if isinstance(name, str) and name not in self._known:
+                raise InputError(
+                    f"This server has no request {name!r}. {ROOT}/openapi.json lists those it has."
+                ) from error
+            raise InputError(f"That is no request: {error}.") from error
 
 
 def id_of(text: str | bytes) -> Id:
     """The id in ``text``, which may be no request otherwise."""
+    return _named(text[:LARGEST]).id
+
+
+def _named(text: str | bytes) -> _Named:
+    """Return id and name in ``text``, without those that it does not have."""
     try:
-        return _names.decode(text[:LARGEST]).id
+        return _names.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError):
-        return None
+        return _Named()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import functools
 import inspect
-from typing import Any, get_args
+from typing import Any, Union, get_args
 
 import msgspec
 
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import ROOT
+from katana450.server.api.fields import ROOT, Request
 
 TITLE = "katana450"
 
@@ -36,9 +36,10 @@ def summary(kind: type) -> str:
 
 
 @functools.cache
-def openapi_json() -> bytes:
-    """OpenAPI 3.1, as JSON."""
-    shapes = [requests.AnyRequest, answers.AnyAnswer]
+def openapi_json(added: tuple[type[Request], ...] = ()) -> bytes:
+    """OpenAPI 3.1, as JSON. ``added``: requests of an extension."""
+    every: Any = Union[(requests.AnyRequest, *added)]
+    shapes = [every, answers.AnyAnswer]
     (request, answer), components = msgspec.json.schema_components(
         shapes, ref_template="#/components/schemas/{name}"
     )

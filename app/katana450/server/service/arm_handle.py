@@ -22,7 +22,6 @@ from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.collision.world import World
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
@@ -44,7 +43,7 @@ class ArmHandle:
         has a name in its VRML world."""
         self.robot = robot
         self.nodes = nodes
-        self._session = session
+        self.session = session
         self._link = link
         self._board = link.board
         self._navigator = navigator
@@ -62,22 +61,17 @@ class ArmHandle:
     @property
     def ready(self) -> FloatArray:
         """(n,) the posture that Home drives to [rad]."""
-        return self._session.ready
+        return self.session.ready
 
     @property
     def surroundings(self) -> Environment:
         """Knows where things are."""
-        return self._session.surroundings
+        return self.session.surroundings
 
     @property
     def pouring(self) -> Pouring | None:
         """Knows where water is."""
-        return self._session.pouring
-
-    @property
-    def rig(self) -> PlanContext:
-        """What programs are planned for. Raises InputError where there are only joints."""
-        return PlanContext(self._session, self.arm.T_base_shoulder)
+        return self.session.pouring
 
     @property
     def arm(self) -> MountedArm:
@@ -104,7 +98,7 @@ class ArmHandle:
     def _posture(self) -> tuple[Margins, FloatArray | None]:
         """Worked out once for everybody who asks, and anew when something has changed."""
         state = self.state
-        world, x = self._session.world_at(state), state.x
+        world, x = self.session.world_at(state), state.x
         key = (state.tool, world, x.tobytes())
         if self._measured is None or self._measured[0] != key:
             chain = self.arm.chain_to(state.tool)
@@ -114,7 +108,7 @@ class ArmHandle:
 
     def choices(self) -> tuple[Choice, ...]:
         """The branches there are to choose from. Raises InputError where there are none."""
-        return self._session.choices(self.state)
+        return self.session.choices(self.state)
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int:
         """Send ``command`` of ``actor``, which may give it; return its ticket.

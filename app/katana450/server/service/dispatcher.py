@@ -21,7 +21,7 @@ from katana450.server.service.hub import Hub, Window
 from katana450.server.service.interfaces import Arm
 from katana450.server.service.object_requests import ObjectRequests
 
-BARE: dict[type[requests.AnyRequest], cmd.Command] = {
+BARE: dict[type[requests.Request], cmd.Command] = {
     requests.EndDrag: cmd.EndDrag(),
     requests.Home: cmd.Home(),
     requests.GoToZero: cmd.GoToZero(),
@@ -41,7 +41,8 @@ OUTCOME_SECONDS = 1.0
 
 def driver_key(hub: Hub, window: Window) -> str:
     """Return the key of ``window`` if it drives, or owns the program that does; else nothing."""
-    return window.person.key if hub.performer.drives(window) else ""
+    holder, key = hub.lease.holder, window.person.key
+    return key if holder == window.person or hub.gate.program == (holder, key) else ""
 
 
 class Dispatcher:
@@ -51,7 +52,7 @@ class Dispatcher:
         self._hub = hub
         self._placing = ObjectRequests(hub)
 
-    def do(self, window: Window, request: requests.AnyRequest, budget: Budget) -> answers.Answer:
+    def do(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
         """The answer, once it is done. Whatever is asked is a sign of life.
 
         The outcome of a command may be still to come, see ``is_pending``.
@@ -64,7 +65,7 @@ class Dispatcher:
         with nullcontext() if free else budget.charged(driver, question=question):
             return msgspec.structs.replace(self._done(window, request), id=request.id)
 
-    def _done(self, window: Window, request: requests.AnyRequest) -> answers.Answer:
+    def _done(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub
         hub.beat(window)
         match request:
@@ -75,6 +76,8 @@ class Dispatcher:
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.Named(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
+        if isinstance(request, hub.runner.request_types):
+            return hub.runner.handle(window, request)
         if isinstance(request, requests.Set):
             return answers.Done(ticket=hub.move(window, self._setting(request)))
         command = self._command(request)
@@ -110,7 +113,7 @@ class Dispatcher:
             return msgspec.structs.replace(pending, outcome=UNKNOWN)
         return serialize.concluded(pending, outcome)
 
-    def _arrange(self, window: Window, request: requests.AnyRequest) -> None:
+    def _arrange(self, window: Window, request: requests.Request) -> None:
         """What is about who drives, and how."""
         hub = self._hub
         match request:
@@ -134,12 +137,8 @@ class Dispatcher:
                 hub.jog(window, rates, frame)
             case requests.Speed(value=value):
                 hub.set_speed(window, value)
-            case requests.Program(text=text, more=more, speed=speed):
-                hub.performer.script(window, text, more=more, speed=speed)
-            case requests.Steer(order=order):
-                hub.performer.steer(window, order)
 
-    def _command(self, request: requests.AnyRequest) -> cmd.Command | None:
+    def _command(self, request: requests.Request) -> cmd.Command | None:
         """What the arm is told, where the request is one for the arm."""
         if type(request) in BARE:
             return BARE[type(request)]
@@ -207,7 +206,7 @@ class Dispatcher:
         return serialize.things(arm)
 
 
-def _misfit(request: requests.AnyRequest) -> float | None:
+def _misfit(request: requests.Request) -> float | None:
     """Return `so3.misfit` of the pose in ``request``; None where it has none."""
     if isinstance(request, requests.Pose | requests.Place | requests.Attach) and request.T:
         return so3.misfit(np.array(request.T)[:3, :3])

@@ -5,6 +5,7 @@ Lives in the gateway's one thread; `CommandGate` decides which commands reach th
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -18,12 +19,13 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import Rates
+from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.command_gate import CommandGate
 from katana450.server.service.event_log import Journal
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.interfaces import Arm, Behind
-from katana450.server.service.program_runner import ProgramRunner
+from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
 from katana450.server.service.stop_state import Presses, Stopped
 from katana450.settings import Settings
@@ -59,17 +61,18 @@ class Hub:
         clock: Callable[[], float],
         hold_after: float = Settings.silence,
         meshes: Meshes | None = None,
-        *,
-        owner_silence: float = Settings.owner_silence,
+        runner: Callable[[Hub], Runner] | None = None,
     ) -> None:
         """``hold_after``: silence of whoever drives [s] that stops an arm that moves. ``meshes``:
-        those there are at first. ``owner_silence``: see ``Settings``."""
+        those there are at first. ``runner``: makes its ``Runner``, None for one that never
+        drives."""
         self.clock = clock
         self._hold_after = hold_after
         self.gate = CommandGate(clock)
         self.journal = Journal()
-        self.performer = ProgramRunner(self, owner_silence)
-        self.gate.on_stop = self.performer.stopped
+        self.runner = Runner(self, Namespace()) if runner is None else runner(self)
+        self.requests = RequestDecoder(self.runner.request_types)
+        self.gate.on_stop = guarded(self.runner.stopped)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}
@@ -129,7 +132,7 @@ class Hub:
         if not for_good:
             return
         self._remembered.pop(person.key, None)
-        self.performer.leave(window)
+        self.runner.leave(window)
         if self.lease.holder == person:
             if self.stopped is None and self.gate.moves():
                 self.gate.protect(f"{person.name} left while the arm moved.")
@@ -252,7 +255,7 @@ class Hub:
             self._watch(arm)
             self.journal.follow(arm.ledger)
             self.gate.reconcile()
-            self.performer.tick()
+            self.runner.tick()
 
     def _hear(self) -> None:
         """Take over the newest sign of life of whoever drives, by when it was received."""

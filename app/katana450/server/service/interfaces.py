@@ -12,13 +12,13 @@ from katana450.arm.control.choices import Choice
 from katana450.arm.control.event_log import Entry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
-from katana450.extensions.programs.bench import PlanContext
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.nodes import Nodes
 
@@ -45,7 +45,7 @@ class Arm(Protocol):
     def ready(self) -> FloatArray: ...
 
     @property
-    def rig(self) -> PlanContext: ...
+    def session(self) -> Session: ...
 
     @property
     def lateness(self) -> LoopTiming: ...

@@ -25,7 +25,7 @@ class ObjectRequests:
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
 
-    def command(self, request: requests.AnyRequest) -> cmd.Command | None:
+    def command(self, request: requests.Request) -> cmd.Command | None:
         """What the arm is told; None for a request about something else."""
         match request:
             case requests.Place():

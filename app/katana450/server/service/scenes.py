@@ -35,7 +35,7 @@ class Scenes:
 
         Raises InputError if ``arm`` cannot have it, or there is no room for ``meshes``.
         """
-        arm.rig.session.check(command)
+        arm.session.check(command)
         self._meshes.put(meshes, used_in(arm.state))
         self._waiting[key] = _Waiting(command, tuple(meshes))
         while len(self._waiting) > KEPT:

@@ -66,7 +66,7 @@ def state(hub: Hub) -> answers.State:
         stop=None if stopped is None else stopped.stage,
         age=arm.age,
         windows=len(hub.windows),
-        program=hub.performer.told(),
+        program=hub.runner.progress(),
     )
 
 

@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from katana450.arm.control.messages import headline, mood, sentence
-from katana450.arm.control.state import State, Status
-from katana450.server.api.answers import Progress
-from katana450.server.api.fields import Order
+from katana450.arm.control.state import Status
 from katana450.server.service.hub import Hub, Window
-from katana450.server.service.program_planning import Stage
-from katana450.server.service.steering import RUNS
+from katana450.server.service.runner import StatusLine
 
 NO_STATE = 0.3
 """[s] Without a word of the arm's process, after which its state counts as unknown."""
 
+FIRST = (Status.FAULT, Status.STOPPED, Status.BLOCKED)
+"""States of the arm that the page tells whatever drives it."""
+
 AGE_WORTH_TELLING = 0.2
 """[s] A picture that is younger counts as now."""
-
-PLANNING = "planning"
-"""The mood of the page while a program is planned."""
-
-
-class _Line(NamedTuple):
-    """The state line of the page: the colour of its lamp, two or three words, one sentence."""
-
-    mood: str
-    headline: str
-    why: str
 
 
 def silence(hub: Hub) -> float | None:
@@ -44,58 +33,22 @@ def health(hub: Hub) -> str | None:
     return None if age is None else f"No word from the arm's process for {age:.1f} s."
 
 
-def _line(state: State, program: Progress | None, *, waits: bool) -> _Line:
-    """``waits``: whether the program runs as soon as it is planned."""
-    line = _Line(mood(state), headline(state), sentence(state))
-    first = state.status in (Status.FAULT, Status.STOPPED, Status.BLOCKED)
-    if program is None or first:
-        return line
-    step = f"Step {program.step} of {program.steps}"
-    if program.status in RUNS:
-        if state.paused:
-            return line._replace(headline=f"{program.name}, paused", why=f"{step}. {line.why}")
-        return line._replace(mood="moving", headline=f"{program.name}, {step.lower()}")
-    if program.status != Stage.PLANNING.value:
-        return line
-    said = f"Planning {program.name or 'the script'}"
-    about = [program.why] if program.why else []
-    if program.steps:
-        about.append(f"{step}: {program.task}, {program.share:.0%}.")
-    if state.moving:
-        return line._replace(why=" ".join((f"{said}.", *about)))
-    said += ", paused" if state.paused else f" {program.share:.0%}"
-    if waits:
-        about.append("Then it waits for Resume." if state.paused else "Then it runs.")
-    else:
-        about.append("It does not run by itself.")
-    return _Line(PLANNING, said, " ".join(about))
-
-
-def _orders(hub: Hub, window: Window) -> list[Order]:
-    """What the bar lets this window tell the program that is planned or runs."""
-    program, performer = hub.performer.told(), hub.performer
-    if program is None or hub.arm is None or not performer.owns(window):
-        return []
-    pause = [Order.RESUME if hub.arm.state.paused else Order.PAUSE] if hub.stopped is None else []
-    if program.status == Stage.PLANNING.value:
-        return [*(pause if performer.waits else []), Order.END]
-    return pause if program.status in RUNS else []
-
-
 def common(hub: Hub) -> dict[str, Any]:
     """The part that is the same for all."""
     state = hub.arm.state if hub.arm is not None else None
     stopped, holder, age = hub.stopped, hub.lease.holder, silence(hub)
-    now = _Line("starting", "Starting", "")
+    now = StatusLine("starting", "Starting", "")
     if state is not None:
-        now = _line(state, hub.performer.told(), waits=hub.performer.waits)
+        now = StatusLine(mood(state), headline(state), sentence(state))
+        if state.status not in FIRST:
+            now = hub.runner.status_line(state, now)
     if stopped is not None:
-        now = _Line("stopped", "Stopped", "")
+        now = StatusLine("stopped", "Stopped", "")
     if age is not None:
-        now = _Line("lost", "No word from the arm", f"What is shown is {age:.1f} s old.")
+        now = StatusLine("lost", "No word from the arm", f"What is shown is {age:.1f} s old.")
     if stopped is not None and not stopped.confirmed:
         why = f"The arm has not confirmed it. {now.why}".rstrip()
-        now = _Line("stopped", "Stop requested", why)
+        now = StatusLine("stopped", "Stop requested", why)
     return {
         **now._asdict(),
         "stop": None if stopped is None else stopped.stage,
@@ -131,6 +84,6 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
             for each in hub.windows
             if mine and each.person != person and each.person.role.may_drive
         ],
-        "orders": [order.value for order in _orders(hub, window)],
+        "orders": list(hub.runner.orders(window)) if hub.arm is not None else [],
         "age": round(age, 1) if age >= AGE_WORTH_TELLING else 0,
     }

@@ -16,7 +16,6 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.extensions.programs.script_files import Scripts
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras
@@ -29,7 +28,7 @@ from katana450.server.view.looks import Shows
 from katana450.server.view.objects import ObjectsPanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
-from katana450.server.view.programs import ProgramsPanel, Steering
+from katana450.server.view.panel_folder import PanelFolder
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.tint import Tint
@@ -56,12 +55,10 @@ GHOST_FROM = np.deg2rad(0.2)
 class ViewOptions:
     """What is shown besides the arm.
 
-    layers: what extensions show. programs: who runs them, and which there are. meshes: those that
-    things are of.
+    layers: what extensions show. meshes: those that things are of.
     """
 
     layers: tuple[ViewLayer, ...] = ()
-    programs: tuple[Steering, Scripts] | None = None
     meshes: Meshes = field(default_factory=Meshes)
 
 
@@ -112,13 +109,13 @@ class View(Follower):
         self._objects = ObjectsPanel(
             server, gestures, lambda: board.snapshot.state, session.surroundings
         )
-        self._programs: ProgramsPanel | None = None
-        if besides.programs is not None:
-            steering, scripts = besides.programs
-            self._programs = ProgramsPanel(
-                server, robot, steering, scripts, gestures, lambda: board.snapshot.state
-            )
+        self._folders: list[PanelFolder] = []
         self.show(board.snapshot)
+
+    def add(self, folder: PanelFolder) -> None:
+        """Have ``folder`` show each state too; before ``start``."""
+        self._folders.append(folder)
+        folder.follow()
 
     def _show_ellipsoid(self, visible: bool) -> None:
         self._ellipsoid.show(visible, self._board.snapshot.state)
@@ -140,8 +137,8 @@ class View(Follower):
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(state, time.perf_counter(), self._board.ledger, caught_up=caught_up)
             self._objects.follow(state, caught_up=caught_up)
-            if self._programs is not None:
-                self._programs.follow()
+            for folder in self._folders:
+                folder.follow()
         self._server.flush()
 
     def _show_goal(self, state: State) -> None:

@@ -120,9 +120,11 @@ class Gestures:
             # Its beginning was refused, or it was ended here while the hand went on.
             return None if held is None or not self._gate.is_current(held) else held
         actor = self._hub.at_scene(browser.slot.key, seen)
-        if self._guard.steers(message):
+        runner = self._hub.runner
+        if self._guard.is_of(message, runner.controls):
+            # A run may be another's than who drives by hand.
             self._gate.check_current(actor)
-            self._hub.performer.check_may_touch(actor)
+            runner.check_may_touch(actor)
             return actor
         actor = self._gate.claim(actor, pacing=self._guard.paces(message))
         if isinstance(message, wire.TransformControlsDragStartMessage):

@@ -14,7 +14,7 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-from katana450.server.viser_bridge.labels import PACING, PERSONAL, STEERING
+from katana450.server.viser_bridge.labels import PACING, PERSONAL
 
 WORKSPACE = 1.5
 """[m] No gizmo goes farther from the base in any direction: more than twice the arm's reach."""
@@ -61,15 +61,12 @@ class Guard:
             return getattr(self._control(message), "label", None) not in PERSONAL
         return not isinstance(message, wire.ViewerCameraMessage)
 
-    def steers(self, message: Any) -> bool:
-        """Whether ``message`` is for a program, which may be another's than who drives by hand."""
-        return self._is_of(message, STEERING)
-
     def paces(self, message: Any) -> bool:
         """Whether ``message`` only pauses, resumes or slows down what moves, by hand or program."""
-        return self._is_of(message, PACING)
+        return self.is_of(message, PACING)
 
-    def _is_of(self, message: Any, labels: tuple[str, ...]) -> bool:
+    def is_of(self, message: Any, labels: tuple[str, ...]) -> bool:
+        """Return whether ``message`` is for a control with one of ``labels``."""
         if not isinstance(message, wire.GuiUpdateMessage):
             return False
         return getattr(self._control(message), "label", None) in labels

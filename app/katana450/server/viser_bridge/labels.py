@@ -5,6 +5,3 @@ PACING = ("Motion", "Speed")
 
 PERSONAL = ("View", "Theme")
 """Controls that concern only the window in which they are clicked."""
-
-STEERING = ("Script", "Program", "Look at", "Teach", "Name")
-"""Controls of programs. The program runner decides who may use them."""

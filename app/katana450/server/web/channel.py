@@ -110,7 +110,7 @@ class Channel(ABC):
     def unasked(self) -> tuple[Any, float | None]:
         """What is to be told now, None for nothing; and in how long there may be more [s]."""
 
-    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+    def answer(self, window: Window, request: requests.Request) -> None:
         """Do it and tell the answer, if the request has an id or is a question."""
         answer = self._desk.do(window, request, self.budget)
         told = request.id is not None or request.traits.answered
@@ -145,7 +145,7 @@ class Channel(ABC):
             await asyncio.sleep(0)
             text = await self._line.receive()
             try:
-                request = requests.decoded(text)
+                request = self.hub.requests.decoded(text)
             except InputError as error:
                 log.warning("A bad request of %s: %s", window.person.name, error)
                 if not self._bad.take(self.hub.clock()):

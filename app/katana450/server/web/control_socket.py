@@ -48,7 +48,7 @@ class ControlSocket(Channel):
         self._looked_at = float("-inf")
         self.window: Window | None = None
 
-    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+    def answer(self, window: Window, request: requests.Request) -> None:
         super().answer(window, request)
         if isinstance(request, requests.Stop):
             self.tell({"is": "stopped"})

@@ -87,8 +87,9 @@ class Api:
     def routes(self) -> list[BaseRoute]:
         """All of them."""
 
-        async def described(_request: Request) -> Response:
-            return Response(schema.openapi_json(), media_type="application/json")
+        async def openapi(_request: Request) -> Response:
+            described = schema.openapi_json(self._hub.runner.request_types)
+            return Response(described, media_type="application/json")
 
         async def socket(socket: WebSocket) -> None:
             await program_socket.serve_socket(self._hub, self._door, self._budgets, socket)
@@ -98,7 +99,7 @@ class Api:
             Route(f"{ROOT}/stop", self._stop, methods=["POST"]),
             Route(f"{ROOT}/do", self._do, methods=["POST"]),
             *self._provided,
-            Route(f"{ROOT}/openapi.json", described),
+            Route(f"{ROOT}/openapi.json", openapi),
             WebSocketRoute(f"{ROOT}/socket", socket),
         ]
 
@@ -136,7 +137,7 @@ class Api:
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
         body = await body_of(request, requests.LARGEST)
         try:
-            asked = requests.decoded(body)
+            asked = self._hub.requests.decoded(body)
             if isinstance(asked, requests.Hello | requests.Watch):
                 raise InputError("That is for a connection that lasts: the socket or the TCP port.")
             window = self._window(request, visitor)

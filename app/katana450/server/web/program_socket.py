@@ -69,7 +69,7 @@ class Program(Channel):
         self._due = 0.0
         self._watched: tuple[requests.Named, ...] = ()
 
-    def answer(self, window: Window, request: requests.AnyRequest) -> None:
+    def answer(self, window: Window, request: requests.Request) -> None:
         if isinstance(request, requests.Watch):
             if request.fields:
                 arm = self.hub.present()
@@ -204,7 +204,7 @@ class Lines:
     async def _hello(self, line: _TcpLine) -> requests.Hello | None:
         try:
             async with asyncio.timeout(HELLO_SECONDS):
-                request = requests.decoded(await line.receive())
+                request = self._hub.requests.decoded(await line.receive())
         except TimeoutError:
             await line.close(0, 'Nothing was said. Begin with {"do": "hello", "name": "..."}.')
         except InputError as error:

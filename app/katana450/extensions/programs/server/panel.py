@@ -16,15 +16,15 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.requests import Order
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts, file_name
+from katana450.extensions.programs.server.preview import Preview
+from katana450.extensions.programs.server.state_line import RUNS
 from katana450.extensions.programs.taught import taught
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.api.answers import Progress as Told
-from katana450.server.api.fields import Order
-from katana450.server.service.steering import RUNS
+from katana450.server.api.answers import Progress
 from katana450.server.view.controls import GestureGate, refuse
-from katana450.server.view.preview import Preview
 
 STEP = 0.1
 """[s] Between two times to look at."""
@@ -51,7 +51,7 @@ class Steering(Protocol):
         ...
 
     @property
-    def told(self) -> Told | None:
+    def progress(self) -> Progress | None:
         """How it stands."""
         ...
 
@@ -128,7 +128,7 @@ class ProgramsPanel:
 
     def follow(self) -> None:
         """Show how the program stands."""
-        told = self._steering.told
+        told = self._steering.progress
         page = _page(told, len(self._taught))
         if page != self._status.content:
             self._status.content = page
@@ -158,7 +158,7 @@ class ProgramsPanel:
 
     def _order(self, actor: Actor, _client: viser.ClientHandle | None = None) -> None:
         said = self._orders.value
-        told = self._steering.told
+        told = self._steering.progress
         status = "" if told is None else told.status
         if said in ("Wait", "End") or (said != "Preview" and status in RUNS):
             self._steering.steer(ORDERS[said], actor)
@@ -232,7 +232,7 @@ def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
         return False
 
 
-def _page(told: Told | None, poses: int) -> str:
+def _page(told: Progress | None, poses: int) -> str:
     lines = []
     if told is not None:
         head = f"<b>{escape(told.name)}</b> " if told.name else ""

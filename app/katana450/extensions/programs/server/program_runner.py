@@ -1,32 +1,34 @@
-"""A person's program, run where the people are: a participant of its own that holds the arm.
+"""A program on a running server: a participant of its own that holds the arm.
 
-Planning takes long and happens in a thread (`Planning`); all else lives in the gateway's one
-thread.
+Planning takes long and happens in a thread (`Planning`); all else lives in the server's thread.
 """
 
 from __future__ import annotations
 
 import logging
+from argparse import Namespace
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
-from katana450.extensions.programs import runner
+from katana450.extensions.programs import requests, runner
+from katana450.extensions.programs.bench import PlanContext
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.requests import Order
 from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.server import state_line
+from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.source import LARGEST
 from katana450.server.api import answers
-from katana450.server.api.fields import Order
+from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
 from katana450.server.service.heartbeats import LastHeartbeat
+from katana450.server.service.hub import Hub, Window
 from katana450.server.service.identity import Identity
-from katana450.server.service.program_planning import Planning
-
-if TYPE_CHECKING:
-    from katana450.server.service.hub import Hub, Window
+from katana450.server.service.runner import Runner, StatusLine
 
 log = logging.getLogger(__name__)
 
@@ -39,14 +41,17 @@ class _Here(LastHeartbeat):
         return self._clock()
 
 
-class ProgramRunner:
+class ProgramRunner(Runner):
     """At most one program at a time."""
 
-    def __init__(self, hub: Hub, owner_silence: float) -> None:
-        """``owner_silence``: time without a heartbeat of its owner after which a program ends [s];
-        a page that reloads is back sooner."""
-        self._hub = hub
-        self._owner_silence = owner_silence
+    request_types = (requests.Program, requests.Steer)
+    controls = ("Script", "Program", "Look at", "Teach", "Name")
+
+    def __init__(self, hub: Hub, options: Namespace) -> None:
+        """``options.owner_silence``: time without a heartbeat of its owner after which a program
+        ends [s]; a page that reloads is back sooner."""
+        super().__init__(hub, options)
+        self._owner_silence: float = options.owner_silence
         self._parts: dict[str, str] = {}
         self._planning: Planning | None = None
         self._owner: Window | None = None
@@ -76,37 +81,22 @@ class ProgramRunner:
         """Whether ``window`` is the page or API program that the present program is of."""
         return self._is_owner(window.person)
 
-    def drives(self, window: Window) -> bool:
-        """Return whether ``window`` holds the lease, or owns the program that does."""
-        joined = self._self
-        return self._hub.lease.holder == (
-            joined.person if joined is not None and self.owns(window) else window.person
-        )
-
     def check_may_touch(self, actor: Actor) -> None:
-        """Raise LeaseError where ``actor`` must not touch the panel of programs; in any thread."""
         self._check_may_drive(actor.person)
         if self.running:
             self._check_owns(actor.person)
 
-    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
-        """Plan ``text`` for ``actor`` at the panel, and do ``then`` once it is planned."""
-        window = self._window_of(actor)
-        if then is not None:
-            self._hub.gate.check_not_stopped()
-        self.script(window, text, more=False, speed=1.0)
-        self._then = then
+    def handle(self, window: Window, request: Request) -> answers.Answer:
+        match request:
+            case requests.Program(text=text, more=more, speed=speed):
+                self.script(window, text, more=more, speed=speed)
+            case requests.Steer(order=order):
+                self.steer(window, order)
+        return answers.Done()
 
-    def order(self, order: Order, actor: Actor) -> None:
-        """`steer` for ``actor`` at the panel."""
-        self.steer(self._window_of(actor), order)
-
-    def _window_of(self, actor: Actor) -> Window:
-        self._hub.gate.check_current(actor)
-        window = self._hub.window(actor.key)
-        if window is None:
-            raise LeaseError("Open the front page to run programs.")
-        return window
+    def then(self, order: Order | None) -> None:
+        """Do ``order`` as soon as the present script is planned."""
+        self._then = order
 
     def script(self, window: Window, text: str, *, more: bool, speed: float) -> None:
         """Take a part of a script; after the last it is planned, from where the arm stands then.
@@ -122,7 +112,7 @@ class ProgramRunner:
             self._parts[key] = text
             return
         self._check_free()
-        arm = self._hub.present()
+        arm = self.hub.present()
         if arm.state.moving:
             raise LeaseError("The arm moves: a program is planned from where it stands.")
         self._check_may_drive(window.person)
@@ -138,14 +128,15 @@ class ProgramRunner:
 
     def _plan(self, window: Window, text: str, speed: float, changed: str) -> None:
         """Plan ``text`` from the present state; ``changed`` is why an earlier plan is not kept."""
-        arm = self._hub.present()
+        arm = self.hub.present()
         note = f"Planned anew: {changed}." if changed else ""
-        self._planning = Planning(text, speed, arm.rig, arm.state, self._hub.clock, note)
+        context = PlanContext(arm.session, arm.arm.T_base_shoulder)
+        self._planning = Planning(text, speed, context, arm.state, self.hub.clock, note)
         self._own(window)
 
     def _own(self, window: Window) -> None:
         self._owner, self._run, self._then = window, None, None
-        self._seen = self._hub.clock()
+        self._seen = self.hub.clock()
 
     def steer(self, window: Window, order: Order) -> None:
         """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
@@ -179,22 +170,20 @@ class ProgramRunner:
     def _steer_planning(self, planning: Planning, window: Window, order: Order) -> None:
         match order:
             case Order.RUN | Order.STEP:
-                self._hub.gate.check_not_stopped()
+                self.hub.gate.check_not_stopped()
                 self._then, planning.note = order, ""
             case Order.PAUSE:
-                self._hub.move(window, cmd.Pause())
+                self.hub.move(window, cmd.Pause())
             case Order.RESUME:
-                self._hub.move(window, cmd.Resume())
+                self.hub.move(window, cmd.Resume())
             case Order.END:
                 self._then = None
                 planning.cancel(f"{window.person.name} cancelled the planning.")
 
     def stopped(self) -> None:
-        """The arm was stopped: what was asked for before that is not done after it."""
         self._forget_run("STOP was pressed while it was planned")
 
     def redirected(self) -> None:
-        """The arm was told something else: a run that was asked for before is not done after it."""
         self._forget_run("the arm was told something else while it was planned")
 
     def _forget_run(self, why: str) -> None:
@@ -203,7 +192,6 @@ class ProgramRunner:
             self._then, planning.note = None, f"Not run: {why}."
 
     def leave(self, window: Window) -> None:
-        """Somebody is gone for good."""
         self._parts.pop(window.person.key, None)
         if not self.owns(window):
             return
@@ -212,8 +200,7 @@ class ProgramRunner:
             self._end(f"{window.person.name} left.")
 
     def tick(self) -> None:
-        """Look at the arm, and go on; to be called often."""
-        hub, t = self._hub, self._hub.clock()
+        hub, t = self.hub, self.hub.clock()
         if self._then is not None and self._owner_is_silent(t):
             self._forget_run("whoever asked for it is gone")
         if self.program is not None and self._then is not None:
@@ -247,14 +234,13 @@ class ProgramRunner:
             if self._run.phase is not Phase.RUNNING:
                 self._leave_with(self._run.phase, self._run.why)
 
-    def told(self) -> answers.Progress | None:
-        """How it stands; None when there is none."""
+    def progress(self) -> answers.Progress | None:
         planning, owner = self._planning, self._owner
         if planning is None or owner is None:
             return None
-        program, run, arm = planning.program, self._run, self._hub.arm
+        program, run, arm = planning.program, self._run, self.hub.arm
         if program is None or run is None or arm is None or planning.refused is not None:
-            return planning.told(owner.person.name)
+            return planning.progress(owner.person.name)
         now = runner.progress(program, run, arm.state)
         return answers.Progress(
             name=program.name,
@@ -268,6 +254,17 @@ class ProgramRunner:
             seconds=program.duration,
             why=now.why,
         )
+
+    def status_line(self, state: State, line: StatusLine) -> StatusLine:
+        return state_line.status_line(state, line, self.progress(), waits=self.waits)
+
+    def orders(self, window: Window) -> tuple[str, ...]:
+        arm = self.hub.arm
+        if arm is None or not self.owns(window):
+            return ()
+        stopped = self.hub.stopped is not None
+        offered = state_line.orders(arm.state, self.progress(), stopped=stopped, waits=self.waits)
+        return tuple(order.value for order in offered)
 
     def _go_on(self) -> None:
         """Do what was to be done once a program is planned."""
@@ -284,13 +281,13 @@ class ProgramRunner:
     def _begin(self, window: Window, order: Order) -> None:
         """Run the program that is planned; where the arm or the scene is not as it was planned for,
         plan it anew first."""
-        planning, hub = self._planning, self._hub
+        planning, hub = self._planning, self.hub
         if planning is None or planning.program is None:
             raise LeaseError("There is no program that is planned; send one first.")
         arm = hub.present()
         changed = planning.changed_to(arm.state)
         if changed:
-            self._hub.gate.check_not_stopped()
+            self.hub.gate.check_not_stopped()
             if arm.state.moving:
                 raise LeaseError("The arm moves: a program is planned from where it stands.")
             if hub.lease.holder != window.person:
@@ -326,7 +323,7 @@ class ProgramRunner:
     def _tell(self, *commands: cmd.Command) -> None:
         assert self._self is not None
         for command in commands:
-            self._hub.move(self._self, self._as_allowed(command))
+            self.hub.move(self._self, self._as_allowed(command))
 
     def _as_allowed(self, command: cmd.Command) -> cmd.Command:
         """``command``, no faster than a person has allowed since the program began."""
@@ -348,14 +345,14 @@ class ProgramRunner:
         assert self._self is not None
         assert self._run is not None
         joined, self._self = self._self, None
-        self._hub.gate.program = None
+        self.hub.gate.program = None
         self._run = runner.ended(self._run, phase, why)
         # A program's speed is its own.
         with suppress(InputError):
-            self._hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
-        if self._hub.lease.holder == joined.person:
-            self._hub.release_lease(joined)
-        self._hub.leave(joined, for_good=True)
+            self.hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
+        if self.hub.lease.holder == joined.person:
+            self.hub.release_lease(joined)
+        self.hub.leave(joined, for_good=True)
         log.info("The program %s: %s", joined.person.name, why or f"{phase.value}.")
 
     def _check_free(self) -> None:
@@ -364,17 +361,17 @@ class ProgramRunner:
         planning = self._planning
         if planning is None or not planning.busy:
             return
-        if not self._owner_is_silent(self._hub.clock()):
+        if not self._owner_is_silent(self.hub.clock()):
             raise LeaseError("Another program is being planned: cancel that first, or wait for it.")
         planning.cancel("Whoever asked for it is gone.")
 
     def _owner_is_here(self) -> bool:
         owner = self._owner
-        return owner is not None and self._hub.window(owner.person.key) is not None
+        return owner is not None and self.hub.window(owner.person.key) is not None
 
     def _owner_is_silent(self, t: float) -> bool:
         """Return whether no heartbeat of the owner was received for the heartbeat timeout."""
-        window = None if self._owner is None else self._hub.window(self._owner.person.key)
+        window = None if self._owner is None else self.hub.window(self._owner.person.key)
         if window is not None:
             self._seen = max(self._seen, window.heartbeat.newest)
         return t - self._seen > self._owner_silence

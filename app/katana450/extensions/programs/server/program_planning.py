@@ -95,7 +95,7 @@ class Planning:
         """Return a clause that names what is no longer as it was planned for, else ""."""
         return self.situation.changed_to(Situation.of(state))
 
-    def told(self, by: str) -> answers.Progress:
+    def progress(self, by: str) -> answers.Progress:
         """How a program stands that has not begun; ``by``: its owner's name."""
         program, now = self.program, self.stage
         if self.cancelled is not None or self.refused is not None:

@@ -1,0 +1,70 @@
+"""The extension ``programs``: scripts that a server plans and runs."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from katana450.cli.serve_options import SHORTEST_SILENCE, heartbeat_timeout
+from katana450.extension import Extension, ServeExtension
+
+if TYPE_CHECKING:
+    from katana450.server.service.runner import Runner
+    from katana450.server.view.panel_folder import FolderContext, PanelFolder
+
+OWNER_SILENCE, LONGEST_OWNER_SILENCE = 1.0, 10.0
+"""[s] Heartbeat timeout of a program's owner, after which the program ends; its longest value."""
+
+
+def add_serve_options(parser: ArgumentParser) -> None:
+    """Add to ``katana450 serve`` the options of programs."""
+    parser.add_argument(
+        "--owner-silence",
+        type=_owner_silence,
+        default=OWNER_SILENCE,
+        metavar="SECONDS",
+        help="heartbeat timeout of a program's owner, after which the program ends "
+        f"({SHORTEST_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
+    )
+    parser.add_argument(
+        "--programs",
+        type=Path,
+        metavar="DIR",
+        help="a folder of scripts for the panel, where taught ones are saved too",
+    )
+
+
+def _owner_silence(text: str) -> float:
+    return heartbeat_timeout(text, LONGEST_OWNER_SILENCE)
+
+
+def _runner() -> type[Runner]:
+    from katana450.extensions.programs.server.program_runner import ProgramRunner
+
+    return ProgramRunner
+
+
+def _folder(context: FolderContext) -> PanelFolder | None:
+    from katana450.extensions.programs.script_files import Scripts
+    from katana450.extensions.programs.server.panel import ProgramsPanel
+    from katana450.extensions.programs.server.panel_access import PanelAccess
+    from katana450.extensions.programs.server.program_runner import ProgramRunner
+
+    runner = context.hub.runner
+    if not isinstance(runner, ProgramRunner):
+        # Another extension provides the one runner of this server.
+        return None
+    return ProgramsPanel(
+        context.server,
+        context.robot,
+        PanelAccess(runner, context.hub, context.call),
+        Scripts(context.options.programs),
+        context.gestures,
+        context.state,
+    )
+
+
+EXTENSION = Extension(
+    "programs", serve=ServeExtension(add_serve_options, runner=_runner, folder=_folder)
+)

@@ -1,0 +1,57 @@
+"""Requests of the programs' panel, carried from viser's threads to the server's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from katana450.arm.control.actor import Actor
+from katana450.errors import LeaseError
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.server.api import answers
+from katana450.server.service.hub import Hub, Window
+
+
+class PanelAccess:
+    """The runner as the panel uses it: for any thread, and for the actor of a gesture."""
+
+    def __init__(
+        self, runner: ProgramRunner, hub: Hub, call: Callable[[Callable[[], None]], None]
+    ) -> None:
+        """``call``: runs a function in the server's thread, see ``FolderContext``."""
+        self._runner = runner
+        self._hub = hub
+        self._call = call
+
+    @property
+    def progress(self) -> answers.Progress | None:
+        """Progress of the present or last program."""
+        return self._runner.progress()
+
+    @property
+    def program(self) -> Program | None:
+        """The program that is planned."""
+        return self._runner.program
+
+    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
+        """Plan ``text`` for ``actor``, and do ``then`` once it is planned. Raises KatanaError."""
+        self._call(lambda: self._plan(text, then, actor))
+
+    def steer(self, order: Order, actor: Actor) -> None:
+        """Steer the program for ``actor``. Raises LeaseError with the reason why not."""
+        self._call(lambda: self._runner.steer(self._window_of(actor), order))
+
+    def _plan(self, text: str, then: Order | None, actor: Actor) -> None:
+        window = self._window_of(actor)
+        if then is not None:
+            self._hub.gate.check_not_stopped()
+        self._runner.script(window, text, more=False, speed=1.0)
+        self._runner.then(then)
+
+    def _window_of(self, actor: Actor) -> Window:
+        self._hub.gate.check_current(actor)
+        window = self._hub.window(actor.key)
+        if window is None:
+            raise LeaseError("Open the front page to run programs.")
+        return window

@@ -1,0 +1,60 @@
+"""The state line and the buttons of the page while a program is planned or runs."""
+
+from __future__ import annotations
+
+from katana450.arm.control.state import State
+from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.server.program_planning import Stage
+from katana450.server.api.answers import Progress
+from katana450.server.service.runner import StatusLine
+
+RUNS = ("running", "paused", "blocked")
+"""States of a program that holds the arm, as `answers.Progress.status`."""
+
+PLANNING = "planning"
+"""The mood of the page while a program is planned."""
+
+
+def status_line(
+    state: State, line: StatusLine, program: Progress | None, *, waits: bool
+) -> StatusLine:
+    """Return the line for ``program`` in place of ``line``, which tells of ``state`` alone.
+
+    ``waits``: whether the program runs as soon as it is planned.
+    """
+    if program is None:
+        return line
+    step = f"Step {program.step} of {program.steps}"
+    if program.status in RUNS:
+        if state.paused:
+            return line._replace(headline=f"{program.name}, paused", why=f"{step}. {line.why}")
+        return line._replace(mood="moving", headline=f"{program.name}, {step.lower()}")
+    if program.status != Stage.PLANNING.value:
+        return line
+    said = f"Planning {program.name or 'the script'}"
+    about = [program.why] if program.why else []
+    if program.steps:
+        about.append(f"{step}: {program.task}, {program.share:.0%}.")
+    if state.moving:
+        return line._replace(why=" ".join((f"{said}.", *about)))
+    said += ", paused" if state.paused else f" {program.share:.0%}"
+    if waits:
+        about.append("Then it waits for Resume." if state.paused else "Then it runs.")
+    else:
+        about.append("It does not run by itself.")
+    return StatusLine(PLANNING, said, " ".join(about))
+
+
+def orders(
+    state: State, program: Progress | None, *, stopped: bool, waits: bool
+) -> tuple[Order, ...]:
+    """Return the orders that the page offers to the owner of ``program``.
+
+    ``waits``: whether the program runs as soon as it is planned.
+    """
+    if program is None:
+        return ()
+    pause = () if stopped else (Order.RESUME if state.paused else Order.PAUSE,)
+    if program.status == Stage.PLANNING.value:
+        return (*(pause if waits else ()), Order.END)
+    return pause if program.status in RUNS else ()

@@ -1,0 +1,100 @@
+"""Base of what drives the arm over time: an extension overrides its methods, as for programs."""
+
+from __future__ import annotations
+
+import logging
+from argparse import Namespace
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.state import State
+from katana450.server.api import answers
+from katana450.server.api.fields import Request
+
+if TYPE_CHECKING:
+    from katana450.server.service.hub import Hub, Window
+
+log = logging.getLogger(__name__)
+
+
+class StatusLine(NamedTuple):
+    """The state line of the page: the colour of its lamp, two or three words, one sentence."""
+
+    mood: str
+    headline: str
+    why: str
+
+
+class Runner:
+    """Drives the arm over time as a participant of its own, on behalf of an owner. This one: never.
+
+    A run joins the hub as a participant, holds the lease, and submits its commands as everybody
+    does; ``CommandGate.program`` names it and its owner meanwhile. The hub calls the methods below
+    in the server's thread, except where they name another. There is one runner in a server.
+
+    Attributes:
+        request_types: Classes of the requests that ``handle`` answers, beside those of the core.
+        controls: Labels of its controls in the panel. ``check_may_touch`` decides who may use them.
+    """
+
+    request_types: ClassVar[tuple[type[Request], ...]] = ()
+    controls: ClassVar[tuple[str, ...]] = ()
+
+    def __init__(self, hub: Hub, options: Namespace) -> None:  # noqa: ARG002
+        """``options``: of ``katana450 serve``."""
+        self.hub = hub
+
+    def handle(self, window: Window, request: Request) -> answers.Answer:
+        """Execute ``request``, one of ``request_types``, and return its answer.
+
+        Raises LeaseError and InputError with the reason for a refusal.
+        """
+        raise NotImplementedError
+
+    def check_may_touch(self, actor: Actor) -> None:
+        """Raise LeaseError where ``actor`` must not touch ``controls``. Called in any thread."""
+
+    def tick(self) -> None:
+        """Look at the arm and continue. Called every ``TICK`` after the watch over the driver."""
+
+    def stopped(self) -> None:
+        """Note a stop, before the arm gets it: nothing asked for earlier may begin afterwards.
+
+        Called in any thread, under the lock of the gate: it must return at once.
+        """
+
+    def redirected(self) -> None:
+        """Note that the arm got a command that supersedes what waits to begin. In any thread."""
+
+    def leave(self, window: Window) -> None:
+        """Note that ``window`` is gone for good."""
+
+    def progress(self) -> answers.Progress | None:
+        """Return the progress of the present or last run, which is a part of the state."""
+
+    def status_line(self, state: State, line: StatusLine) -> StatusLine:  # noqa: ARG002
+        """Return the state line of the page in place of ``line``, which tells of ``state``.
+
+        It is not called while the arm is stopped, blocked or at fault.
+        """
+        return line
+
+    def orders(self, window: Window) -> tuple[str, ...]:  # noqa: ARG002
+        """Return the orders that the bar of the page offers to ``window``."""
+        return ()
+
+
+def guarded(note: Callable[[], None]) -> Callable[[], None]:
+    """Return ``note`` with its errors logged and not raised.
+
+    For ``stopped`` and ``redirected``, which are on the path of a stop to the arm.
+    """
+
+    def noted() -> None:
+        try:
+            note()
+        except Exception:
+            log.exception("The runner met an error.")
+
+    return noted

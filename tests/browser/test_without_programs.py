@@ -1,0 +1,38 @@
+"""The page of a server without the extension ``programs``: whole, and silent about programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import OpenPage
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.test_gateway import bar, mood, take
+from tests.extensions.environments import without
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[AppServer]:
+    command = (*ATTENTIVE_APP, "--silence", "2.0")
+    with without(tmp_path, "programs"), AppServer(command) as server:
+        yield server
+
+
+def test_page_drives_stops_and_offers_no_programs(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm", "/target/move"))
+    take(page)
+    page.drag_slider("Axis 1", 20.0)
+    page.wait_until(lambda: bar(page, "headline") == "On target", "the arm to arrive")
+    page.page.keyboard.press("Space")
+    page.wait_until(lambda: mood(page.page) == "stopped", "the stop")
+    page.press_in_bar("Clear stop")
+    page.wait_until(lambda: mood(page.page) == "ok", "the stop to be cleared")
+    assert page.page.locator("#orders button").count() == 0
+    assert "Programs" not in page.panel_text()
+    assert "Objects" in page.panel_text()
+    page.keep(artefacts / "without-programs.png")
+    assert page.errors == []
