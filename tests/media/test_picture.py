@@ -15,20 +15,19 @@ from katana450.arm.robot.camera import Camera as Viewpoint
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, Shape
-from katana450.extensions.render.camera import Camera
-from katana450.extensions.render.line import tube
-from katana450.extensions.render.picture import Picture, picture
-from katana450.extensions.render.scene import Item, Scene
-from katana450.extensions.render.sight import FLOOR, NOWHERE, look
-from katana450.extensions.render.tracer import Tracer
-from katana450.extensions.render.water import CUP
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.line import tube
+from katana450.extensions.media.picture import Picture, picture
+from katana450.extensions.media.scene import Item, Scene
+from katana450.extensions.media.sight import FLOOR, NOWHERE, look
+from katana450.extensions.media.tracer import Tracer
+from katana450.extensions.media.water import CUP
 from katana450.maths.geometry import se3
-from katana450.png import png
 from katana450.resources import URDF_PATH
 from katana450.server.viser_bridge.themes import DARK, LIGHT, THEMES
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
-from tests.render.conftest import Workshop
+from tests.media.conftest import Workshop
 
 NEAR = Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(40.0), (320, 200))
 """Cup, basin and hand."""
@@ -56,7 +55,7 @@ def ball(radius: float) -> Shape:
 def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture) -> None:
     state = workshop.filled
     again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT, 1)
-    assert png(again.pixels) == png(filled.pixels)
+    assert again.png == filled.png
 
 
 @pytest.mark.parametrize("pose", POSES)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.extensions.render.camera import Camera
-from katana450.extensions.render.light import Light
-from katana450.extensions.render.scene import Floats, light_of
-from katana450.extensions.render.shading import Lamp, lamp
-from katana450.extensions.render.sight import Sight
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.light import Light
+from katana450.extensions.media.scene import Floats, light_of
+from katana450.extensions.media.shading import Lamp, lamp
+from katana450.extensions.media.sight import Sight
 from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM
 from katana450.server.viser_bridge.themes import Theme
 

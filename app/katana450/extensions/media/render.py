@@ -25,13 +25,12 @@ from katana450.assembly.robot_session import described
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.playback import Playback, chosen
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.film import check_filmable, write_film
+from katana450.extensions.media.picture import MOVING, STILL, Picture, picture
+from katana450.extensions.media.stage import Stage
+from katana450.extensions.media.tracer import check_traceable
 from katana450.extensions.progress import progress
-from katana450.extensions.render.camera import Camera
-from katana450.extensions.render.film import check_filmable, write_film
-from katana450.extensions.render.picture import MOVING, STILL, picture
-from katana450.extensions.render.stage import Stage
-from katana450.extensions.render.tracer import check_traceable
-from katana450.png import png
 from katana450.server.view.cameras import look_from
 from katana450.server.viser_bridge.presets import FOV, Preset
 from katana450.server.viser_bridge.themes import THEMES, Theme
@@ -62,8 +61,8 @@ def render(options: argparse.Namespace) -> int:
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
         stage = Stage(shown.robot, shown.session, load_props())
-        content = png(shot.taken(stage, shown.robot, state, STILL))
-        write_files({path: writer_of(content)})
+        taken = shot.taken(stage, shown.robot, state, STILL)
+        write_files({path: writer_of(taken.png)})
     else:
         _film(path, shown, shot, options.fps, options.urdf)
     print(f"{path}: {path.stat().st_size} bytes")
@@ -77,11 +76,11 @@ class _Shot(NamedTuple):
     size: tuple[int, int]
     theme: str
 
-    def taken(self, stage: Stage, robot: Robot, state: State, rays: int) -> Pixels:
+    def taken(self, stage: Stage, robot: Robot, state: State, rays: int) -> Picture:
         look = look_from(self.preset, robot.require_arm(), state)
         camera = Camera(look.position, look.target, float(FOV), self.size)
         theme: Theme = THEMES[self.theme]
-        return picture(stage.items(state), stage.water(state), camera, theme, rays).pixels
+        return picture(stage.items(state), stage.water(state), camera, theme, rays)
 
 
 def _film(path: Path, shown: Playback, shot: _Shot, fps: float, urdf: Path) -> None:
@@ -126,4 +125,4 @@ def _begin(shot: _Shot, urdf: Path, bare: bool) -> None:
 
 def _take(state: State) -> Pixels:
     (studio,) = _studios
-    return studio.shot.taken(studio.stage, studio.robot, state, MOVING)
+    return studio.shot.taken(studio.stage, studio.robot, state, MOVING).pixels

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import secrets
 from collections.abc import Iterable
 from contextlib import suppress
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from katana450.errors import ConfigurationError, InputError, installing
+from katana450.errors import InputError
 
 QUALITY = 8
 """Of 10."""
@@ -23,11 +22,7 @@ SLOWEST, FASTEST = 1.0, 120.0
 
 
 def check_filmable(size: tuple[int, int], fps: float) -> None:
-    """Raises ConfigurationError without imageio-ffmpeg, and InputError for what no film can be."""
-    if importlib.util.find_spec("imageio_ffmpeg") is None:
-        raise ConfigurationError(
-            "Films are made with imageio-ffmpeg, which is not installed. " + installing("report")
-        )
+    """Raise InputError unless a film can have ``size`` [px] and ``fps`` pictures a second."""
     if any(side % 2 for side in size):
         raise InputError(f"A film has an even number of pixels a side, not {size[0]}x{size[1]}.")
     if not SLOWEST <= fps <= FASTEST:

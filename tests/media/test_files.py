@@ -1,8 +1,7 @@
-"""PNG and MP4 files, read back by other programs; and none where something went wrong."""
+"""Films, read back by ffmpeg; and none where something went wrong."""
 
 from __future__ import annotations
 
-import io
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,16 +9,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from imageio_ffmpeg import get_ffmpeg_exe
-from PIL import Image
 
 from katana450.errors import ConfigurationError, InputError
-from katana450.extensions.render import film, tracer
-from katana450.extensions.render.film import write_film
-from katana450.png import png
+from katana450.extensions.media.film import write_film
+from katana450.extensions.media.tracer import check_traceable
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -44,17 +38,6 @@ def decoded(path: Path) -> tuple[Pixels, str]:
     )
     pictures = np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
     return pictures, done.stderr.decode()
-
-
-@given(
-    st.tuples(st.integers(1, 9), st.integers(1, 9)).flatmap(
-        lambda size: arrays(np.uint8, (*size, 3))
-    )
-)
-def test_a_png_is_read_as_it_was(pixels: Pixels) -> None:
-    picture = Image.open(io.BytesIO(png(pixels)))
-    assert picture.mode == "RGB"
-    assert (np.asarray(picture) == pixels).all()
 
 
 def test_a_film_has_its_frames_size_and_length(tmp_path: Path) -> None:
@@ -100,9 +83,7 @@ def test_what_no_film_can_be_is_refused(
         write_film(tmp_path / "film.mp4", frames(), size, fps)
 
 
-def test_what_to_install_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_embreex_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(ConfigurationError, match=r"pip install --editable '\.\[report\]'"):
-        tracer.check_traceable()
-    with pytest.raises(ConfigurationError, match=r"pip install --editable '\.\[report\]'"):
-        film.check_filmable((96, 64), 25.0)
+    with pytest.raises(ConfigurationError, match="need embreex"):
+        check_traceable()

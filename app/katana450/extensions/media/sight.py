@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.extensions.render.scene import Bools, Floats, Ints, Scene
-from katana450.extensions.render.tracer import NOTHING, Meeting, Tracer
+from katana450.extensions.media.scene import Bools, Floats, Ints, Scene
+from katana450.extensions.media.tracer import NOTHING, Meeting, Tracer
 
 FLOOR, NOWHERE = -1, -2
 """In place of the number of an item."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.extensions.report.figures import PARTS, largest
-from katana450.extensions.report.measures import Along
+from katana450.extensions.media.figures import PARTS, largest
+from katana450.extensions.media.measures import Along
 
 
 def test_the_drawn_error_is_the_largest_of_every_part_of_every_path() -> None:

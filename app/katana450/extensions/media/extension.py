@@ -1,4 +1,4 @@
-"""The extension ``render``: pictures and films of the arm, and the command that takes them."""
+"""The extension ``media``: the command that takes pictures and films of the arm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ THEMES = ("light", "dark")
 
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:
-    """Put them into `parser`."""
+    """Add the options of ``render`` to ``parser``."""
     parser.add_argument(
         "--out",
         type=Path,
@@ -85,13 +85,13 @@ def _size(text: str) -> tuple[int, int]:
 
 
 def _render(options: argparse.Namespace) -> int:
-    from katana450.extensions.render.render import render
+    from katana450.extensions.media.render import render
 
     return render(options)
 
 
 EXTENSION = Extension(
-    "render",
+    "media",
     (
         CliCommand(
             "render",

@@ -18,12 +18,12 @@ import numpy as np
 from katana450.arm.control.arm import Arm
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
+from katana450.extensions.media import figures
+from katana450.extensions.media.measures import Bound, alongs, bounds, measured
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.simulation import Trace
-from katana450.extensions.report import figures
-from katana450.extensions.report.measures import Bound, alongs, bounds, measured
 from katana450.maths.kinematics.forward import forward
 
 NONE: Mapping[str, bytes] = {}

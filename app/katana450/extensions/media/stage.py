@@ -16,9 +16,9 @@ from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, Shape, shapes_of
 from katana450.arm.robot.visual import Visual
-from katana450.extensions.render.picture import Translucent
-from katana450.extensions.render.scene import Item, smooth
-from katana450.extensions.render.water import veils_of
+from katana450.extensions.media.picture import Translucent
+from katana450.extensions.media.scene import Item, smooth
+from katana450.extensions.media.water import veils_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.conduit import PITCH, poses, ring

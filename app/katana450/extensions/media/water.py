@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.arm.robot.surfaces import Material, Shape
-from katana450.extensions.render.picture import Translucent
-from katana450.extensions.render.scene import Item, smooth
+from katana450.extensions.media.picture import Translucent
+from katana450.extensions.media.scene import Item, smooth
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment

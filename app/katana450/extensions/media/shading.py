@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.extensions.render.light import Light
-from katana450.extensions.render.scene import Floats, light_of, unit
+from katana450.extensions.media.light import Light
+from katana450.extensions.media.scene import Floats, light_of, unit
 
 
 class Lamp(NamedTuple):

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.extensions.render.scene import Floats, unit
-from katana450.extensions.render.sight import NOWHERE, Sight
-from katana450.extensions.render.tracer import Tracer
+from katana450.extensions.media.scene import Floats, unit
+from katana450.extensions.media.sight import NOWHERE, Sight
+from katana450.extensions.media.tracer import Tracer
 
 TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
 """Which of sixteen each pixel of a tile takes: neighbours take what is far apart."""

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from katana450.arm.robot.surfaces import Material, Shape
-from katana450.extensions.render.scene import Item, unit
+from katana450.extensions.media.scene import Item, unit
 from katana450.maths.geometry.arrays import FloatArray
 
 SIDES = 8

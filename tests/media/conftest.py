@@ -12,7 +12,7 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import described
-from katana450.extensions.render.stage import Stage
+from katana450.extensions.media.stage import Stage
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 

@@ -11,20 +11,19 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.line import tube
+from katana450.extensions.media.picture import picture
+from katana450.extensions.media.scene import Item
+from katana450.extensions.media.stage import Stage
 from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.simulation import Trace
-from katana450.extensions.render.camera import Camera
-from katana450.extensions.render.line import tube
-from katana450.extensions.render.picture import picture
-from katana450.extensions.render.scene import Item
-from katana450.extensions.render.stage import Stage
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
 from katana450.maths.planning.tool_path import ToolPath
-from katana450.png import png
 from katana450.server.view.traces import DESIRED, PLACES, coloured
 from katana450.server.viser_bridge.themes import LIGHT
 
@@ -94,7 +93,7 @@ def stage_pictures(
             items += _lines(program, robot, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
-        found[f"{name}.png"] = png(picture(items, stage.water(state), camera, LIGHT, RAYS).pixels)
+        found[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT, RAYS).png
     return found
 
 

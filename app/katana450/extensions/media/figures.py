@@ -1,9 +1,8 @@
-"""The figures of a report, drawn for a printed page; matplotlib is asked for only here."""
+"""The figures of a report, drawn for a printed page; matplotlib is loaded when one is drawn."""
 
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import io
 import math
 from collections.abc import Sequence
@@ -13,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from katana450.arm.control.arm import Arm
-from katana450.errors import ConfigurationError, installing
+from katana450.extensions.media.measures import Along
 from katana450.extensions.programs.simulation import Trace
-from katana450.extensions.report.measures import Along
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import tool_speed
 
@@ -50,15 +48,6 @@ PARTS = 200
 """Of a path, of each of which the largest error is drawn."""
 
 TIME = "time (s)"
-
-
-def check_drawable() -> None:
-    """ConfigurationError when matplotlib is missing, told before a long run."""
-    if importlib.util.find_spec("matplotlib") is None:
-        raise ConfigurationError(
-            "The figures of a report are drawn by matplotlib, which is not installed. "
-            + installing("report")
-        )
 
 
 def path_figure(paths: Sequence[Along]) -> bytes:
@@ -194,7 +183,6 @@ def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[s
 
 
 def _plt() -> Any:
-    check_drawable()
     importlib.import_module("matplotlib").use("Agg")
     return importlib.import_module("matplotlib.pyplot")
 

@@ -8,18 +8,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.errors import ConfigurationError, installing
-from katana450.extensions.render.scene import Bools, Floats, Ints, Scene
+from katana450.errors import ConfigurationError
+from katana450.extensions.media.scene import Bools, Floats, Ints, Scene
 
 NOTHING = -1
 """Number of the triangle of a ray that meets none."""
 
 
 def check_traceable() -> None:
-    """ConfigurationError when embreex is missing, told before a long run."""
+    """Raise ConfigurationError where embreex is missing, so that it is reported before a long run.
+
+    It is a dependency on all machines but Linux on arm64.
+    """
     if importlib.util.find_spec("embreex") is None:
         raise ConfigurationError(
-            "Pictures are made with embreex, which is not installed. " + installing("report")
+            "Pictures and films need embreex, which is not installed and has no wheel for Linux on "
+            "arm64. Build it from source: https://github.com/trimesh/embreex."
         )
 
 

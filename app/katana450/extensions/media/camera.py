@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.render.scene import Floats, unit
+from katana450.extensions.media.scene import Floats, unit
 from katana450.maths.geometry.arrays import finite_array
 
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
-from katana450.extensions.render import room
-from katana450.extensions.render.camera import Camera
-from katana450.extensions.render.light import TILE, Light, reaching
-from katana450.extensions.render.scene import Bools, Floats, Ints, Item, Scene
-from katana450.extensions.render.shading import Stuff, developed, shaded
-from katana450.extensions.render.sight import FLOOR, NOWHERE, Sight, look, through
-from katana450.extensions.render.tracer import Tracer
+from katana450.extensions.media import room
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.light import TILE, Light, reaching
+from katana450.extensions.media.scene import Bools, Floats, Ints, Item, Scene
+from katana450.extensions.media.shading import Stuff, developed, shaded
+from katana450.extensions.media.sight import FLOOR, NOWHERE, Sight, look, through
+from katana450.extensions.media.tracer import Tracer
 from katana450.server.viser_bridge.themes import Theme
 
 STILL, MOVING = 4, 1
@@ -46,6 +48,13 @@ class Picture:
     pixels: npt.NDArray[np.uint8]
     item: Ints
     names: tuple[str, ...]
+
+    @property
+    def png(self) -> bytes:
+        """The picture as a PNG file; the same pixels give the same bytes."""
+        file = io.BytesIO()
+        Image.fromarray(self.pixels).save(file, "png")
+        return file.getvalue()
 
     def shows(self, *names: str) -> Bools:
         """(height, width) where the middle of a pixel shows one of the items of these ``names``."""
