@@ -101,7 +101,7 @@ bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and b
 
 lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
-	  --no-header pyproject.toml --extra report --group build --output-file requirements.lock
+	  --no-header pyproject.toml --group build --output-file requirements.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header pyproject.toml --group dev --constraint requirements.lock \
 	  --output-file requirements-dev.lock
