@@ -32,8 +32,8 @@ def dask(python: Path, folder: Path, *words: str, until: str) -> Iterator[str]:
     """Run a Dask process; yields the first group of ``until`` in what it prints."""
     command = [str(python), "-m", *words, "--host", "127.0.0.1", "--no-dashboard"]
     with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
         try:
-            assert process.stderr is not None
             found = (re.search(until, line) for line in process.stderr)
             yield next(match for match in found if match).group(1)
         finally:

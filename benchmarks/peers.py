@@ -1,4 +1,4 @@
-"""An environment for each peer of the benchmark, so that none decides what another may need."""
+"""An environment for each peer of a benchmark, so that none decides what another may need."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-PINS = Path(__file__).with_name("kinematics_peers.lock")
-PEERS = ("EAIK", "roboticstoolbox-python", "pin", "mink", "ikpy")
+PINS = Path(__file__).with_name("peers.lock")
+PEERS = ("EAIK", "roboticstoolbox-python", "pin", "mink", "ikpy", "vtk")
 _LINES_OF_REASON = 3
 
 
