@@ -16,7 +16,7 @@ patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
 .PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-crowd bench-drag \
-        bench-import bench-kinematics bench-load bench-start bench-streams bench-view pictures lock clean
+        bench-import bench-kinematics bench-load bench-pictures bench-start bench-streams bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -95,6 +95,9 @@ bench-collision: $(dev_ok)    ## distances and one control tick, beside raw mesh
 bench-import: $(dev_ok)       ## `import katana450` and its first call, beside `import numpy`
 	$(bin)/python -m benchmarks.import_time $(ARGS)
 
+bench-pictures: $(dev_ok)     ## pictures by our renderer beside VTK; installs that
+	$(bin)/python -m benchmarks.pictures $(ARGS)
+
 pictures: $(dev_ok) browser   ## take the pictures of the documentation anew
 	$(bin)/python -m docs.pictures
 
@@ -103,7 +106,7 @@ bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and b
 
 lock: $(dev_ok)               ## resolve the dependencies anew into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
-	  --no-header pyproject.toml --extra report --group build --output-file requirements.lock
+	  --no-header pyproject.toml --group build --output-file requirements.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header pyproject.toml --group dev --constraint requirements.lock \
 	  --output-file requirements-dev.lock

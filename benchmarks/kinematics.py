@@ -24,11 +24,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import kinematics_report as report
-from benchmarks.kinematics_environment import prepare
 from benchmarks.kinematics_process import SolverError, SolverProcess
 from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Machine, Row, Tables
 from benchmarks.kinematics_task import FloatArray, Task
+from benchmarks.peers import prepare
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.chain import Chain

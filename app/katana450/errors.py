@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 
 class KatanaError(Exception):
     """Base of every error of this project; its text can be shown to a person as it stands."""
@@ -31,14 +29,6 @@ class ConfigurationError(KatanaError):
 
 class LeaseError(KatanaError):
     """Somebody asked of the lease of the arm what is not theirs to ask."""
-
-
-def installing(extra: str) -> str:
-    """What to do where the libraries of an ``extra`` are missing."""
-    return (
-        "Install it, in the folder of katana450, with: "
-        f"{sys.executable} -m pip install --editable '.[{extra}]'"
-    )
 
 
 def digits_beyond(value: float, lower: float, upper: float) -> str:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
 
-BUILT_IN = ("programs", "importers", "reachability", "export", "experiments", "render")
+BUILT_IN = ("programs", "importers", "reachability", "export", "experiments", "media")
 """Built-in extensions, in the order of their commands in the help."""
 
 log = logging.getLogger(__name__)

@@ -92,14 +92,6 @@ def test_a_value_that_is_no_number_is_not_understood(capsys: pytest.CaptureFixtu
     assert "--voxel" in capsys.readouterr().err
 
 
-def test_without_distributed_the_extra_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    assert main(["workspace", "--scheduler", "tcp://127.0.0.1:1"]) == 1
-    assert "pip install --editable '.[dask]'" in capsys.readouterr().err
-
-
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
     """A map fine enough to take minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()

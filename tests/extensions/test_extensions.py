@@ -94,7 +94,7 @@ def test_every_built_in_extension_is_found() -> None:
         ("export", ["export", "render"]),
         ("experiments", ["run", "demo"]),
         ("programs", ["run", "demo"]),
-        ("render", ["render"]),
+        ("media", ["render"]),
     ],
 )
 def test_missing_extension_takes_its_commands_with_it(
@@ -122,13 +122,13 @@ def test_core_commands_work_without_any_extension(blocking: Path) -> None:
 
 
 def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
-    blocked = "katana450.extensions.report"
+    blocked = "katana450.extensions.media"
     said = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
     assert said.startswith("1 ")
-    assert "The extension report is needed and not installed." in said
+    assert "The extension media is needed and not installed." in said
 
 
-NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "report", "render")
+NOT_NEEDED = ("importers", "scene", "reachability", "export", "experiments", "media")
 """Extensions that a server runs without."""
 
 

@@ -4,63 +4,15 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
-import sysconfig
-import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 
 from tests.browser.server import AppServer
+from tests.packaging.conftest import BROKEN
 
-ROOT = Path(__file__).resolve().parents[2]
-HERE = Path(sysconfig.get_path("purelib"))
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
-BROKEN = "raise SystemExit('a file of the user was run')\n"
-
-
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("wheel")
-    done = subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(out)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    (built,) = out.glob("*.whl")
-    return built
-
-
-@pytest.fixture(scope="module")
-def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the interpreter of a fresh environment with the wheel in it.
-
-    Its dependencies are those of the environment that runs the tests.
-    """
-    home = tmp_path_factory.mktemp("fresh")
-    venv.create(home, with_pip=False)
-    python = home / "bin" / "python"
-    subprocess.run(
-        [
-            *(sys.executable, "-m", "uv", "pip", "install", "--quiet", "--offline", "--no-deps"),
-            *("--python", str(python), str(wheel)),
-        ],
-        check=True,
-        timeout=120,
-    )
-    others = [path for path in HERE.glob("*.pth") if "katana450" not in path.name]
-    lines = [str(HERE), *(path.read_text(encoding="utf-8") for path in others)]
-    (site,) = home.glob("lib/python*/site-packages")
-    (site / "dependencies.pth").write_text("\n".join(lines), encoding="utf-8")
-    # Another distribution that ships a package of this name.
-    (site / "app").mkdir()
-    (site / "app" / "__init__.py").write_text(BROKEN, encoding="utf-8")
-    return python
 
 
 @pytest.fixture(params=["app.py", "app/__init__.py"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from katana450.extensions.report.figures import AXES, STYLE, TIME, check_drawable, equal_axes
+from katana450.extensions.media.figures import AXES, STYLE, TIME, equal_axes
 
 if TYPE_CHECKING:
     from katana450.library.motion_plan import MotionPlan
@@ -17,7 +17,6 @@ SAMPLES = 400
 
 def figure_of(plan: MotionPlan) -> Any:
     """Draw ``plan`` and return the matplotlib ``Figure``, still open."""
-    check_drawable()
     plt = importlib.import_module("matplotlib.pyplot")
     samples = plan.sample(plan.duration / SAMPLES)
     points = 1e3 * samples.points

@@ -35,9 +35,9 @@ def demo(options: Namespace) -> int:
 
 def _run(text: str, source: str, options: Namespace) -> int:
     if options.report is not None:
-        from katana450.extensions.report.figures import check_drawable
+        from katana450.extensions.media.tracer import check_traceable
 
-        check_drawable()
+        check_traceable()
     try:
         script = parse(text)
         if options.headless or options.dry_run or options.report is not None:

@@ -9,11 +9,11 @@ from datetime import datetime
 from katana450.arm.control.messages import part
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
+from katana450.extensions.media.report import Report
 from katana450.extensions.programs.clocked_run import planned, played
 from katana450.extensions.programs.order import Go
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
-from katana450.extensions.report.report import Report
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
@@ -43,7 +43,7 @@ def simulate(script: Script, options: Namespace) -> int:
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:
         # The pictures of a report are all that needs the renderer.
-        from katana450.extensions.report.stages import stage_pictures
+        from katana450.extensions.media.report_pictures import stage_pictures
 
         pictures = stage_pictures(
             program, robot, plan.session, load_props(), rehearsal.states, report.trace

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from katana450.cli.version import version
-from katana450.errors import ConfigurationError, installing
+from katana450.errors import ConfigurationError
 from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import Survey
 
@@ -63,15 +63,10 @@ class Cluster:
 def connected(address: str) -> Iterator[Cluster]:
     """The cluster whose scheduler is at `address`, such as tcp://10.0.0.1:8786.
 
-    Raises ConfigurationError when the extra `dask` is not installed, the scheduler does not answer,
-    it has no workers, or they have another version of what counts.
+    Raises ConfigurationError when the scheduler does not answer, it has no workers, or they have
+    another version of what counts.
     """
-    try:
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise ConfigurationError(
-            "--scheduler needs Dask's distributed, which is not installed. " + installing("dask")
-        ) from None
+    distributed: Any = import_module("distributed")
     # What goes wrong is told as one error of ours.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:

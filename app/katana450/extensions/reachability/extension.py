@@ -60,8 +60,7 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="spread the work over the Dask cluster of this scheduler, such as "
-        "tcp://10.0.0.1:8786; needs the extra `dask`",
+        help="spread the work over the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786",
     )
     add_arm_options(parser)
 

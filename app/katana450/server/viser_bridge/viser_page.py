@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 import json
 import re
 from collections.abc import Sequence
@@ -16,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 import viser
 import zstandard
+from PIL import Image
 from starlette.datastructures import QueryParams
 
 from katana450.errors import ConfigurationError
-from katana450.png import png
 from katana450.server.viser_bridge.themes import THEMES, gradient
 from katana450.server.web.security import content_policy
 
@@ -106,13 +107,20 @@ def _our_scripts() -> str:
             "plane_color": theme.floor,
             "shadow_opacity": theme.shadow,
             "dark": theme.dark,
-            "sky": base64.b64encode(png(gradient(theme.sky, theme.floor))).decode(),
+            "sky": _png(gradient(theme.sky, theme.floor)),
         }
         for name, theme in THEMES.items()
     }
     *first, last = (f'src="../static/{name}.js"' for name in OUR_SCRIPTS)
     last += f' data-rooms="{escape(json.dumps(rooms))}"'
     return "".join(f"<script {each}></script>" for each in (*first, last))
+
+
+def _png(pixels: npt.NDArray[np.uint8]) -> str:
+    """Return a PNG file of ``pixels`` (height, width, 3) in base 64."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "png")
+    return base64.b64encode(file.getvalue()).decode()
 
 
 def _hash(script: bytes) -> str:

@@ -1,0 +1,1 @@
+"""Pictures, films and reports of runs, without a browser; the same bytes on every run."""

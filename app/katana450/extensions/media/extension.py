@@ -1,0 +1,103 @@
+"""The extension ``media``: the command that takes pictures and films of the arm."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from katana450.extension import CliCommand, Extension
+from katana450.extensions.export.extension import joint_values
+from katana450.resources import URDF_PATH
+
+CAMERAS = ("free", "front", "side", "top", "tool")
+"""As the buttons of the page have them; the first is its 3D view."""
+
+THEMES = ("light", "dark")
+
+
+def add_render_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``render`` to ``parser``."""
+    parser.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help=".png for a picture, .mp4 for a film",
+    )
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument(
+        "--pose",
+        type=joint_values,
+        default=(),
+        metavar="Q",
+        help="values of the driven joints in rad with commas between, gripper last, such as "
+        "--pose=0,-1.2,1.4,0.1,0,0.2 (default: the home posture)",
+    )
+    shown.add_argument(
+        "--trajectory",
+        type=Path,
+        metavar="FILE",
+        help="a motion; .csv with the columns t,theta1,...,theta5,gripper or .json with lists of "
+        "these names",
+    )
+    shown.add_argument(
+        "--run",
+        metavar="SCRIPT",
+        help="circle, pour or the file of a script, whose run is the motion",
+    )
+    parser.add_argument(
+        "--at",
+        type=float,
+        metavar="SECONDS",
+        help="for a picture of a motion: at what time (default: at its end)",
+    )
+    parser.add_argument(
+        "--camera", choices=CAMERAS, default=CAMERAS[0], help="view (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--size",
+        type=_size,
+        default=(1280, 720),
+        metavar="WxH",
+        help="pixels (default: 1280x720)",
+    )
+    parser.add_argument(
+        "--fps", type=float, default=25.0, help="pictures a second (default: %(default)g)"
+    )
+    parser.add_argument("--theme", choices=THEMES, default=THEMES[0])
+    parser.add_argument(
+        "--urdf",
+        type=Path,
+        default=URDF_PATH,
+        metavar="FILE",
+        help="another arm: pan, three parallel axes, roll (default: the Katana450)",
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.split("x"))
+    except ValueError:
+        width = height = 0
+    if not (16 <= width <= 4096 and 16 <= height <= 4096):
+        raise argparse.ArgumentTypeError(f"two numbers from 16 to 4096, as 1280x720, not {text!r}")
+    return width, height
+
+
+def _render(options: argparse.Namespace) -> int:
+    from katana450.extensions.media.render import render
+
+    return render(options)
+
+
+EXTENSION = Extension(
+    "media",
+    (
+        CliCommand(
+            "render",
+            "a picture or a film of the arm, without a browser",
+            add_render_options,
+            _render,
+        ),
+    ),
+)

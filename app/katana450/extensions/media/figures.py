@@ -1,0 +1,194 @@
+"""The figures of a report, drawn for a printed page; matplotlib is loaded when one is drawn."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from katana450.arm.control.arm import Arm
+from katana450.extensions.media.measures import Along
+from katana450.extensions.programs.simulation import Trace
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.velocity import tool_speed
+
+INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
+AXES = ("#0b6e99", "#c2410c", "#2f855a", "#7c3aed", "#a16207")
+
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.grid": True,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.5,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+    "savefig.dpi": 200,
+    "svg.hashsalt": "katana450",
+}
+
+SPREADINGS = 30
+"""Until names that would lie on each other lie beside each other."""
+
+PARTS = 200
+"""Of a path, of each of which the largest error is drawn."""
+
+TIME = "time (s)"
+
+
+def path_figure(paths: Sequence[Along]) -> bytes:
+    """PNG: desired and traced path in 3D, and the error along it (as the paper's Fig. 7)."""
+    plt = _plt()
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(7.2, 3.9))
+        space = figure.add_axes((0.0, 0.0, 0.52, 0.92), projection="3d")
+        panel = figure.add_axes((0.62, 0.15, 0.36, 0.76))
+        worst = 1e3 * max(float(path.error.max()) for path in paths)
+        power = math.floor(math.log10(worst)) if worst > 0.0 else 0
+        for number, path in enumerate(paths):
+            wished, traced = 1e3 * path.desired, 1e3 * path.traced
+            label = {"label": "desired"} if number == 0 else {}
+            space.plot(*wished.T, color=DESIRED, linewidth=4.0, alpha=0.7, **label)
+            label = {"label": "traced"} if number == 0 else {}
+            space.plot(*traced.T, color=AXES[0], linewidth=1.1, **label)
+            space.scatter(*wished[0], color=INK, s=14)
+        sigma, errors = largest(paths)
+        errors = 1e3 * errors / 10.0**power
+        panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
+        panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
+        equal_axes(space, 1e3 * np.concatenate([path.desired for path in paths]))
+        space.set_xlabel("x (mm)")
+        space.set_ylabel("y (mm)")
+        space.set_zlabel("z (mm)", labelpad=9.0)
+        figure.text(0.02, 0.931, "Desired and traced path", fontsize=10.0, fontweight="bold")
+        space.legend(loc="upper left", bbox_to_anchor=(0.01, 1.0), ncols=2, fontsize=8.0)
+        space.view_init(elev=22.0, azim=-52.0)
+        for axis in (space.xaxis, space.yaxis, space.zaxis):
+            axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+            axis.set_major_locator(plt.MaxNLocator(4))
+        panel.set_title("Position error of the kinematics")
+        panel.set_xlabel("along the path (%)")
+        panel.set_ylabel(f"error ($10^{{{power}}}$ mm)")
+        panel.set_xlim(0.0, 100.0)
+        top = worst / 10.0**power
+        panel.set_ylim(0.0, 1.25 * top or 1.0)
+        panel.axhline(top, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
+        said = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
+        panel.annotate(said, (99.0, 1.03 * top), ha="right", va="bottom")
+        return _png(plt, figure)
+
+
+def largest(paths: Sequence[Along]) -> tuple[FloatArray, FloatArray]:
+    """sigma (m,) in the middle of PARTS parts of every path, and the largest error there [m].
+
+    Rounding errors jump from place to place: all of them on each other would be a block of colour.
+    """
+    edges = np.linspace(0.0, 1.0, PARTS + 1)
+    most = np.zeros(PARTS)
+    for path in paths:
+        part = np.minimum((PARTS * path.sigma).astype(int), PARTS - 1)
+        np.maximum.at(most, part, path.error)
+    return 0.5 * (edges[:-1] + edges[1:]), most
+
+
+def joints_figure(arm: Arm, trace: Trace) -> bytes:
+    """PNG: the joint variables over time (as the paper's Fig. 8)."""
+    plt = _plt()
+    with plt.rc_context(STYLE):
+        figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
+        degrees = np.degrees(trace.q)
+        for axis in range(degrees.shape[1]):
+            panel.plot(trace.t, degrees[:, axis], color=AXES[axis % len(AXES)], linewidth=1.4)
+        _name_lines(panel, trace.t, degrees, [f"θ{n + 1}" for n in range(arm.chain.n)])
+        panel.set_title("Joint variables")
+        panel.set_xlabel(TIME)
+        panel.set_ylabel("angle (deg)")
+        panel.set_xlim(0.0, 1.04 * trace.t[-1])
+        return _png(plt, figure)
+
+
+def speeds_figure(arm: Arm, trace: Trace) -> bytes:
+    """PNG: joint speeds as shares of their limits, and the speed of the tool."""
+    plt = _plt()
+    with plt.rc_context(STYLE):
+        figure, (upper, lower) = plt.subplots(
+            2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained", height_ratios=(3, 2)
+        )
+        shares = 100.0 * trace.qd / arm.chain.speed
+        for axis in range(shares.shape[1]):
+            colour = AXES[axis % len(AXES)]
+            upper.plot(trace.t, shares[:, axis], color=colour, linewidth=1.2, label=f"θ{axis + 1}")
+        for limit in (-100.0, 100.0):
+            upper.axhline(limit, color=ERROR, linewidth=0.8, linestyle=(0, (4, 3)))
+        upper.set_ylim(-115.0, 115.0)
+        upper.set_title("Joint speeds, of their limits")
+        upper.set_ylabel("speed (% of limit)")
+        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
+        upper.legend(**above, ncols=shares.shape[1], fontsize=8.0)
+        chains = [arm.chain_to(tool) for tool in trace.tools]
+        rows = zip(chains, trace.q, trace.qd, strict=True)
+        speeds = 1e3 * np.array([tool_speed(chain, q, qd) for chain, q, qd in rows])
+        lower.fill_between(trace.t, speeds, color=AXES[0], alpha=0.15, linewidth=0.0)
+        lower.plot(trace.t, speeds, color=AXES[0], linewidth=1.2)
+        lower.set_title("Speed of the tool point")
+        lower.set_ylabel("speed (mm/s)")
+        lower.set_xlabel(TIME)
+        lower.set_xlim(0.0, trace.t[-1])
+        lower.set_ylim(bottom=0.0)
+        return _png(plt, figure)
+
+
+def equal_axes(space: Any, points: FloatArray) -> None:
+    """The same millimetre on all three axes, with room around."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.55 * float((high - low).max())
+    for number, set_limits in enumerate((space.set_xlim, space.set_ylim, space.set_zlim)):
+        set_limits(middle[number] - half, middle[number] + half)
+    space.set_box_aspect((1.0, 1.0, 1.0), zoom=0.86)
+
+
+def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
+    """Each line's name at its end, moved apart where ends meet."""
+    apart = 0.055 * max(float(values.max() - values.min()), 1.0)
+    at = values[-1].copy()
+    order = np.argsort(at, kind="stable").tolist()
+    for _ in range(SPREADINGS):
+        for low, high in pairwise(order):
+            short = 0.5 * max(apart - float(at[high] - at[low]), 0.0)
+            at[low], at[high] = at[low] - short, at[high] + short
+    for axis, name in enumerate(names):
+        panel.annotate(
+            name,
+            (t[-1], at[axis]),
+            xytext=(5, 0),
+            textcoords="offset points",
+            va="center",
+            color=AXES[axis % len(AXES)],
+            fontweight="bold",
+        )
+
+
+def _plt() -> Any:
+    importlib.import_module("matplotlib").use("Agg")
+    return importlib.import_module("matplotlib.pyplot")
+
+
+def _png(plt: Any, figure: Any) -> bytes:
+    file = io.BytesIO()
+    figure.savefig(file, format="png", metadata={"Software": None})
+    plt.close(figure)
+    return file.getvalue()

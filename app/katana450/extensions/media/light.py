@@ -1,0 +1,152 @@
+"""How much of the key light and of the sky reaches what is seen.
+
+A few rays a pixel, others in each of the sixteen pixels of a tile, and the mean over as many pixels
+of one surface (Keller and Heidrich, Interleaved Sampling, 2001): so a few rays look like many.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.extensions.media.scene import Floats, unit
+from katana450.extensions.media.sight import NOWHERE, Sight
+from katana450.extensions.media.tracer import Tracer
+
+TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
+"""Which of sixteen each pixel of a tile takes: neighbours take what is far apart."""
+
+KEY_SIZE = 0.045
+"""[rad] Radius of the key light as it is seen: how soft its shadows are."""
+
+REACH = 2.5
+"""[m] No shadow is longer."""
+
+NEAR = 0.3
+"""[m] What is farther off hides no sky: the room is bright all round."""
+
+OFF = 2e-4
+"""[m] Off the surface that rays to the light start, so that it does not meet them itself."""
+
+LEAF = 2e-3
+"""[m] By which two pixels may be off one plane and still be of one surface."""
+
+ALIKE = 0.9
+"""Cosine between normals of one surface."""
+
+
+class Light(NamedTuple):
+    """key, sky: (n,) shares from 0 to 1 that reach each point."""
+
+    key: Floats
+    sky: Floats
+
+
+def reaching(
+    sight: Sight, tracer: Tracer, towards: Floats, size: tuple[int, int], rays: int
+) -> Light:
+    """For each pixel of a picture of width and height ``size``, row by row.
+
+    towards: (3,) unit direction to the key light. rays: of each kind for a pixel.
+    """
+    width, height = size
+    rows, columns = np.divmod(np.arange(width * height), width)
+    place = TILE[rows % 4, columns % 4]
+    seen = np.flatnonzero(sight.item != NOWHERE)
+    faces_key = np.einsum("ni,i->n", sight.flat[seen], towards) > 0.0
+    lit = seen[faces_key]
+    key, sky = (np.zeros(width * height, dtype=np.float32) for _ in range(2))
+    disc, dome = _disc(rays), _dome(rays)
+    side, upright = _across(sight.normals[seen])
+    aside, above = _across(towards[None])
+    for ray in range(rays):
+        number = place + 16 * ray
+        spot = disc[number[lit]]
+        key[lit] += ~tracer.blocked(
+            _start(sight, lit), unit(towards + spot[:, :1] * aside + spot[:, 1:] * above), REACH
+        )
+        way = dome[number[seen]]
+        out = way[:, :1] * side + way[:, 1:2] * upright + way[:, 2:] * sight.normals[seen]
+        sky[seen] += ~tracer.blocked(_start(sight, seen), out.astype(np.float32), NEAR)
+    found = np.stack((key, sky), axis=-1).reshape(height, width, 2) / np.float32(rays)
+    points = sight.points.reshape(height, width, 3)
+    normals = sight.normals.reshape(height, width, 3)
+    for axis in (0, 1):
+        found = _spread(found, points, normals, axis, 1)
+    # The sky's shade has no edges, so it bears a wider mean.
+    soft = found[..., 1:]
+    for axis in (0, 1):
+        soft = _spread(soft, points, normals, axis, 3)
+    return Light(found[..., 0].ravel(), soft.ravel())
+
+
+def _start(sight: Sight, which: np.typing.NDArray[np.intp]) -> Floats:
+    return (sight.points[which] + OFF * sight.flat[which]).astype(np.float32)
+
+
+def _spread(values: Floats, points: Floats, normals: Floats, axis: int, stride: int) -> Floats:
+    """Means over four pixels along one axis, ``stride`` apart, of those on the same surface.
+
+    Every place of a tile counts once: with five pixels, the outer two by half.
+    """
+    total, weights = values.copy(), np.ones(values.shape[:2], dtype=np.float32)
+    for step, weight in ((stride, 1.0), (2 * stride, 0.5)):
+        here, there = [slice(None)] * 2, [slice(None)] * 2
+        here[axis], there[axis] = slice(None, -step), slice(step, None)
+        one, other = tuple(here), tuple(there)
+        apart = points[other] - points[one]
+        same = np.abs(np.einsum("hwi,hwi->hw", apart, normals[one])) < LEAF
+        same &= np.abs(np.einsum("hwi,hwi->hw", apart, normals[other])) < LEAF
+        same &= np.einsum("hwi,hwi->hw", normals[one], normals[other]) > ALIKE
+        share = weight * same.astype(np.float32)
+        total[one] += share[..., None] * values[other]
+        total[other] += share[..., None] * values[one]
+        weights[one] += share
+        weights[other] += share
+    return total / weights[..., None]
+
+
+def _spots(rays: int) -> Floats:
+    """(16 rays, 2) evenly in the unit square; sixteen for the first ray of each place, and so on.
+
+    Those of one place are far apart too: in the first number by strata, in the second by the golden
+    section from Van der Corput's.
+    """
+    place = np.arange(16)
+    mirrored = ((place & 1) * 8 + (place & 2) * 2 + (place & 4) // 2 + (place & 8) // 8) / 16.0
+    ray = np.arange(rays)[:, None]
+    first = (ray + (place + 0.5) / 16.0) / rays
+    second = (mirrored + 0.5 / 16.0 + ray * GOLDEN) % 1.0
+    return np.stack((first, second), axis=2).reshape(-1, 2).astype(np.float32)
+
+
+GOLDEN = 0.618034
+
+
+def _disc(rays: int) -> Floats:
+    """(16 rays, 2) evenly on the key light's disc."""
+    spots = _spots(rays)
+    r, turn = KEY_SIZE * np.sqrt(spots[:, 0]), 2.0 * np.pi * spots[:, 1]
+    return np.stack((r * np.cos(turn), r * np.sin(turn)), axis=1).astype(np.float32)
+
+
+def _dome(rays: int) -> Floats:
+    """(16 rays, 3) over the half sphere about z, as thick as what they bring (Lambert's cosine)."""
+    spots = _spots(rays)
+    r, turn = np.sqrt(spots[:, 0]), 2.0 * np.pi * spots[:, 1]
+    up = np.sqrt(1.0 - spots[:, 0])
+    return np.stack((r * np.cos(turn), r * np.sin(turn), up), axis=1).astype(np.float32)
+
+
+def _across(n: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (n, 3) each, square to unit vectors (n, 3) and to each other.
+
+    Duff et al., Building an Orthonormal Basis, Revisited, 2017.
+    """
+    x, y, z = n.T
+    sign = np.where(z < 0.0, np.float32(-1.0), np.float32(1.0))
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    one = np.stack((1.0 + sign * x * x * a, sign * b, -sign * x), axis=1)
+    return one, np.stack((b, sign + y * y * a, -y), axis=1)

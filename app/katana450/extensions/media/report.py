@@ -1,0 +1,295 @@
+"""The files of a report: figures, a table of the run, its measures for programs and for people."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import html
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from katana450.arm.control.arm import Arm
+from katana450.atomic import write_files, writer_of
+from katana450.errors import InputError
+from katana450.extensions.media import figures
+from katana450.extensions.media.measures import Bound, alongs, bounds, measured
+from katana450.extensions.programs.measures import MEASURES
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.script import Script
+from katana450.extensions.programs.simulation import Trace
+from katana450.maths.kinematics.forward import forward
+
+NONE: Mapping[str, bytes] = {}
+
+UNITS = {
+    "_m_s3": "m/s³",
+    "_mm_s": "mm/s",
+    "_mm": "mm",
+    "_ml": "ml",
+    "_percent": "%",
+    "_deg": "deg",
+    "_s": "s",
+}
+"""Of a measure, by how its name ends; the longer ends first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """Of one run.
+
+    values: of each measure by its name. facts: what was run, and how, by name. notes: for people.
+    """
+
+    script: Script
+    program: Program
+    arm: Arm
+    trace: Trace
+    values: dict[str, float | None]
+    bounds: tuple[Bound, ...]
+    facts: dict[str, Any]
+    notes: tuple[str, ...]
+
+    @staticmethod
+    def of(
+        script: Script,
+        program: Program,
+        arm: Arm,
+        trace: Trace,
+        facts: dict[str, Any],
+        notes: tuple[str, ...] = (),
+    ) -> Report:
+        """With everything measured."""
+        values = measured(program, arm, trace)
+        return Report(script, program, arm, trace, values, bounds(script, values), facts, notes)
+
+    @property
+    def held(self) -> bool:
+        """Whether every bound is."""
+        return all(bound.held for bound in self.bounds)
+
+    @property
+    def lines(self) -> list[str]:
+        """The measures as a person reads them."""
+        return [
+            f"{_title(name):<32} {_with_unit(name, value)}" for name, value in self.values.items()
+        ]
+
+    def json(self, written: datetime) -> str:
+        """Everything measured, units in the names, and what was expected of it."""
+        expected = [
+            {
+                "name": bound.name,
+                "at_least": bound.low if np.isfinite(bound.low) else None,
+                "at_most": bound.high if np.isfinite(bound.high) else None,
+                "value": bound.value,
+                "held": bound.held,
+            }
+            for bound in self.bounds
+        ]
+        found = {
+            **self.values,
+            "bounds_held": self.held,
+            "bounds": expected,
+            "script": self.script.name,
+            **self.facts,
+            "notes": list(self.notes),
+            "written": written.isoformat(timespec="seconds"),
+        }
+        return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+
+    def csv(self) -> str:
+        """One row a tick: time, step, line, task, joints and speeds, fingers, tool, path."""
+        n = self.arm.chain.n
+        file = io.StringIO()
+        rows = csv.writer(file, lineterminator="\n")
+        heads = ["t_s", "step", "line", "task"]
+        heads += [f"theta{axis}_deg" for axis in range(1, n + 1)]
+        heads += [f"theta{axis}_deg_s" for axis in range(1, n + 1)]
+        slides = self.arm.gripper.slides
+        heads.append("fingers_mm" if slides else "fingers_deg")
+        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_share"])
+        trace = self.trace
+        for tick in range(len(trace.t)):
+            task = self.program.tasks[int(trace.task[tick])]
+            numbers = [*np.degrees(trace.q[tick]), *np.degrees(trace.qd[tick])]
+            fingers = trace.fingers[tick]
+            numbers.append(float(1e3 * fingers if slides else np.degrees(fingers)))
+            chain = self.arm.chain_to(trace.tools[tick])
+            point = 1e3 * forward(chain, trace.q[tick])[:3, 3]
+            rows.writerow(
+                [
+                    f"{trace.t[tick]:.3f}",
+                    task.number + 1,
+                    task.line,
+                    task.name,
+                    *(f"{value:.9g}" for value in numbers),
+                    trace.tools[tick],
+                    *(f"{value:.9g}" for value in point),
+                    f"{trace.sigma[tick]:.9g}",
+                ]
+            )
+        return file.getvalue()
+
+    def write(
+        self, directory: Path, written: datetime, pictures: Mapping[str, bytes] = NONE
+    ) -> tuple[Path, ...]:
+        """All its files into ``directory``, made if need be. Raises InputError where it cannot.
+
+        ``pictures``: PNG files by their names, of those in CAPTIONS, shown before the figures.
+        """
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{directory} cannot be made: {error.strerror or error}.") from error
+        paths = alongs(self.program)
+        images = dict(pictures)
+        if paths:
+            images["path.png"] = figures.path_figure(paths)
+        images["joints.png"] = figures.joints_figure(self.arm, self.trace)
+        images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
+        contents = {
+            "report.html": self._page(images, written).encode(),
+            "report.json": self.json(written).encode(),
+            "trace.csv": self.csv().encode(),
+            **images,
+        }
+        writers = {directory / name: writer_of(content) for name, content in contents.items()}
+        write_files(writers)
+        return tuple(writers)
+
+    def _page(self, images: dict[str, bytes], written: datetime) -> str:
+        shown = "\n".join(
+            f'<figure><img alt="{CAPTIONS[name][0]}" '
+            f'src="data:image/png;base64,{base64.b64encode(image).decode()}">'
+            f"<figcaption>{CAPTIONS[name][1]}</figcaption></figure>"
+            for name, image in images.items()
+        )
+        rows = "\n".join(
+            f"<tr><th>{_title(name)}<small>{MEASURES[name]}</small></th>"
+            f"<td>{_with_unit(name, value)}</td></tr>"
+            for name, value in self.values.items()
+        )
+        checks = "\n".join(
+            f'<li class="{"held" if bound.held else "missed"}">{_title(bound.name)}: '
+            f"{_with_unit(bound.name, bound.value)}; {bound.wanted}</li>"
+            for bound in self.bounds
+        )
+        said = {
+            True: "Every bound is held." if self.bounds else "Nothing was expected of it.",
+            False: "A bound is missed.",
+        }[self.held]
+        notes = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
+        facts = " · ".join(
+            f"{name.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{name} {value}"
+            for name, value in self.facts.items()
+        )
+        return PAGE.format(
+            name=html.escape(self.script.name),
+            about=f"<p>{html.escape(self.script.about)}</p>" if self.script.about else "",
+            verdict=said,
+            mood="held" if self.held else "missed",
+            figures=shown,
+            rows=rows,
+            checks=checks,
+            notes=notes,
+            facts=html.escape(facts),
+            written=written.strftime("%d %B %Y, %H:%M"),
+        )
+
+
+CAPTIONS = {
+    "initial.png": ("The arm before it moves", "Initial configuration."),
+    "grasping.png": ("The fingers closed on the cup", "Grasping the cup."),
+    "approaching.png": ("The full cup over the basin", "Approaching the basin."),
+    "emptying.png": ("Water running from the cup into the basin", "Emptying the cup."),
+    "tracing.png": (
+        "The arm on its path",
+        "On the path; grey: what is wished for, in colour: what the tool has traced of it.",
+    ),
+    "path.png": (
+        "Desired and traced path in 3D, and the error along it",
+        (
+            "Left: the path wished for and that of forward kinematics on the planned joints, in "
+            "the shoulder frame; dots are where paths start. Right: how far apart they are, the "
+            "most in each half of a percent of all paths."
+        ),
+    ),
+    "joints.png": ("Joint angles over time", "What the arm was told, a hundred times a second."),
+    "speeds.png": (
+        "Joint speeds against their limits, and speed of the tool",
+        "Above: each joint's speed as a share of its most; dashed: the limits. Below: the tool.",
+    ),
+}
+"""Of each figure what it shows, for who cannot see it and for who can."""
+
+PAGE = """\
+<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{name} · katana450</title>
+<style>
+:root {{ color-scheme: light dark; --ink: #1f2933; --soft: #52606d; --page: #f7f8fa;
+  --card: #fff; --line: #d9dee4; --held: #15803d; --missed: #b91c1c; }}
+@media (prefers-color-scheme: dark) {{ :root {{ --ink: #e6eaef; --soft: #9fb0c0; --page: #14181d;
+  --card: #1d232a; --line: #323b45; --held: #4ade80; --missed: #f87171; }} }}
+body {{ margin: 0 auto; padding: 1.5rem 1rem 3rem; max-width: 50rem; background: var(--page);
+  color: var(--ink); font: 1rem/1.5 system-ui, sans-serif; }}
+h1 {{ margin: 0; font-size: 1.7rem; }}
+h2 {{ margin: 2rem 0 .5rem; font-size: 1.1rem; }}
+p {{ margin: .4rem 0; }}
+.verdict {{ font-weight: 600; }}
+.held {{ color: var(--held); }} .missed {{ color: var(--missed); }}
+figure {{ margin: 1.2rem 0; padding: .8rem; background: #fff; border-radius: .6rem;
+  border: 1px solid var(--line); }}
+img {{ display: block; width: 100%; height: auto; }}
+figcaption {{ margin-top: .5rem; color: #52606d; font-size: .85rem; }}
+table {{ width: 100%; border-collapse: collapse; background: var(--card); border-radius: .6rem; }}
+th, td {{ padding: .45rem .7rem; border-bottom: 1px solid var(--line); text-align: left;
+  font-weight: 500; vertical-align: top; }}
+td {{ text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }}
+small {{ display: block; color: var(--soft); font-weight: 400; }}
+ul {{ padding-left: 1.2rem; }}
+footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
+</style>
+<h1>{name}</h1>
+{about}
+<p class="verdict {mood}">{verdict}</p>
+{notes}
+{figures}
+<h2>Measured</h2>
+<table>
+{rows}
+</table>
+<h2>Expected</h2>
+<ul>
+{checks}
+</ul>
+<footer>katana450 · {facts} · {written}</footer>
+</html>
+"""
+
+
+def _unit(name: str) -> str:
+    return next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
+
+
+def _title(name: str) -> str:
+    end = next((end for end in UNITS if name.endswith(end)), "")
+    return name.removesuffix(end).replace("_", " ").capitalize()
+
+
+def _with_unit(name: str, value: float | None) -> str:
+    """A measure as a person reads it."""
+    return "none" if value is None else f"{_shown(value)} {_unit(name)}".rstrip()
+
+
+def _shown(value: float) -> str:
+    return f"{value:.2e}" if value != 0.0 and abs(value) < 1e-3 else f"{value:.4g}"

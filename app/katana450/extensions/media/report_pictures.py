@@ -1,0 +1,140 @@
+"""Pictures of a run at the moments a paper would show: its Figs. 9 to 12 for a thing that is
+carried and poured, and for a path the arm on it with what it has traced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.props import Props
+from katana450.arm.robot.robot import Robot
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.line import tube
+from katana450.extensions.media.picture import picture
+from katana450.extensions.media.scene import Item
+from katana450.extensions.media.stage import Stage
+from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.pouring import POURING
+from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.simulation import Trace
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.planning.path import point_derivatives
+from katana450.maths.planning.tool_path import ToolPath
+from katana450.server.view.traces import DESIRED, PLACES, coloured
+from katana450.server.viser_bridge.themes import LIGHT
+
+SIZE = 880, 550
+
+RAYS = 2
+
+FOV = float(np.deg2rad(36.0))
+
+ON_TABLE = (1.06, 0.66, 0.70), (0.19, 0.04, 0.21)
+"""[m] From where cup, basin and hand are seen, and what is looked at."""
+
+ON_PATH = (0.88, -0.95, 0.66), (0.13, -0.02, 0.185)
+"""[m] The same for a path before the arm."""
+
+CLOSING = ": close"
+"""How the task ends its name that takes a thing."""
+
+EMPTYING = 0.45
+"""Of the time that the cup is turned over: by then it pours."""
+
+DESIRED_RADIUS, TRACED_RADIUS = 1.2e-3, 2e-3
+"""[m]"""
+
+
+def moments(program: Program, trace: Trace) -> dict[str, int]:
+    """The tick of each picture by its name; only what the run has of them."""
+    names = [task.name for task in program.tasks]
+    takes = [number for number, name in enumerate(names) if name.endswith(CLOSING)]
+    pours = [number for number, name in enumerate(names) if name == POURING]
+    found: dict[str, int] = {}
+    if takes:
+        start = next(n for n in range(len(names)) if _same(program, n, takes[0]))
+        found["initial"] = _ticks(trace, start)[0]
+        found["grasping"] = _ticks(trace, takes[0])[-1]
+    if pours:
+        ticks = _ticks(trace, pours[0])
+        found["approaching"] = ticks[0]
+        found["emptying"] = ticks[int(EMPTYING * (len(ticks) - 1))]
+    if not found:
+        on_path = np.flatnonzero(trace.segment >= 0)
+        drawn = [tick for tick in on_path.tolist() if _path(program, trace, tick) is not None]
+        if drawn:
+            found["tracing"] = drawn[int(DONE * (len(drawn) - 1))]
+    return found
+
+
+DONE = 0.7
+"""Of a path, when the arm is shown on it."""
+
+
+def stage_pictures(
+    program: Program,
+    robot: Robot,
+    session: Session,
+    props: Props,
+    states: Sequence[State],
+    trace: Trace,
+) -> Mapping[str, bytes]:
+    """PNG files by their names."""
+    stage = Stage(robot, session, props)
+    found: dict[str, bytes] = {}
+    for name, tick in moments(program, trace).items():
+        state, items = states[tick], stage.items(states[tick])
+        look = ON_TABLE
+        if name == "tracing":
+            items += _lines(program, robot, trace, tick)
+            look = ON_PATH
+        camera = Camera(*look, FOV, SIZE)
+        found[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT, RAYS).png
+    return found
+
+
+def _same(program: Program, one: int, other: int) -> bool:
+    """Whether two tasks belong to one step."""
+    return program.tasks[one].number == program.tasks[other].number
+
+
+def _ticks(trace: Trace, task: int) -> list[int]:
+    return [int(tick) for tick in np.flatnonzero(trace.task == task)]
+
+
+def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
+    order = program.tasks[int(trace.task[tick])].order
+    if not isinstance(order, Go):
+        return None
+    path = order.plan.segments[int(trace.segment[tick])].path
+    return path if isinstance(path, ToolPath) else None
+
+
+def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item]:
+    """The path that the arm is on, and what it has traced of it, coloured as on the page."""
+    path = _path(program, trace, tick)
+    assert path is not None
+    T = robot.require_arm().T_base_shoulder
+
+    def seen(points: FloatArray) -> FloatArray:
+        return np.asarray(points @ T[:3, :3].T + T[:3, 3])
+
+    whole = point_derivatives(path, np.linspace(0.0, 1.0, PLACES + 1))[0]
+    before = [each for each in range(tick + 1) if _is_on(program, trace, each, path)]
+    traced = np.array([forward(path.chain, trace.sent[each])[:3, 3] for each in before])
+    wished = point_derivatives(path, trace.sigma[before])[0]
+    worst = np.linalg.norm(traced - wished, axis=1).max()
+    red, green, blue = coloured(np.array([worst]))[0].tolist()
+    tubes = (
+        tube("desired path", seen(whole), DESIRED_RADIUS, DESIRED),
+        tube("traced path", seen(traced), TRACED_RADIUS, (red, green, blue)),
+    )
+    return [item for item in tubes if item is not None]
+
+
+def _is_on(program: Program, trace: Trace, tick: int, path: ToolPath) -> bool:
+    return int(trace.segment[tick]) >= 0 and _path(program, trace, tick) is path

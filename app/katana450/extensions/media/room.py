@@ -1,0 +1,72 @@
+"""The room of a picture: that of the page, floor with its lines, background and lamps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.light import Light
+from katana450.extensions.media.scene import Floats, light_of
+from katana450.extensions.media.shading import Lamp, lamp
+from katana450.extensions.media.sight import Sight
+from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM
+from katana450.server.viser_bridge.themes import Theme
+
+LAMPS: tuple[Lamp, ...] = (
+    lamp(KEY, (255, 250, 242), 1.08),
+    lamp(RIM, (226, 238, 255), 0.42),
+    lamp(FILL, (255, 255, 255), 0.16),
+)
+"""The first is the one with shadows."""
+
+HEIGHT = FLOOR_AT
+
+CELLS = ((0.05, 0.6), (0.25, 1.0))
+"""[m] Between the lines of the floor, and pixels that they are wide: the fine ones, the others."""
+
+FADES = 5.0
+"""[m] At which the floor has become background."""
+
+
+def background(theme: Theme, camera: Camera, y: Floats) -> Floats:
+    """(n, 3) light behind everything, at heights ``y`` (n,) of the picture in pixels."""
+    share = np.clip(y / camera.size[1], 0.0, 1.0)[:, None]
+    top, bottom = (np.array(c, dtype=np.float32) / 255.0 for c in (theme.sky, theme.floor))
+    return light_of(top + share * (bottom - top))
+
+
+def floor(theme: Theme, camera: Camera, sight: Sight, light: Light, behind: Floats) -> Floats:
+    """(n, 3) light of points on the floor. behind: (n, 3) the background there."""
+    colour = np.tile(np.array(theme.floor, dtype=np.float32) / 255.0, (len(sight.points), 1))
+    for (apart, wide), line in zip(CELLS, (theme.cell, theme.section), strict=True):
+        share = _lines(camera, sight, apart, wide)[:, None]
+        colour += share * (np.array(line, dtype=np.float32) / 255.0 - colour)
+    dark = (1.0 - theme.shadow * (1.0 - light.key)) * (1.0 - CORNERS * (1.0 - light.sky))
+    shown = light_of(colour * dark[:, None])
+    east, north = (sight.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
+    left = np.clip(1.0 - np.hypot(east, north) / FADES, 0.0, 1.0)[:, None]
+    return np.asarray(behind + left * (shown - behind), dtype=np.float32)
+
+
+CORNERS = 0.45
+"""How much darker the floor is where no sky reaches it."""
+
+
+def _lines(camera: Camera, sight: Sight, apart: float, wide: float) -> Floats:
+    """(n,) how much of each pixel lines ``apart`` [m] and ``wide`` [pixels] cover."""
+    right, up, _ = camera.frame
+    step = camera.pixel * sight.distance
+    down = sight.directions[:, 2]
+    covered = np.zeros(len(down), dtype=np.float32)
+    for axis in (0, 1):
+        # How far the spot on the floor moves along the axis, to the next pixel aside and above.
+        slope = sight.directions[:, axis] / down
+        moved = step * np.hypot(right[axis] - slope * right[2], up[axis] - slope * up[2])
+        at = sight.points[:, axis] / apart
+        off = np.abs(at - np.round(at)) * apart / moved
+        line = np.clip(0.5 * wide + 0.5 - off, 0.0, min(wide, 1.0))
+        # Lines nearer together than pixels are a tone.
+        tone = np.minimum(wide * moved / apart, 1.0)
+        blend = np.clip(2.0 * moved / apart - 0.5, 0.0, 1.0)
+        covered = np.maximum(covered, line + blend * (tone - line))
+    return covered

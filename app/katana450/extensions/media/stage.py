@@ -1,0 +1,136 @@
+"""The arm, what stands around it and its water in one state, as shapes for a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.control.things import Thing
+from katana450.arm.robot.conduit import Stretch
+from katana450.arm.robot.props import Props
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, Shape, shapes_of
+from katana450.arm.robot.visual import Visual
+from katana450.extensions.media.picture import Translucent
+from katana450.extensions.media.scene import Item, smooth
+from katana450.extensions.media.water import veils_of
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.server.view.conduit import PITCH, poses, ring
+from katana450.server.view.things import COLOUR, form
+
+CONDUIT, TABLE = "conduit", "table"
+"""Names of their items; those of links and things are their own."""
+
+
+class Stage:
+    """Shapes that are read once, and put where a state has them."""
+
+    def __init__(self, robot: Robot, session: Session, props: Props) -> None:
+        """``session``: knows where things and water are."""
+        self._robot, arm = robot, robot.require_arm()
+        self._session = session
+        self._links = {link.name: link.shapes for link in robot.links}
+        self._table = _in_file(props.table.mesh)
+        self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
+        self._hung = [_Hung(stretch) for stretch in arm.stretches]
+
+    def items(self, state: State) -> list[Item]:
+        """All that hides what is behind it."""
+        return [*self.arm(state), *self.conduit(state), *self.around(state)]
+
+    def arm(self, state: State) -> list[Item]:
+        """Its links."""
+        frames = self._frames(state)
+        return [
+            Item(name, shape, frames[name])
+            for name, shapes in self._links.items()
+            for shape in shapes
+        ]
+
+    def conduit(self, state: State) -> list[Item]:
+        """Its cables."""
+        frames, angles = self._frames(state), self._angles(state)
+        return [
+            Item(
+                CONDUIT,
+                hung.bent(angles[hung.stretch.hinge.joint]),
+                frames[hung.stretch.start.link],
+            )
+            for hung in self._hung
+        ]
+
+    def around(self, state: State) -> list[Item]:
+        """The table, and the things."""
+        x = state.x
+        found = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
+        for thing in state.things:
+            if thing.look.hidden:
+                continue
+            T = self._session.surroundings.pose(thing, x)
+            shapes = self._known.get(thing.name) or (_plain(thing),)
+            found += [Item(thing.name, shape, T) for shape in shapes]
+        return found
+
+    def water(self, state: State) -> list[Translucent]:
+        """The water, if there is any."""
+        pouring = self._session.pouring
+        if pouring is None or state.poured is None:
+            return []
+        return veils_of(state.poured.water, pouring.around(state.things))
+
+    def _angles(self, state: State) -> Mapping[str, float]:
+        return self._robot.joint_values(state.q, state.gripper)
+
+    def _frames(self, state: State) -> Mapping[str, FloatArray]:
+        """(4, 4) of each link in the base frame."""
+        return self._robot.frames(self._angles(state))
+
+
+class _Hung:
+    """A stretch of conduit: its rings, as the page has them."""
+
+    def __init__(self, stretch: Stretch) -> None:
+        self.stretch = stretch
+        self._vertices, self._faces = ring(stretch.radius)
+        self._normals = smooth(self._vertices, self._faces)
+
+    @cached_property
+    def _poses(self) -> FloatArray:
+        """(A, count, 7) wxyz and position [m] of the rings."""
+        return np.asarray(poses(self.stretch, round(self.stretch.length / PITCH)), dtype=float)
+
+    def bent(self, angle: float) -> Shape:
+        """With its joint at ``angle`` [rad], in the frame of the link it starts from."""
+        low, share = self.stretch.between(angle)
+        rings = self._poses[low] + share * (self._poses[low + 1] - self._poses[low])
+        R = np.array([so3.from_quaternion(pose) for pose in rings[:, :4]])
+        vertices = np.einsum("rij,vj->rvi", R, self._vertices) + rings[:, None, 4:]
+        normals = np.einsum("rij,vj->rvi", R, self._normals)
+        faces = self._faces + len(self._vertices) * np.arange(len(rings))[:, None, None]
+        return Shape(
+            HOSE,
+            frozen(vertices.reshape(-1, 3)),
+            frozen(normals.reshape(-1, 3)),
+            faces.reshape(-1, 3).astype(np.int64),
+        )
+
+
+HOSE = Material("rubber", (0.035, 0.035, 0.04), rough=0.6)
+
+
+def _in_file(path: Path) -> Sequence[Shape]:
+    return tuple(shapes_of(Visual(frozen(np.eye(4)), frozen(np.ones(3)), path)))
+
+
+def _plain(thing: Thing) -> Shape:
+    red, green, blue = thing.look.colour or COLOUR
+    colour = red / 255.0, green / 255.0, blue / 255.0
+    made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(thing), COLOUR)
+    (shape,) = shapes_of(made)
+    return Shape(Material("plain", colour), shape.vertices, shape.normals, shape.faces)

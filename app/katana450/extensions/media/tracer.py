@@ -1,0 +1,70 @@
+"""Rays against triangles, by Embree."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from katana450.errors import ConfigurationError
+from katana450.extensions.media.scene import Bools, Floats, Ints, Scene
+
+NOTHING = -1
+"""Number of the triangle of a ray that meets none."""
+
+
+def check_traceable() -> None:
+    """Raise ConfigurationError where embreex is missing, so that it is reported before a long run.
+
+    It is a dependency on all machines but Linux on arm64.
+    """
+    if importlib.util.find_spec("embreex") is None:
+        raise ConfigurationError(
+            "Pictures and films need embreex, which is not installed and has no wheel for Linux on "
+            "arm64. Build it from source: https://github.com/trimesh/embreex."
+        )
+
+
+class Meeting(NamedTuple):
+    """The first triangle each of n rays meets: its number or NOTHING, how far off (n,) [m], and
+    the shares (n,) of its second and third corner where it is met."""
+
+    face: Ints
+    distance: Floats
+    second: Floats
+    third: Floats
+
+
+class Tracer:
+    """A scene made ready for rays."""
+
+    def __init__(self, scene: Scene) -> None:
+        check_traceable()
+        rtcore: Any = importlib.import_module("embreex.rtcore_scene")
+        meshes: Any = importlib.import_module("embreex.mesh_construction")
+        self._scene = rtcore.EmbreeScene()
+        self._empty = not len(scene.faces)
+        if not self._empty:
+            meshes.TriangleMesh(self._scene, scene.vertices, scene.faces)
+
+    def first(self, origins: Floats, directions: Floats) -> Meeting:
+        """Of rays (n, 3) [m] in unit directions (n, 3)."""
+        count = len(origins)
+        if self._empty or not count:
+            nowhere = np.full(count, np.inf, dtype=np.float32)
+            zero = np.zeros(count, dtype=np.float32)
+            return Meeting(np.full(count, NOTHING, dtype=np.int32), nowhere, zero, zero)
+        found = self._scene.run(origins, directions, output=True)
+        face: Ints = found["primID"]
+        distance = np.where(face == NOTHING, np.float32(np.inf), found["tfar"])
+        return Meeting(face, distance, found["u"], found["v"])
+
+    def blocked(self, origins: Floats, directions: Floats, reach: float) -> Bools:
+        """(n,) whether each meets anything within ``reach`` [m]."""
+        if self._empty or not len(origins):
+            return np.zeros(len(origins), dtype=bool)
+        reached = np.full(len(origins), reach, dtype=np.float32)
+        found = self._scene.run(origins, directions, dists=reached, query="OCCLUDED")
+        return np.asarray(found != NOTHING)

@@ -1,0 +1,71 @@
+"""Water as a picture shows it: the page's shapes, in one colour, to be seen through."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from katana450.arm.robot.surfaces import Material, Shape
+from katana450.extensions.media.picture import Translucent
+from katana450.extensions.media.scene import Item, smooth
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.environment import WaterEnvironment
+from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.parcel import landing
+from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
+from katana450.maths.water.units import FEMTOLITRE
+from katana450.server.view.water import (
+    CLEAR,
+    COLOUR,
+    FLAT,
+    IN_AIR,
+    IN_VESSEL,
+    INSET,
+    ON_TABLE,
+    ROUGH,
+    TWIST,
+    WORTH_SHOWING,
+)
+
+WATER = Material("water", (COLOUR[0] / 255.0, COLOUR[1] / 255.0, COLOUR[2] / 255.0), 0.0, ROUGH)
+
+CUP, STREAM, BASIN, PUDDLE = (
+    "water in cup",
+    "water in air",
+    "water in basin",
+    "water on table",
+)
+"""Names of its items."""
+
+
+def veils_of(water: Water, around: WaterEnvironment) -> list[Translucent]:
+    """All of it that can be seen."""
+    found: list[Translucent] = []
+    basin, level = around.basin, around.basin.level(water.basin * FEMTOLITRE)
+    if water.cup >= WORTH_SHOWING:
+        up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, around.cup.floor))
+        corners = body(around.cup.inside, Flow(around).surface(water)) * INSET
+        shape = _shape(corners, BODY_FACES)
+        found.append(Translucent(Item(CUP, shape, water.T_base_cup @ up), IN_VESSEL))
+    if water.parcels:
+        end = landing(water.parcels[0], around, level).age
+        corners = stream(water.parcels, around.cup.inside.radius, end)
+        found.append(Translucent(Item(STREAM, _shape(corners, STREAM_FACES), np.eye(4)), IN_AIR))
+    if water.basin >= WORTH_SHOWING:
+        level = max(level, CLEAR)
+        radius, (x, y, z) = basin.radius(level), basin.at
+        corners, faces = disc()
+        shape = _shape(corners * (radius, radius, level), faces)
+        T = se3.from_rotation_translation(np.eye(3), (x, y, z + basin.floor))
+        found.append(Translucent(Item(BASIN, shape, T), IN_VESSEL))
+    for number, puddle in enumerate(water.puddles):
+        corners, faces = blob()
+        scaled = corners * (puddle.radius, puddle.radius, min(puddle.radius / FLAT, 1.0))
+        T = se3.from_rotation_translation(so3.rotation_z(TWIST * number), puddle.at)
+        found.append(Translucent(Item(PUDDLE, _shape(scaled, faces), T), ON_TABLE))
+    return found
+
+
+def _shape(corners: FloatArray, faces: Faces) -> Shape:
+    whole = faces.astype(np.int64)
+    return Shape(WATER, corners, smooth(corners, whole), whole)

@@ -1,1 +1,0 @@
-"""Pictures and films of the arm without a browser: rays on the processor, the same on every run."""

@@ -1,0 +1,47 @@
+"""An environment for each peer of a benchmark, so that none decides what another may need."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+PINS = Path(__file__).with_name("peers.lock")
+PEERS = ("EAIK", "roboticstoolbox-python", "pin", "mink", "ikpy", "vtk")
+_LINES_OF_REASON = 3
+
+
+def prepare(folder: Path, peer: str) -> Path | str:
+    """The Python that has `peer`, installed under `folder` when missing; else why there is none."""
+    home = folder / peer
+    python = home / "bin" / "python"
+    uv = [sys.executable, "-m", "uv"]
+    commands = [
+        [*uv, "pip", "install", "--quiet", "--python", str(python), "--constraint", str(PINS), peer]
+    ]
+    if not python.exists():
+        commands.insert(0, [*uv, "venv", "--quiet", "--python", sys.executable, str(home)])
+    for command in commands:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            said = done.stderr.strip().splitlines()[-_LINES_OF_REASON:]
+            return " ".join(" ".join(said).split()) or f"exit status {done.returncode}"
+    return python
+
+
+def refresh_pins() -> None:
+    """Resolve the newest versions of all peers into the lock file."""
+    subprocess.run(
+        [
+            *(sys.executable, "-m", "uv", "pip", "compile", "--upgrade", "--universal", "--quiet"),
+            *("--no-header", "--no-annotate", "--python-version", "3.11"),
+            *("--output-file", str(PINS), "-"),
+        ],
+        input="\n".join(PEERS),
+        text=True,
+        check=True,
+    )
+
+
+if __name__ == "__main__":
+    refresh_pins()

@@ -1,0 +1,41 @@
+"""The arm on its table, ready for pictures."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import described
+from katana450.extensions.media.stage import Stage
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+
+class Workshop(NamedTuple):
+    """An arm, its rules, and its shapes."""
+
+    robot: Robot
+    session: Session
+    stage: Stage
+
+    @property
+    def ready(self) -> State:
+        """At home, the cup empty."""
+        return self.session.begin(self.session.ready, 0.0, 0.0)
+
+    @property
+    def filled(self) -> State:
+        """The same with 200 ml in the cup."""
+        return self.session.step(self.ready, [cmd.Fill(2e-4)], 0.01)
+
+
+@pytest.fixture(scope="session")
+def workshop() -> Workshop:
+    robot, session, _ = described(Settings(), URDF_PATH, None)
+    return Workshop(robot, session, Stage(robot, session, load_props()))

@@ -1,0 +1,89 @@
+"""Films, read back by ffmpeg; and none where something went wrong."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from imageio_ffmpeg import get_ffmpeg_exe
+
+from katana450.errors import ConfigurationError, InputError
+from katana450.extensions.media.film import write_film
+from katana450.extensions.media.tracer import check_traceable
+
+Pixels = npt.NDArray[np.uint8]
+
+COUNT, WIDTH, HEIGHT = 12, 96, 64
+
+
+def frames(count: int = COUNT) -> Iterator[Pixels]:
+    """A bright bar that goes across."""
+    for number in range(count):
+        picture = np.full((HEIGHT, WIDTH, 3), 30, dtype=np.uint8)
+        picture[:, 8 * number : 8 * number + 8] = (230, 60, 60)
+        yield picture
+
+
+def decoded(path: Path) -> tuple[Pixels, str]:
+    """Pictures (n, height, width, 3) of a film, and what ffmpeg says of it."""
+    done = subprocess.run(
+        [get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+        capture_output=True,
+        timeout=60,
+        check=True,
+    )
+    pictures = np.frombuffer(done.stdout, dtype=np.uint8).reshape(-1, HEIGHT, WIDTH, 3)
+    return pictures, done.stderr.decode()
+
+
+def test_a_film_has_its_frames_size_and_length(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    assert write_film(path, frames(), (WIDTH, HEIGHT), 25.0) == COUNT
+    shown, told = decoded(path)
+    assert "Duration: 00:00:00.48" in told
+    assert "h264 (High) (avc1 / 0x31637661), yuv420p" in told
+    assert f"{WIDTH}x{HEIGHT}" in told
+    assert "25 fps" in told
+    assert shown.shape == (COUNT, HEIGHT, WIDTH, 3)
+    for number, picture in enumerate(shown):
+        red = picture[:, :, 0].mean(axis=0)
+        assert 8 * number <= int(red.argmax()) < 8 * number + 8
+    assert [each.name for each in tmp_path.iterdir()] == ["film.mp4"]
+
+
+def test_an_unfinished_film_leaves_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    path.write_bytes(b"an older one")
+
+    def interrupted() -> Iterator[Pixels]:
+        yield from frames(3)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_film(path, interrupted(), (WIDTH, HEIGHT), 25.0)
+    assert path.read_bytes() == b"an older one"
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(InputError, match="no picture"):
+        write_film(path, iter(()), (WIDTH, HEIGHT), 25.0)
+    assert path.read_bytes() == b"an older one"
+
+
+@pytest.mark.parametrize(
+    ("size", "fps", "said"),
+    [((95, 64), 25.0, "even"), ((96, 64), 0.0, "a second"), ((96, 64), float("nan"), "a second")],
+)
+def test_what_no_film_can_be_is_refused(
+    tmp_path: Path, size: tuple[int, int], fps: float, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        write_film(tmp_path / "film.mp4", frames(), size, fps)
+
+
+def test_missing_embreex_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(ConfigurationError, match="need embreex"):
+        check_traceable()

@@ -1,0 +1,178 @@
+"""Pictures: the same every time, and showing what is there where it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from katana450.arm.control.things import Form, Thing
+from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.camera import Camera as Viewpoint
+from katana450.arm.robot.loader import load
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.surfaces import Material, Shape
+from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.line import tube
+from katana450.extensions.media.picture import Picture, picture
+from katana450.extensions.media.scene import Item, Scene
+from katana450.extensions.media.sight import FLOOR, NOWHERE, look
+from katana450.extensions.media.tracer import Tracer
+from katana450.extensions.media.water import CUP
+from katana450.maths.geometry import se3
+from katana450.resources import URDF_PATH
+from katana450.server.viser_bridge.themes import DARK, LIGHT, THEMES
+from tests.exchange.conftest import POSES
+from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
+from tests.media.conftest import Workshop
+
+NEAR = Camera((0.98, 0.52, 0.62), (0.22, 0.06, 0.14), math.radians(40.0), (320, 200))
+"""Cup, basin and hand."""
+
+UP = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, 0.5))
+
+
+@pytest.fixture(scope="module")
+def katana() -> Robot:
+    return load(URDF_PATH)
+
+
+@pytest.fixture(scope="module")
+def filled(workshop: Workshop) -> Picture:
+    state = workshop.filled
+    return picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT, 1)
+
+
+def ball(radius: float) -> Shape:
+    mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    normals = np.asarray(mesh.vertices) / radius
+    return Shape(Material("red", (0.8, 0.1, 0.1)), mesh.vertices, normals, np.asarray(mesh.faces))
+
+
+def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture) -> None:
+    state = workshop.filled
+    again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT, 1)
+    assert again.png == filled.png
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_the_arm_covers_what_pillow_says(
+    workshop: Workshop, katana: Robot, pose: tuple[float, ...]
+) -> None:
+    """Another program's projection of another reader's meshes, posed by that reader."""
+    view: Viewpoint = camera(katana)
+    at = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))
+    scene = Scene.of(workshop.stage.arm(workshop.session.begin(np.array(pose[:5]), pose[5], 0.0)))
+    # Through the middle of each pixel, as in a picture, but without its light.
+    y, x = np.mgrid[0.5:SIZE, 0.5:SIZE].reshape(2, -1).astype(np.float32)
+    eye = np.array(at.position, dtype=np.float32)
+    sight = look(scene, Tracer(scene), eye, at.directions(x, y), -10.0)
+    theirs = silhouette(placed(URDF_PATH, katana.values(pose)), view)
+    assert overlap(sight.solid.reshape(SIZE, SIZE), theirs) >= 0.98
+
+
+def test_the_arm_stands_before_its_room_whatever_the_theme(workshop: Workshop) -> None:
+    items = workshop.stage.items(workshop.ready)
+    shown = {
+        name: picture(items, (), replace(NEAR, size=(160, 100)), theme, 1)
+        for name, theme in THEMES.items()
+    }
+    light, dark = shown["Light"], shown["Dark"]
+    assert (light.item == dark.item).all()
+    room = light.item == FLOOR
+    assert light.pixels[room].mean() > 180.0
+    assert dark.pixels[room].mean() < 80.0
+    arm = light.item >= 0
+    assert np.abs(light.pixels[arm].astype(float) - dark.pixels[arm]).mean() < 12.0
+
+
+def test_cup_and_water_are_seen(workshop: Workshop, filled: Picture) -> None:
+    cup, water = filled.shows("cup"), filled.shows(CUP)
+    assert cup.sum() > 300
+    assert 20 < water.sum() < cup.sum()
+    dry = picture(workshop.stage.items(workshop.ready), (), NEAR, LIGHT, 1)
+    wet, white = filled.pixels[water].astype(float), dry.pixels[water].astype(float)
+    # Water takes red from the white of the cup.
+    assert (wet[:, 2] - wet[:, 0]).mean() > (white[:, 2] - white[:, 0]).mean() + 20.0
+    assert not dry.shows(CUP).any()
+    assert (
+        filled.pixels[~water & (filled.item == dry.item)]
+        == dry.pixels[~water & (filled.item == dry.item)]
+    ).mean() > 0.99
+
+
+def test_a_thing_of_ones_own_is_seen_where_it_stands(workshop: Workshop) -> None:
+    T = se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0))
+    box = Thing("crate", Form.BOX, (0.1, 0.1, 0.1), T)
+    state = replace(workshop.ready, things=(box,))
+    shown = picture(workshop.stage.around(state), (), NEAR, LIGHT, 1)
+    where = np.argwhere(shown.shows("crate")).mean(axis=0)
+    away = np.array((0.4, 0.0, 0.05)) - NEAR.position
+    right, up, ahead = NEAR.frame @ away / NEAR.pixel
+    depth = NEAR.frame[2] @ away
+    assert where[1] == pytest.approx(160.0 + right / depth, abs=3.0)
+    assert where[0] == pytest.approx(100.0 - up / depth, abs=3.0)
+    assert ahead > 0.0
+
+
+def test_a_ball_is_as_large_as_geometry_has_it() -> None:
+    """A ball off to no side covers a disc of the sine of its half angle."""
+    at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (300, 300))
+    shown = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT, 1)
+    radius = math.tan(math.asin(0.3 / 2.0)) / at.pixel
+    assert shown.shows("ball").sum() == pytest.approx(math.pi * radius**2, rel=0.01)
+
+
+def test_a_shadow_falls_where_the_key_light_leaves_it() -> None:
+    """A ball 0.5 m up: along the light from its middle to the floor."""
+    at = Camera((0.0, -2.5, 2.5), (0.0, 0.0, 0.0), math.radians(50.0), (200, 200))
+    items = [Item("ball", ball(0.15), UP)]
+    with_ball, without = picture(items, (), at, LIGHT, 4), picture((), (), at, LIGHT, 4)
+    darker = without.pixels.astype(int).sum(axis=2) - with_ball.pixels.astype(int).sum(axis=2)
+    shadow = (darker > 60) & (with_ball.item == FLOOR)
+    key = np.array((0.7, -0.9, 1.9))
+    foot = np.array((0.0, 0.0, 0.5)) - key * (0.5 + 0.0255) / key[2]
+    right, up, depth = at.frame @ (foot - at.position)
+    row, column = np.argwhere(shadow).mean(axis=0)
+    assert column == pytest.approx(100.0 + right / depth / at.pixel, abs=2.0)
+    assert row == pytest.approx(100.0 - up / depth / at.pixel, abs=2.0)
+
+
+def test_edges_are_smooth() -> None:
+    """Between a dark ball and the bright room there are pixels of neither."""
+    at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (200, 200))
+    row = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT, 1).pixels[:, :, 1].astype(int)
+    inside, outside = row[100, 100], row[100, 5]
+    # Where the outline is nearly upright, row after row crosses pixels elsewhere.
+    rim = row[70:130, 10:60]
+    assert ((rim > inside + 15) & (rim < outside - 15)).any(axis=1).mean() > 0.8
+
+
+def test_an_empty_picture_is_the_room() -> None:
+    at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (64, 48))
+    shown = picture((), (), at, DARK, 1)
+    assert set(np.unique(shown.item)) == {FLOOR, NOWHERE}
+    assert shown.names == ()
+
+
+def test_a_line_is_a_tube_of_its_length() -> None:
+    turn = np.linspace(0.0, math.tau, 200)
+    circle = np.stack((np.cos(turn), np.sin(turn), np.zeros(200)), axis=1)
+    item = tube("line", circle, 0.01, (10, 160, 80))
+    assert item is not None
+    mesh = trimesh.Trimesh(item.shape.vertices, item.shape.faces, process=False)
+    # An octagon's outline for the circle's.
+    around = 2.0 * 8 * 0.01 * math.sin(math.pi / 8)
+    assert mesh.area == pytest.approx(math.tau * around, rel=0.01)
+    out = mesh.face_normals * (mesh.triangles_center - _nearest(mesh.triangles_center))
+    assert (out.sum(axis=1) > 0.0).all()
+    assert tube("dot", np.zeros((5, 3)), 0.01, (0, 0, 0)) is None
+
+
+def _nearest(points: np.typing.NDArray[np.float64]) -> np.typing.NDArray[np.float64]:
+    """On the unit circle."""
+    flat = points * (1.0, 1.0, 0.0)
+    return np.asarray(flat / np.linalg.norm(flat, axis=1, keepdims=True))
