@@ -276,7 +276,8 @@ def test_requests_that_are_none_change_nothing_and_end_the_line_after_a_while(
 
 
 def test_single_requests_may_be_posted(server: AppServer) -> None:
-    assert post(server, do="clear_stop", id=1) == (200, {"is": "done", "id": 1})
+    status, done = post(server, do="clear_stop", id=1)
+    assert (status, done["is"], done["id"], done["outcome"]) == (200, "done", 1, "accepted")
     status, done = post(server, do="joint", axis=5, value=0.3)
     assert status == 200
     state: dict[str, Any] = {"ticket": 0}

@@ -1,4 +1,4 @@
-"""What requests are made of: what they have in common, and what their fields can be."""
+"""What requests and answers are made of: what they have in common, and their fields."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ MOST_JOINTS = 32
 Rates = tuple[float, float, float, float, float]
 """Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
 
+Numbers = list[float]
 Vector3 = tuple[float, float, float]
 Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
@@ -142,5 +143,18 @@ class Request(
     """
 
     traits: ClassVar[RequestTraits]
+
+    id: Id = None
+
+
+class Answer(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    tag_field="is",
+    tag=str.lower,
+):
+    """Base of all answers; ``is`` is the class name in lower case, ``id`` the request's."""
 
     id: Id = None

@@ -9,15 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
-from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.api.fields import Rates
 from katana450.server.service.command_gate import CommandGate
 from katana450.server.service.event_log import Journal
 from katana450.server.service.heartbeats import LastHeartbeat
@@ -184,17 +180,15 @@ class Hub:
 
     # What people do
 
-    def stop(self, actor: Actor, press: str | None = None) -> None:
-        """Anybody may, at any time. A ``press`` counts once, however often it is told."""
-        if self._presses.is_new(press):
-            self.gate.submit(cmd.Stop(), actor)
+    def stop(self, actor: Actor, press: str | None = None) -> int:
+        """Stop the arm for ``actor``, who may be anybody; return the ticket.
 
-    def clear_stop(self, window: Window) -> None:
-        """End a stop; the arm stays where it is until somebody moves it afresh."""
-        self.gate.submit(cmd.ClearStop(), window.actor)
+        A repeated ``press`` counts once: it changes nothing, and the ticket is 0.
+        """
+        return self.gate.submit(cmd.Stop(), actor) if self._presses.is_new(press) else 0
 
     def may_clear_stop(self, window: Window) -> bool:
-        """Whether ``clear_stop`` is not refused to the window."""
+        """Return whether the window may clear a stop."""
         holder = self.lease.holder
         return window.person.role.may_drive and holder in (None, window.person)
 
@@ -227,16 +221,9 @@ class Hub:
         window.heartbeat.note()
         self._hear()
 
-    def jog(self, window: Window, rates: Rates, frame: JogFrame) -> None:
-        """Go with ``rates`` until the next jog, at most for JOG_TIME."""
-        self.move(window, cmd.Jog(np.array(rates), frame))
-
     def move(self, window: Window, command: cmd.Command) -> int:
         """Submit ``command`` of ``window``; return its ticket."""
         return self.gate.submit(command, window.actor)
-
-    def set_speed(self, window: Window, speed: float) -> None:
-        self.move(window, cmd.SpeedScale(speed))
 
     # What time does
 
