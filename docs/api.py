@@ -54,6 +54,10 @@ Where a request is several commands (`set` with `more`) and some of them are ref
 once, as `accepted`; so is `branch`, whose path is planned first, and a `steer` that gives the arm no
 command yet. `stop` waits for nothing: it is `requested`.
 
+A stop can be cleared before a program sees it. A program that must not continue then, such as one that
+streams joint angles, gives each command the `revocations` of the state in which it began: the server
+refuses the command if there was a stop or a change of driver since. An answer to a command has the number too.
+
 In a state `stop` is `requested` until the arm itself has shown, newer than the request, that it is
 stopped, and `confirmed` then. `age` is the time since the arm's process last answered: from 0.3 s on
 what else the state says is old, and `GET /health` answers with status 503.
@@ -138,7 +142,7 @@ def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     lines = [f"### {heading}\n", _said(kind), ""]
     described = msgspec.json.schema_components([kind])[1][kind.__name__]
     for field in msgspec.structs.fields(kind):
-        if field.name == "id":
+        if field.name == "id" or (tag == "do" and field.name == "revocations"):
             continue
         shape = _shape(described["properties"][field.name])
         default = "" if field.required else f", default `{_json(field.default)}`"

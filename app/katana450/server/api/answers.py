@@ -147,6 +147,7 @@ class State(Answer, frozen=True, kw_only=True):
         speed: share of full speed. holder: name of who holds the arm.
         stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
             newer than the request is stopped, then confirmed.
+        revocations: number of stops and of losses of the lease so far.
         windows: pages and programs that are open. water: of the cup; null where there is none.
         program: planned, running or run last. fields: of the VRML world that are watched.
     """
@@ -179,6 +180,7 @@ class State(Answer, frozen=True, kw_only=True):
     holder: str | None
     stopped: str | None
     stop: str | None
+    revocations: int
     age: float
     windows: int
     water: Water | None

@@ -139,12 +139,14 @@ class Request(
 ):
     """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it.
 
-    Each class declares ``traits``.
+    Each class declares ``traits``. ``revocations``: of a state or an answer; a command is refused
+    if there was a stop or a change of driver since then.
     """
 
     traits: ClassVar[RequestTraits]
 
     id: Id = None
+    revocations: Annotated[int, Meta(ge=0)] | None = None
 
 
 class Answer(

@@ -41,13 +41,14 @@ class Done(Answer, frozen=True, kw_only=True):
     the parts in ``refused`` take no effect, or unknown if the arm's process does not report it
     within 1 s; of a stop, requested: the state tells when it is confirmed. ``rotation_misfit``, of
     a pose: the largest entry of R^T R - I; the nearest rotation is used, and more than 1e-3 is
-    refused."""
+    refused. ``revocations``: the state's, when the command was accepted."""
 
     ticket: int | None = None
     outcome: str | None = None
     findings: tuple[Finding, ...] = ()
     refused: tuple[PartRefusal, ...] = ()
     rotation_misfit: float | None = None
+    revocations: int | None = None
 
 
 class Refused(Answer, frozen=True, kw_only=True):

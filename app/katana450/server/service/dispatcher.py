@@ -90,10 +90,13 @@ class Dispatcher:
         if command is None:
             self._arrange(window, request)
             return answers.Done()
-        ticket = hub.move(window, command)
+        # Read before: a stop that comes in between is newer than the answer.
+        revocations = hub.gate.revocations
+        ticket = hub.move(window, command, request.revocations)
         # A stream is not held up by its answers, and what is planned first has no ticket yet.
         at_once = request.traits.stream or command.traits.planned or not ticket
-        return _done(ticket, ACCEPTED if at_once else None, _misfit(request))
+        done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
+        return msgspec.structs.replace(done, revocations=revocations)
 
     @staticmethod
     def is_pending(answer: answers.Answer) -> bool:

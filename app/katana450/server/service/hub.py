@@ -6,7 +6,7 @@ Lives in the gateway's one thread; `CommandGate` decides which commands reach th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from katana450.arm.control import commands as cmd
@@ -221,9 +221,9 @@ class Hub:
         window.heartbeat.note()
         self._hear()
 
-    def move(self, window: Window, command: cmd.Command) -> int:
-        """Submit ``command`` of ``window``; return its ticket."""
-        return self.gate.submit(command, window.actor)
+    def move(self, window: Window, command: cmd.Command, seen: int | None = None) -> int:
+        """Submit ``command`` of ``window``; return its ticket. ``seen``: see ``Actor``."""
+        return self.gate.submit(command, replace(window.actor, seen=seen))
 
     # What time does
 
