@@ -268,7 +268,7 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
         hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         hub.move(other, cmd.SpeedScale(1.0))
-    assert bar(table, owner)["orders"] == ["pause"]
+    assert bar(table, owner)["orders"] == ["pause", "end"]
     assert bar(table, other)["orders"] == []
     # The page of the owner is loaded anew.
     hub.leave(owner)

@@ -38,7 +38,21 @@ class ReleaseLease(Request, frozen=True):
 
 
 class Give(Request, frozen=True, kw_only=True):
-    """Give it to the window or program of that number."""
+    """Give the arm to the window or program of that number.
+
+    The owner of the program that runs may do this too, which ends the program.
+    """
+
+    traits: ClassVar[RequestTraits] = LEASE
+
+    to: int
+
+
+class Decline(Request, frozen=True, kw_only=True):
+    """Decline the request for the arm of the window or program of that number.
+
+    For the holder of the arm, or the owner of the program that runs.
+    """
 
     traits: ClassVar[RequestTraits] = LEASE
 

@@ -135,6 +135,8 @@ class Dispatcher:
                 hub.release_lease(window)
             case requests.Give(to=number):
                 hub.hand_over(window, number)
+            case requests.Decline(to=number):
+                hub.decline(window, number)
             case requests.Program(text=text, more=more, speed=speed):
                 hub.performer.script(window, text, more=more, speed=speed)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
@@ -47,6 +47,13 @@ class Window:
         return Actor(self.person, self.channel)
 
 
+class Takeover(NamedTuple):
+    """The newest take-over of the arm. drivers: keys of the windows that drove until then."""
+
+    taker: Person
+    drivers: frozenset[str]
+
+
 class Hub:
     """The participants and their heartbeats. Times are in seconds."""
 
@@ -73,6 +80,7 @@ class Hub:
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
         self._presses = Presses()
+        self._takeover: Takeover | None = None
 
     @property
     def arm(self) -> Arm | None:
@@ -105,11 +113,7 @@ class Hub:
         it gives its commands.
         """
         key = key_of(visitor, page)
-        known = self._remembered.pop(key) if key in self._remembered else None
-        person, number = known or self._meet(key, visitor)
-        self._remembered[key] = (person, number)
-        while len(self._remembered) > REMEMBERED:
-            self._remembered.pop(next(iter(self._remembered)))
+        person, number = self._known(key, visitor)
         window = Window(person, number, tell, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
         self.beat(window)
@@ -196,7 +200,9 @@ class Hub:
         self.gate.acquire(window.person)
 
     def take(self, window: Window) -> None:
+        driving = [each.person.key for each in self.windows if self.performer.drives(each)]
         self.gate.change(lambda lease, t: lease.take(window.person, t), window.actor)
+        self._takeover = Takeover(window.person, frozenset(driving))
 
     def request(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.request(window.person))
@@ -204,17 +210,40 @@ class Hub:
     def withdraw(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.withdraw(window.person))
 
+    def taken_by(self, window: Window) -> str | None:
+        """Return who took the arm over from ``window`` and still holds it."""
+        takeover = self._takeover
+        if takeover is None or window.person.key not in takeover.drivers:
+            return None
+        return takeover.taker.name if self.lease.holder == takeover.taker else None
+
     def release_lease(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.release(window.person), window.actor)
 
     def hand_over(self, window: Window, number: int) -> None:
-        """To the window of that number."""
-        taker = next((each for each in self.windows if each.number == number), None)
-        if taker is None:
-            raise LeaseError("They have closed their window.")
+        """Give the arm to the window of that number; a program of ``window`` that holds it ends."""
+        taker = self._numbered(number)
         self.gate.change(
-            lambda lease, t: lease.hand_over(window.person, taker.person, t), window.actor
+            lambda lease, t: lease.hand_over(self._giver(window), taker.person, t), window.actor
         )
+
+    def decline(self, window: Window, number: int) -> None:
+        """Decline the request for the arm of the window of that number, and tell it."""
+        asker = self._numbered(number)
+        self.gate.change(lambda lease, _: lease.decline(self._giver(window), asker.person))
+        asker.tell({"is": "refused", "why": f"{window.person.name} declined your request."})
+
+    def _giver(self, window: Window) -> Person:
+        """Return as whom ``window`` may give the arm away: as its program, if that holds it."""
+        program = self.gate.program
+        owns = program is not None and program.owner == window.person.key
+        return program.person if program is not None and owns else window.person
+
+    def _numbered(self, number: int) -> Window:
+        found = next((each for each in self.windows if each.number == number), None)
+        if found is None:
+            raise LeaseError("They have closed their window.")
+        return found
 
     def beat(self, window: Window) -> None:
         """A message of the window is being handled: a sign of life as of when it was received."""
@@ -267,6 +296,18 @@ class Hub:
             self.gate.protect(f"{holder.name} {why} while the arm moved.")
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
+
+    def person_of(self, visitor: Identity, page: str) -> Person:
+        """Return who speaks for ``page``, whether or not its control socket is open now."""
+        return self._known(key_of(visitor, page), visitor)[0]
+
+    def _known(self, key: str, visitor: Identity) -> tuple[Person, int]:
+        """Return person and number of the page of that key; a new page gets new ones."""
+        known = self._remembered.pop(key, None) or self._meet(key, visitor)
+        self._remembered[key] = known
+        while len(self._remembered) > REMEMBERED:
+            self._remembered.pop(next(iter(self._remembered)))
+        return known
 
     def _meet(self, key: str, visitor: Identity) -> tuple[Person, int]:
         self._numbers += 1

@@ -79,7 +79,7 @@ def _orders(hub: Hub, window: Window) -> list[Order]:
     pause = [Order.RESUME if hub.arm.state.paused else Order.PAUSE] if hub.stopped is None else []
     if program.status == Stage.PLANNING.value:
         return [*(pause if performer.waits else []), Order.END]
-    return pause if program.status in RUNS else []
+    return [*pause, Order.END] if program.status in RUNS else []
 
 
 def common(hub: Hub) -> dict[str, Any]:
@@ -110,6 +110,10 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     """The part that is its own."""
     person, lease = window.person, hub.lease
     mine = lease.holder == person
+    # The owner of a program decides while the program drives.
+    decides = hub.performer.drives(window)
+    program = hub.performer.told()
+    taker = hub.taken_by(window)
     age = hub.age(window)
     clears = hub.may_clear_stop(window)
     other = lease.holder.name if lease.holder is not None else "whoever may drive"
@@ -124,13 +128,15 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
         "asking": [
             {"number": each.number, "name": each.person.name}
             for each in hub.windows
-            if mine and each.person in lease.waiting
+            if decides and each.person in lease.waiting
         ],
         "others": [
             {"number": each.number, "name": each.person.name}
             for each in hub.windows
             if mine and each.person != person and each.person.role.may_drive
         ],
+        "taken": "" if taker is None else f"{taker} took over from you.",
+        "planning": program is not None and program.status == Stage.PLANNING.value,
         "orders": [order.value for order in _orders(hub, window)],
         "age": round(age, 1) if age >= AGE_WORTH_TELLING else 0,
     }
