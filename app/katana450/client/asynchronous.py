@@ -108,10 +108,11 @@ class AsyncClient:
         ``seconds``.
         """
         done = await self.ask(request)
-        ticket = done.ticket if isinstance(done, answers.Done) else None
-        # A program that is resumed ends by itself, which changes the driver too.
-        moves = isinstance(done, answers.Done) and not request.traits.for_program
-        revocations = done.revocations if moves else None
+        ticket = revocations = None
+        if isinstance(done, answers.Done):
+            ticket = done.ticket
+            # A program that is resumed ends by itself, which changes the driver too.
+            revocations = None if request.traits.for_program else done.revocations
         async with asyncio.timeout(seconds):
             async for state in self.states():
                 if state.stopped is not None:
