@@ -5,7 +5,8 @@
 (() => {
   const TELL_EVERY = 50; // ms
   const AGAIN = 100; // ms
-  const TRIES = 30;
+  const TRIES = 100; // to bring the camera back
+  const STEADY = 1000; // ms that viser has to look there before it is done
   // Of each theme: what the floor's message holds, and the file of the sky.
   const ROOMS = JSON.parse(document.currentScript.dataset.rooms);
   const page = new URLSearchParams(location.search).get("page");
@@ -39,6 +40,7 @@
   let camera = null; // where this person last looked from
   let kept = null; //   the same, from when the line is back until viser looks from there again
   let tries = 0;
+  let there = null; //  when viser began to look there, ms; null while it looks elsewhere
   const groups = new Map(); // the labels of the rows of buttons, by their ids
   const room = new Map(); //   the last message of each kind that the theme decides on
   let seen = 0;
@@ -62,8 +64,23 @@
     else requestAnimationFrame(soon);
   }
 
-  // viser starts anew from its first view whenever the line is back; told often enough, it looks
-  // where the person had looked.
+  // viser starts from its first view whenever the line is back, and once more when it has drawn the
+  // scene, which on a slow page comes later than our camera. So the camera is set until it stays.
+  function restore(worker) {
+    if (kept && performance.now() - (there ?? Infinity) > STEADY) kept = null;
+    if (kept && there === null && (tries += 1) > TRIES) kept = null;
+    if (!kept) return;
+    if (there === null) look(worker);
+    setTimeout(() => restore(worker), AGAIN);
+  }
+
+  // A person who turns the camera meanwhile has it.
+  for (const kind of ["pointerdown", "wheel"])
+    window.addEventListener(kind, ({ target }) => tries && target?.tagName === "CANVAS" && (kept = null), {
+      capture: true,
+      passive: true,
+    });
+
   function look(worker) {
     const { position, look_at, up_direction } = kept;
     const messages = [
@@ -121,12 +138,8 @@
     }
 
     #looks(message) {
-      if (kept && (same(kept, message) || tries >= TRIES)) kept = null;
       if (!kept) camera = message;
-      else if (tries > 0) {
-        tries += 1;
-        setTimeout(() => kept && look(this), AGAIN);
-      }
+      else there = same(kept, message) ? (there ?? performance.now()) : null;
     }
 
     #hear(data) {
@@ -135,6 +148,7 @@
         groups.clear();
         kept = camera;
         tries = 0;
+        there = null;
       }
       if (data?.type !== "message_batch" || data.ours) return;
       Fields.hear(data.messages);
@@ -148,7 +162,7 @@
       if (ready) Fit.begin();
       if (!kept || tries > 0 || !ready) return;
       tries = 1;
-      setTimeout(() => kept && look(this), AGAIN);
+      setTimeout(() => restore(this), AGAIN);
     }
   };
 

@@ -70,9 +70,10 @@ class CommandGate:
                 raise LeaseError("The server itself does not move the arm.")
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
             clears = isinstance(command, cmd.ClearStop)
-            # A stop from before there was an arm can be cleared, and nothing else done.
-            gone = clears and self.arm is None
-            ticket = 0 if gone else self.present().deliver(command, granted)
+            if not clears:
+                # Without an arm nothing can be done but to clear a stop.
+                self.present()
+            ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
             if clears:
                 self.stopped = None
             elif isinstance(command, cmd.Jog):

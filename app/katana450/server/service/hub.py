@@ -219,6 +219,7 @@ class Hub:
 
     def release_lease(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.release(window.person), window.actor)
+        self._takeover = None
 
     def hand_over(self, window: Window, number: int) -> None:
         """Give the arm to the window of that number; a program of ``window`` that holds it ends."""
