@@ -101,7 +101,7 @@ class Lease:
         """Return the lease without the request of ``person``, which the holder declines."""
         self._check_holds(holder)
         if person not in self.waiting:
-            raise LeaseError("They do not ask for the arm any more.")
+            raise LeaseError("The request for the arm was withdrawn.")
         return self._without(person)
 
     def hand_over(self, giver: Person, taker: Person, t: float) -> Self:

@@ -8,10 +8,11 @@ from katana450.server.api.fields import Answer
 
 
 class Finding(msgspec.Struct, frozen=True, kw_only=True):
-    """One reason why the arm does not do what was wished.
+    """A reason why the arm does not reach the target as it was given.
 
-    ``said`` in words; ``amount`` in ``unit``, both null when there is none; ``axis`` counts from 1;
-    ``parts``: the two that are about to meet; ``seconds``: how long a stop takes.
+    ``said``: the reason in words. ``amount`` in ``unit``: both null where there is no number.
+    ``axis`` counts from 1. ``parts``: the two parts that are about to meet. ``seconds``: duration
+    of a stop.
     """
 
     reason: str
@@ -36,12 +37,17 @@ class PartRefusal(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is done. A command of the arm has a ``ticket``: it is in every state
-    whose ticket is no smaller. Its ``outcome``: accepted, limited by the ``findings`` or because
-    the parts in ``refused`` take no effect, or unknown if the arm's process does not report it
-    within 1 s; of a stop, requested: the state tells when it is confirmed. ``rotation_misfit``, of
-    a pose: the largest entry of R^T R - I; the nearest rotation is used, and more than 1e-3 is
-    refused. ``revocations``: the state's, when the command was accepted."""
+    """The request of that id is done.
+
+    Attributes:
+        ticket: of a command of the arm: every state with this or a higher ticket includes it.
+        outcome: accepted; limited by the ``findings``, or because the parts in ``refused`` take no
+            effect; unknown if the arm's process does not report it within 1 s; for a stop,
+            requested: the state tells when it is confirmed.
+        rotation_misfit: of a pose: the largest entry of R^T R - I. The nearest rotation is used;
+            more than 1e-3 is refused.
+        revocations: the state's number when the command was accepted.
+    """
 
     ticket: int | None = None
     outcome: str | None = None
@@ -52,7 +58,8 @@ class Done(Answer, frozen=True, kw_only=True):
 
 
 class Refused(Answer, frozen=True, kw_only=True):
-    """Nothing has changed; ``why`` says why and what to do. ``retry`` [s]: ask again then."""
+    """The request is refused and has changed nothing. ``why``: the reason, and what to do.
+    ``retry``: time [s] after which to ask again."""
 
     why: str
     retry: float | None = None

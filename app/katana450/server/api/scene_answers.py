@@ -8,7 +8,7 @@ from katana450.server.api.fields import Answer, Numbers
 
 
 class Value(msgspec.Struct, frozen=True, kw_only=True):
-    """What a field of a node of the VRML world is: a number, or as many as its type has."""
+    """Value of a field of a node of the VRML world: a number, or as many as its type has."""
 
     node: str
     field: str
@@ -16,8 +16,10 @@ class Value(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Thing(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
-    ``fixed``: to the hand. ``colour``: null for its own."""
+    """An object that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
+
+    ``fixed``: whether it is fixed to the hand. ``colour``: null for the colour of its file.
+    """
 
     name: str
     form: str
@@ -34,19 +36,19 @@ class Thing(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Things(Answer, frozen=True, kw_only=True):
-    """All of them."""
+    """All objects."""
 
     things: list[Thing]
 
 
 class Values(Answer, frozen=True, kw_only=True):
-    """What the fields are that were asked for, in that order."""
+    """Values of the requested fields, in the order of the request."""
 
     values: list[Value]
 
 
 class Field(msgspec.Struct, frozen=True, kw_only=True):
-    """One of a node's; ``type`` as VRML97 calls it. ``settable``: by ``set``, else only read."""
+    """A field of a node. ``type``: its name in VRML97. ``settable``: whether ``set`` can set it."""
 
     field: str
     type: str
@@ -55,7 +57,7 @@ class Field(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Node(msgspec.Struct, frozen=True, kw_only=True):
-    """A node of the VRML world by its DEF name, and what it is of: a joint, link or thing."""
+    """A node of the VRML world. ``node``: its DEF name. ``of``: its joint, link or object."""
 
     node: str
     kind: str
@@ -64,27 +66,29 @@ class Node(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class World(Answer, frozen=True, kw_only=True):
-    """All that can be set and got by name. Lengths in m, angles in rad, z up."""
+    """All nodes of the VRML world. Lengths in m, angles in rad, z up."""
 
     nodes: list[Node]
 
 
 class Link(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a link is: ``T`` (4, 4) in the base frame."""
+    """Pose of a link: ``T`` (4, 4) in the base frame."""
 
     name: str
     T: list[Numbers]
 
 
 class Links(Answer, frozen=True, kw_only=True):
-    """All of them, the base first."""
+    """All links, the base first."""
 
     links: list[Link]
 
 
 class Mesh(Answer, frozen=True, kw_only=True):
-    """An uploaded file. ``key``: for ``place``. ``name``: its own, and of no thing there is.
-    ``said``: what was read. ``size``: along x, y, z [m]."""
+    """An uploaded mesh. ``key``: for ``place``. ``name``: the file's, changed if an object has it.
+
+    ``said``: a summary of what was read. ``size``: along x, y, z [m].
+    """
 
     key: str
     name: str

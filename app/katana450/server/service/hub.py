@@ -243,7 +243,7 @@ class Hub:
     def _numbered(self, number: int) -> Window:
         found = next((each for each in self.windows if each.number == number), None)
         if found is None:
-            raise LeaseError("They have closed their window.")
+            raise LeaseError("That window or program is gone.")
         return found
 
     def beat(self, window: Window) -> None:
