@@ -120,7 +120,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
     no_commands = {
         requests.Hello, requests.Heartbeat, requests.Query, requests.Get, requests.Watch,
         requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
-        requests.Give,
+        requests.Give, requests.Decline,
     }  # fmt: skip
     assert set(samples) | no_commands == set(schema.kinds(requests.AnyRequest))
     for kind, several in samples.items():
