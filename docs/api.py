@@ -51,8 +51,14 @@ program for 1 s (`--owner-silence`).
 The answer to a command comes once the arm's process has taken it, a tick or two later, and can be
 overtaken by the answer to a later question. It says what became of the command: `done` with the
 `outcome` `accepted`, or `limited` with the findings that say by what; or `refused` with the reason.
-Samples of a stream (`servo`, `jog`) are answered at once, as `accepted`; so is `branch`, whose path is
-planned first. `stop` waits for nothing.
+Where a request is several commands (`set` with `more`) and some of them are refused, the answer is
+`limited` and lists those parts with their reasons. Samples of a stream (`servo`, `jog`) are answered at
+once, as `accepted`; so is `branch`, whose path is planned first, and a `steer` that gives the arm no
+command yet. `stop` waits for nothing: it is `requested`.
+
+A stop can be cleared before a program sees it. A program that must not continue then, such as one that
+streams joint angles, gives each command the `revocations` of the state in which it began: the server
+refuses the command if there was a stop or a change of driver since. An answer to a command has the number too.
 
 In a state `stop` is `requested` until the arm itself has shown, newer than the request, that it is
 stopped, and `confirmed` then. `age` is the time since the arm's process last answered: from 0.3 s on
@@ -127,7 +133,14 @@ def page() -> str:
     parts += [
         _kind(kind, None)
         for kind in (
-            *(answers.Finding, answers.Water, answers.Line, answers.Choice, answers.Thing),
+            *(
+                answers.Finding,
+                answers.PartRefusal,
+                answers.Water,
+                answers.Line,
+                answers.Choice,
+                answers.Thing,
+            ),
             *(answers.Value, answers.Node, answers.Field, answers.Link),
         )
     ]
@@ -148,7 +161,7 @@ def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     lines = [f"### {heading}\n", _said(kind), ""]
     described = msgspec.json.schema_components([kind])[1][kind.__name__]
     for field in msgspec.structs.fields(kind):
-        if field.name == "id":
+        if field.name == "id" or (tag == "do" and field.name == "revocations"):
             continue
         shape = _shape(described["properties"][field.name])
         default = "" if field.required else f", default `{_json(field.default)}`"

@@ -5,7 +5,8 @@
 (() => {
   const TELL_EVERY = 50; // ms
   const AGAIN = 100; // ms
-  const TRIES = 30;
+  const TRIES = 100; // to bring the camera back
+  const STEADY = 1000; // ms that viser has to look there before it is done
   // Of each theme: what the floor's message holds, and the file of the sky.
   const ROOMS = JSON.parse(document.currentScript.dataset.rooms);
   const page = new URLSearchParams(location.search).get("page");
@@ -22,6 +23,7 @@
   let camera = null; // where this person last looked from
   let kept = null; //   the same, from when the line is back until viser looks from there again
   let tries = 0;
+  let there = null; //  when viser began to look there, ms; null while it looks elsewhere
   const room = new Map(); //   the last message of each kind that the theme decides on
   let seen = 0;
   let told = 0;
@@ -44,6 +46,23 @@
     else requestAnimationFrame(soon);
   }
 
+  // viser starts from its first view whenever the line is back, and once more when it has drawn the
+  // scene, which on a slow page comes later than our camera. So the camera is set until it stays.
+  function restore(line) {
+    if (kept && performance.now() - (there ?? Infinity) > STEADY) kept = null;
+    if (kept && there === null && (tries += 1) > TRIES) kept = null;
+    if (!kept) return;
+    if (there === null) line.show(Viser.viewing(kept));
+    setTimeout(() => restore(line), AGAIN);
+  }
+
+  // A person who turns the camera meanwhile has it.
+  for (const kind of ["pointerdown", "wheel"])
+    window.addEventListener(kind, ({ target }) => tries && target?.tagName === "CANVAS" && (kept = null), {
+      capture: true,
+      passive: true,
+    });
+
   // The server gives every window the light theme. Each is changed to its own here, before viser sees
   // it: no answer of the server has to be waited for, which a slow page would miss.
   function dress(messages) {
@@ -59,17 +78,9 @@
   const same = (a, b) =>
     ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < 1e-3));
 
-  // viser starts anew from its first view whenever the line is back; told often enough, it looks
-  // where the person had looked.
-  const look = (line) => setTimeout(() => kept && line.show(Viser.viewing(kept)), AGAIN);
-
-  function looks(view, line) {
-    if (kept && (same(kept, view) || tries >= TRIES)) kept = null;
+  function looks(view) {
     if (!kept) camera = view;
-    else if (tries > 0) {
-      tries += 1;
-      look(line);
-    }
+    else there = same(kept, view) ? (there ?? performance.now()) : null;
   }
 
   Viser.tap({
@@ -77,9 +88,9 @@
       Theme.follow(() => redress(line));
       return page ? `${address}?page=${page}` : address;
     },
-    sends(message, line) {
+    sends(message) {
       const view = Viser.viewOf(message);
-      if (view) looks(view, line);
+      if (view) looks(view);
       const choice = Viser.choiceOf(message);
       if (choice?.label === "View") Fit.choose(choice.value);
       if (choice?.label !== "Theme") return true;
@@ -90,6 +101,7 @@
       seen = 0;
       kept = camera;
       tries = 0;
+      there = null;
     },
     hears(messages, line) {
       Fields.hear(messages);
@@ -101,7 +113,7 @@
       if (ready) Fit.begin();
       if (!kept || tries > 0 || !ready) return;
       tries = 1;
-      look(line);
+      setTimeout(() => restore(line), AGAIN);
     },
   });
 

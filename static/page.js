@@ -9,7 +9,7 @@
   const NOT_YOU = 4401;
   const QUIETLY = "quietly"; // the id of what is asked again until it is had
   const OPEN = "katana450.instruments.open";
-  const ORDERS = { pause: "Pause", resume: "Resume", end: "Cancel" };
+  const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
@@ -52,7 +52,7 @@
   }
 
   function insist() {
-    fetch(`stop?press=${press}`, { method: "POST", keepalive: true }).then(
+    fetch(`stop?press=${press}&page=${page}`, { method: "POST", keepalive: true }).then(
       ({ ok }) => ok && stopped(),
       () => {},
     );
@@ -115,16 +115,22 @@
   function acts() {
     const { mine, holder, role, asked, asking: wanting, others } = status;
     if (role === "viewer") return [];
+    // Only who drives is shown requests: in person, or by a program, which ends when the arm is given away.
+    const whom = (name) => (wanting.length > 1 ? ` ${name}` : "");
+    const buttons = wanting.flatMap(({ number, name }) => [
+      act(mine ? `Give to ${name}` : `Allow${whom(name)}`, { do: "give", to: number }, true),
+      act(`Refuse${whom(name)}`, { do: "decline", to: number }),
+    ]);
     if (mine) {
-      const buttons = wanting.map(({ number, name }) => act(`Give to ${name}`, { do: "give", to: number }, true));
       const more = others.filter(({ number }) => !wanting.some((each) => each.number === number));
       if (more.length) buttons.push(handOver(more));
       return [...buttons, act("Let go", { do: "release_lease" })];
     }
     if (holder === null) return [act("Take", { do: "acquire" }, true)];
-    const buttons = [asked ? act("Ask no more", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
-    if (role === "admin") buttons.push(act("Take over", { do: "take" }));
-    return buttons;
+    if (wanting.length) return buttons;
+    const free = [asked ? act("Ask no more", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
+    if (role === "admin") free.push(act("Take over", { do: "take" }));
+    return free;
   }
 
   function handOver(others) {
@@ -141,13 +147,13 @@
     if (!status) return;
     body.dataset.mood = status.mood;
     text("headline", status.headline);
-    text("why", [status.why, status.stopped, status.until].filter(Boolean).join(" "));
+    text("why", [status.taken, status.why, status.stopped, status.until].filter(Boolean).join(" "));
     // A press is done once the arm itself has shown that it is stopped.
     stopButton.classList.toggle("asked", asking !== null || status.stop === "requested");
     byId("objects-button").hidden = status.role === "viewer";
     byId("clear-stop").hidden = !status.stopped || !status.may_clear_stop;
     const { mine, holder, windows, asking: wanting } = status;
-    const wants = mine && wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
+    const wants = wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
     // Programs count too.
     const connected = windows > 1 ? `, ${windows} connected` : "";
@@ -157,10 +163,11 @@
       drawnActs = key;
       byId("acts").replaceChildren(...acts());
     }
-    const orders = status.orders.join();
+    const orders = [status.planning, ...status.orders].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
-      const made = (order) => act(ORDERS[order], { do: "steer", order }, order !== "end");
+      const label = (order) => (order === "end" && status.planning ? "Cancel" : ORDERS[order]);
+      const made = (order) => act(label(order), { do: "steer", order }, order !== "end");
       byId("orders").replaceChildren(...status.orders.map(made));
     }
     const slider = document.querySelector("#speed input");

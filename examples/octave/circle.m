@@ -17,7 +17,7 @@ joints = @(t) katana_ik (on_circle (t), deg2rad (75 - 13 * cos (t)), 0, tip);
 arm = katana_open (port, "Octave");
 katana_say (arm, struct ("do", "acquire"));
 katana_say (arm, struct ("do", "tool", "name", "tcp"));
-state = katana_go (arm, joints (0));
+start = state = katana_go (arm, joints (0));
 
 % Where Octave's kinematics and the server's say the tip is.
 start_error_mm = 1e3 * norm (state.T(1:3, 4)' - on_circle (0));
@@ -35,7 +35,9 @@ while (t = toc (begun)) < seconds
   asked(end + 1, :) = joints (angle);
   rate = 2 * pi / seconds * (1 - cos (2 * pi * share));
   ahead = joints (angle + 1e-4) - joints (angle - 1e-4);
-  request = struct ("do", "servo", "q", asked(end, :), "qd", rate * ahead / 2e-4);
+  % The server refuses it after a stop, even one that was cleared at once.
+  request = struct ("do", "servo", "q", asked(end, :), "qd", rate * ahead / 2e-4, ...
+                    "revocations", start.revocations);
   katana_say (arm, request);
   state = katana_hear (arm, "state");
   traced(end + 1, :) = state.T(1:3, 4)';

@@ -49,6 +49,6 @@ def test_who_holds_the_arm_and_heartbeats_cost_nothing() -> None:
     kinds = [kind for kind in EVERY_REQUEST if kind.traits.free]
     assert {kind.__name__ for kind in kinds} == {
         *("Stop", "ClearStop", "Heartbeat"),
-        *("Acquire", "Take", "Ask", "Withdraw", "Give", "ReleaseLease"),
+        *("Acquire", "Take", "Ask", "Withdraw", "Give", "Decline", "ReleaseLease"),
     }
     assert not any(kind.traits.question for kind in kinds)

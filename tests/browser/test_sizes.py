@@ -289,6 +289,9 @@ def test_buttons_of_the_lease_fit_on_a_phone(server: AppServer, open_page: OpenP
         take(page)
         page.wait_until(lambda: page.page.locator("#acts select").count(), "the other")
         assert overhang(page) <= 0.0
+        other.ask(requests.Ask())
+        page.wait_until(lambda: page.page.get_by_text("Refuse").count(), "the request")
+        assert overhang(page) <= 0.0
         other.ask(requests.Take())
         page.wait_until(lambda: page.page.get_by_text("Take over").count(), "who drives")
         assert overhang(page) <= 0.0

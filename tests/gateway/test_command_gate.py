@@ -43,7 +43,7 @@ def test_actor_travels_with_its_grounds(table: Table) -> None:
     hub.move(first, cmd.Home())
     hub.move(first, cmd.Home())
     hub.stop(second.actor)
-    hub.clear_stop(first)
+    hub.move(first, cmd.ClearStop())
     hub.release_lease(first)
     assert [(actor.name, actor.grounds) for actor in arm.actors] == [
         ("Window 1", Grounds.FREE_LEASE),
@@ -108,7 +108,7 @@ def test_gesture_let_through_before_a_stop_is_refused_after_it_was_cleared(table
     table.stop("Vera")
     with pytest.raises(LeaseError, match="stopped"):
         table.hub.gate.submit(cmd.Home(), gesture)
-    table.hub.clear_stop(driver)
+    table.hub.move(driver, cmd.ClearStop())
     with pytest.raises(LeaseError, match="Do it again"):
         table.hub.gate.submit(cmd.Home(), gesture)
     assert table.arm.commands == []
@@ -153,7 +153,7 @@ def test_no_gesture_of_another_thread_passes_a_stop(table: Table) -> None:
         thread.start()
     for _ in range(1000):
         table.stop("Vera")
-        table.hub.clear_stop(driver)
+        table.hub.move(driver, cmd.ClearStop())
     done.set()
     for thread in threads:
         thread.join()
@@ -218,7 +218,7 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
         moved = internals.value_change(slider, 0.5)
         hooked.receive()
         table.stop("Vera")
-        table.hub.clear_stop(driver)
+        table.hub.move(driver, cmd.ClearStop())
         await hooked.handle(moved)
         assert (table.arm.commands, slider.value) == ([], 0.0)
         assert "Do it again" in hooked.refusals[0]

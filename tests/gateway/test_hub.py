@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
@@ -192,8 +193,10 @@ def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
         lambda: table.hub.acquire(watcher),
         lambda: table.hub.take(watcher),
         lambda: table.hub.request(watcher),
-        lambda: table.hub.jog(watcher, (0.1, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE),
-        lambda: table.hub.set_speed(watcher, 1.0),
+        lambda: table.hub.move(
+            watcher, cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)
+        ),
+        lambda: table.hub.move(watcher, cmd.SpeedScale(1.0)),
     ]
     for act in acts:
         with pytest.raises(LeaseError):
@@ -202,7 +205,7 @@ def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
     table.stop("Vera")
     assert table.arm.stops == 1
     with pytest.raises(LeaseError):
-        table.hub.clear_stop(watcher)
+        table.hub.move(watcher, cmd.ClearStop())
     assert table.hub.stopped is not None
 
 
@@ -215,16 +218,16 @@ def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
     assert not moves(table)
     acts: list[Callable[[], object]] = [
         lambda: table.touch(driver.person.key),
-        lambda: table.hub.jog(driver, (0.1, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE),
+        lambda: table.hub.move(driver, cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)),
     ]
     for act in acts:
         with pytest.raises(LeaseError, match="stopped"):
             act()
     # Only who drives may end it.
     with pytest.raises(LeaseError, match="Window 1 holds"):
-        table.hub.clear_stop(other)
+        table.hub.move(other, cmd.ClearStop())
     assert stands_still(table)
-    table.hub.clear_stop(driver)
+    table.hub.move(driver, cmd.ClearStop())
     assert not stands_still(table)
     assert not moves(table)
     table.touch(driver.person.key)
@@ -234,17 +237,17 @@ def test_a_press_of_stop_counts_once_however_late_it_is_told_again(table: Table)
     driver = table.join(PAGES[0])
     table.stop("Window 1", "a press")
     table.stop("Window 1", "a press")
-    table.hub.clear_stop(driver)
+    table.hub.move(driver, cmd.ClearStop())
     table.stop("Window 1", "a press")
     assert not stands_still(table)
     table.stop("Window 1", "another")
     assert stands_still(table)
-    table.hub.clear_stop(driver)
+    table.hub.move(driver, cmd.ClearStop())
     # Without a name every one counts.
     for _ in range(2):
         table.stop("Window 1")
         assert stands_still(table)
-        table.hub.clear_stop(driver)
+        table.hub.move(driver, cmd.ClearStop())
 
 
 def test_an_arm_that_lost_its_stop_is_stopped_again(table: Table) -> None:
@@ -340,17 +343,17 @@ def test_a_jog_goes_on_while_it_is_held_and_is_over_by_itself(table: Table) -> N
     driver = table.join(PAGES[0])
     forward = (0.2, 0.0, 0.0, 0.0, 0.5)
     for _ in range(5):
-        table.hub.jog(driver, forward, JogFrame.TOOL)
+        table.hub.move(driver, cmd.Jog(np.array(forward), JogFrame.TOOL))
         table.wait(0.04, driver)
     assert table.arm.jogs == [(forward, JogFrame.TOOL)] * 5
-    table.hub.set_speed(driver, 0.25)
+    table.hub.move(driver, cmd.SpeedScale(0.25))
     assert table.arm.share == 0.25
 
 
 def test_a_jog_that_is_let_go_says_so_to_the_arm(table: Table) -> None:
     driver = table.join(PAGES[0])
-    table.hub.jog(driver, (0.2, 0.0, 0.0, 0.0, 0.0), JogFrame.BASE)
-    table.hub.jog(driver, (0.0,) * 5, JogFrame.BASE)
+    table.hub.move(driver, cmd.Jog(np.array((0.2, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE))
+    table.hub.move(driver, cmd.Jog(np.array((0.0,) * 5), JogFrame.BASE))
     assert table.arm.jogs[-1] == ((0.0,) * 5, JogFrame.BASE)
     # A driver who jogged no more and falls silent stops nothing.
     table.wait(2 * Settings.silence)
@@ -375,4 +378,4 @@ def test_before_the_arm_is_there_nobody_drives_it() -> None:
         hub.gate.claim(window.actor)
     hub.tick()
     hub.stop(window.actor)
-    hub.clear_stop(window)
+    hub.move(window, cmd.ClearStop())

@@ -1,17 +1,24 @@
-"""What an answer says of a command: accepted, limited or refused, as the arm's process told."""
+"""Outcome of a command in its answer, as the arm's process reports it."""
 
 from __future__ import annotations
 
 import asyncio
+import time
 from concurrent.futures import Future
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
+from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError, aconnect
-from katana450.server.api import answers, requests
-from katana450.server.service import dispatcher
+from katana450.maths.kinematics.reading import Reading
+from katana450.server.api import answers, requests, schema
+from katana450.server.api.fields import Order
+from katana450.server.service import dispatcher, serialize
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from tests.browser.server import AppServer
@@ -65,9 +72,130 @@ def test_samples_of_a_stream_are_answered_at_once(program: Client) -> None:
     assert done(program.ask(requests.Jog(rates=(0.0,) * 5))).outcome == "accepted"
 
 
+def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
+    program: Client,
+) -> None:
+    T = np.eye(4)
+    T[:3, 3] = (0.3, 0.3, 0.0)
+    place: Any = T.tolist()
+    q = program.query(answers.State).q
+    scene = program.save_scene()
+    key = program.load_scene(scene).key
+    samples: dict[type[requests.Request], list[requests.Request]] = {
+        requests.Stop: [requests.Stop(press="one"), requests.Stop(press="one"), requests.Stop()],
+        requests.ClearStop: [requests.ClearStop()],
+        requests.Speed: [requests.Speed(value=0.5), requests.Speed(value=1.0)],
+        requests.Joint: [requests.Joint(axis=1, value=0.1)],
+        requests.Joints: [requests.Joints(q=q)],
+        requests.Nudge: [requests.Nudge(axis=1, by=0.01)],
+        requests.Servo: [requests.Servo(q=q)],
+        requests.Jog: [requests.Jog(rates=(0.0,) * 5)],
+        requests.Pose: [requests.Pose(T=cast(Any, FAR))],
+        requests.Position: [requests.Position(p=(0.3, 0.1, 0.0))],
+        requests.EndDrag: [requests.EndDrag()],
+        requests.Turn: [requests.Turn(pitch=0.3, roll=0.0)],
+        requests.Gripper: [requests.Gripper(angle=0.1)],
+        requests.Tool: [requests.Tool(name="flange"), requests.Tool(name="tcp")],
+        requests.Read: [requests.Read(reading=each) for each in reversed(Reading)],
+        requests.GoToZero: [requests.GoToZero()],
+        requests.Home: [requests.Home()],
+        requests.Pause: [requests.Pause()],
+        requests.Resume: [requests.Resume()],
+        requests.Branch: [requests.Branch(shoulder="front", elbow="down")],
+        requests.Hold: [requests.Hold()],
+        requests.Place: [
+            requests.Place(name="ball", T=place, form=requests.Form.SPHERE, size=[0.02])
+        ],
+        requests.Attach: [requests.Attach(name="ball", to=requests.Mount.WORLD)],
+        requests.Set: [requests.Set(node="cup_look", field="whichChoice", value=0)],
+        requests.Remove: [requests.Remove(name="ball")],
+        requests.Fill: [requests.Fill(ml=150.0)],
+        requests.Load: [requests.Load(scene=key)],
+        requests.Program: [requests.Program(text="steps:\n  - wait: 20\n")],
+        requests.Steer: [
+            requests.Steer(order=order)
+            for order in (Order.RUN, Order.PAUSE, Order.RESUME, Order.STEP, Order.END)
+        ],
+    }
+    no_commands = {
+        requests.Hello, requests.Heartbeat, requests.Query, requests.Get, requests.Watch,
+        requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
+        requests.Give, requests.Decline,
+    }  # fmt: skip
+    assert set(samples) | no_commands == set(schema.kinds(requests.AnyRequest))
+    for kind, several in samples.items():
+        for request in several:
+            before = program.query(answers.State).ticket
+            answer = done(program.ask(request))
+            if kind is requests.Program:
+                wait_until_planned(program)
+            time.sleep(0.05)
+            if answer.outcome is None:
+                # Nothing became a command then.
+                assert program.query(answers.State).ticket == before, request
+                assert kind is requests.Program
+            else:
+                expected = ("requested",) if kind is requests.Stop else ("accepted", "limited")
+                assert answer.outcome in expected, request
+
+
+def wait_until_planned(program: Client) -> None:
+    deadline = time.monotonic() + 20.0
+    while (progress := program.query(answers.State).program) is None or progress.status != "ready":
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_a_second_stop_does_not_refuse_the_first(session: Session) -> None:
+    mailbox = Mailbox(session.check)
+    mailbox.put(cmd.Home())
+    mailbox.put(cmd.Stop())
+    mailbox.put(cmd.Stop())
+    drained = mailbox.drain()
+    assert (drained.dropped, drained.tickets) == ([1], [[2, 3]])
+
+
+def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    gone, turned = cmd.Shift("ball", position=np.zeros(3)), cmd.SetJoint(4, 30.0)
+    state = session.step(state, [cmd.Batch((turned, gone))], 0.01)
+    answer = done(serialize.concluded(answers.Done(ticket=1), *state.outcomes))
+    assert (answer.outcome, reasons(answer)) == ("limited", ["axis limit"])
+    (part,) = answer.refused
+    assert (part.part, part.command, part.why) == (2, "shift", "There is no 'ball'.")
+    other = cmd.Shift("cube", position=np.zeros(3))
+    state = session.step(state, [cmd.Batch((gone, other))], 0.02)
+    refused = serialize.concluded(answers.Done(ticket=2), *state.outcomes)
+    assert isinstance(refused, answers.Refused)
+    assert refused.why == "There is no 'ball'. There is no 'cube'."
+
+
+def test_a_server_names_the_refused_parts_of_a_request(server: AppServer) -> None:
+    settings = [
+        {"node": "ball", "field": "translation", "value": [0.3, -0.3, 0.0]},
+        {"node": "axis_1", "field": "rotation", "value": [0.0, 0.0, 1.0, 0.1]},
+    ]
+    first = {"more": settings[1:], **settings[0]}
+    deadline = time.monotonic() + 20.0
+    with speaking(server) as lines:
+        while True:
+            # The ball has to go in the same tick; a slow server sees that it is gone already.
+            assert time.monotonic() < deadline
+            place = {"form": "sphere", "size": [0.02], "can_be_held": False}
+            assert lines.answer(do="place", name="ball", **place)["is"] == "done"
+            lines.say(do="remove", name="ball")
+            answer = lines.answer(do="set", **first)
+            if answer["is"] == "done" and answer.get("refused"):
+                break
+        lines.answer(do="release_lease")
+    assert answer["outcome"] == "limited"
+    assert answer["refused"] == [{"part": 2, "command": "shift", "why": "There is no 'ball'."}]
+
+
 def test_what_is_no_command_has_no_outcome(program: Client) -> None:
-    answer = done(program.ask(requests.ClearStop()))
+    answer = done(program.ask(requests.ReleaseLease()))
     assert (answer.outcome, answer.ticket) == (None, None)
+    program.ask(requests.ClearStop())
 
 
 def test_every_channel_says_it(server: AppServer) -> None:

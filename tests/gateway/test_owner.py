@@ -227,7 +227,7 @@ def test_the_page_paces_its_own_program_by_both_its_sockets(server: AppServer, a
             assert control.status["headline"].startswith("Planning")
             await peer.set("Motion", value="Pause")
             await until(program="paused")
-            await control.wait(headline="Square, paused", orders=["resume"])
+            await control.wait(headline="Square, paused", orders=["resume", "end"])
             await peer.set("Motion", value="Resume")
             await until(program="running")
             await peer.set("Speed", value=20.0)

@@ -143,7 +143,7 @@ def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
     table.stop("Somebody")
     table.wait(0.1, window)
     assert table.status == "stopped"
-    table.hub.clear_stop(window)
+    table.hub.move(window, cmd.ClearStop())
     table.hub.release_lease(window)
     table.programs.steer(window, Order.RUN)
     table.wait(0.5, window)
@@ -175,7 +175,7 @@ def test_what_was_asked_for_before_a_stop_is_not_done_after_it(table: Staged) ->
     table.panel.plan(SCRIPT, Order.RUN, window.actor)
     clicked = table.hub.at_scene(window.person.key, table.hub.gate.revocations)
     table.stop("Anybody")
-    table.hub.clear_stop(window)
+    table.hub.move(window, cmd.ClearStop())
     # A click that was on its way meanwhile.
     with pytest.raises(LeaseError, match="Do it again"):
         table.panel.plan(SCRIPT, Order.RUN, clicked)

@@ -144,7 +144,7 @@ def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> 
     table.arm.rest = replace(table.arm.rest, q=q, goal=q, motion=motion)
     with pytest.raises(LeaseError, match="clear the stop first"):
         performer.steer(window, Order.RUN)
-    table.hub.clear_stop(window)
+    table.hub.move(window, cmd.ClearStop())
     table.wait(1.0, window)
     assert table.status == "ready"
     assert not performer.running
@@ -255,7 +255,7 @@ def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> No
     table.arm.moves = False
     table.stop("Anybody")
     assert bar(table, window)["mood"] == "stopped"
-    table.hub.clear_stop(window)
+    table.hub.move(window, cmd.ClearStop())
     finish(table, window, slow)
     assert bar(table, window)["headline"] == "On target"
 
@@ -267,13 +267,13 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     performer.steer(owner, Order.RUN)
     hub.move(owner, cmd.Pause())
     assert isinstance(table.arm.commands[-1], cmd.Pause)
-    hub.set_speed(owner, 0.5)
+    hub.move(owner, cmd.SpeedScale(0.5))
     assert table.arm.share == 0.5
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        hub.set_speed(other, 1.0)
-    assert bar(table, owner)["orders"] == ["pause"]
+        hub.move(other, cmd.SpeedScale(1.0))
+    assert bar(table, owner)["orders"] == ["pause", "end"]
     assert bar(table, other)["orders"] == []
     # The page of the owner is loaded anew.
     hub.leave(owner)

@@ -34,6 +34,39 @@ def test_plan_is_followed_to_its_end(shoulder_arm: katana450.Arm, client: katana
     assert not state.moving
 
 
+@pytest.mark.parametrize("where", ["on the way to the start", "on the plan"])
+def test_stop_that_is_cleared_at_once_ends_the_run(
+    shoulder_arm: katana450.Arm, client: katana450.Client, server: AppServer, where: str
+) -> None:
+    plan = shoulder_arm.plan([2.0, -1.0, 1.4, 0.3, 0.0], [-2.0, -1.0, 1.4, 0.3, 0.0])
+    to_start = where == "on the way to the start"
+    client.joints(plan.end if to_start else plan.start)
+    refused: list[RefusedError] = []
+
+    def run() -> None:
+        with pytest.raises(RefusedError) as raised:
+            plan.run(client)
+        refused.append(raised.value)
+
+    running = threading.Thread(target=run)
+    running.start()
+    with katana450.connect(server.url, name="Onlooker") as onlooker:
+        for state in onlooker.states(50.0):
+            if abs(state.q[0] - plan.start[0]) < 3.5 if to_start else state.q[0] > -1.5:
+                break
+        # Both arrive together, on the connection that also carries the run.
+        client.tell(requests.Stop())
+        client.tell(requests.ClearStop())
+        running.join(60.0)
+        assert len(refused) == 1
+        assert "stopped" in str(refused[0])
+        at_rest = next(each for each in onlooker.states() if not each.moving)
+        assert at_rest.stopped is None
+        time.sleep(0.5)
+        assert onlooker.query(answers.State).q == at_rest.q
+        assert -1.9 < at_rest.q[0] < 1.9
+
+
 def test_stop_ends_the_run_and_nothing_moves_after_it(
     shoulder_arm: katana450.Arm, client: katana450.Client, server: AppServer
 ) -> None:

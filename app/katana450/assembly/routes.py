@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 import msgspec
 from starlette.applications import Starlette
@@ -27,6 +28,7 @@ from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import Admission
 from katana450.server.web.authenticator import Address, Authenticator
 from katana450.server.web.bodies import body_of
+from katana450.server.web.control_socket import PAGE
 from katana450.server.web.http_api import Api, RouteProvider
 from katana450.server.web.token_bucket import TokenBucket
 
@@ -100,7 +102,10 @@ def application(
         """The same as the button, for a page whose socket is gone."""
         visitor = _known(door, request)
         press = request.query_params.get("press", "")[:LONGEST_PRESS]
-        hub.stop(visiting(visitor, CommandChannel.PAGE), press or None)
+        actor = visiting(visitor, CommandChannel.PAGE)
+        if PAGE.fullmatch(name := request.query_params.get("page", "")):
+            actor = replace(actor, person=hub.person_of(visitor, name))
+        hub.stop(actor, press or None)
         return Response(status_code=204)
 
     async def health(_request: Request) -> Response:

@@ -101,17 +101,24 @@ class AsyncClient:
                     await self.tell(requests.Watch(hz=0.0))
 
     async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
-        """Ask for a motion and wait until the arm is at rest; how it stands then.
+        """Ask for a motion and wait until the arm is at rest; return its state then.
 
-        Its ``why`` is empty when all went as wished. Raises RefusedError when it was not begun or
-        was stopped, TimeoutError.
+        Its ``why`` is empty if the target was reached. Raises RefusedError if the motion was
+        refused, stopped or taken over, even where the stop is cleared already; TimeoutError after
+        ``seconds``.
         """
         done = await self.ask(request)
-        ticket = done.ticket if isinstance(done, answers.Done) else None
+        ticket = revocations = None
+        if isinstance(done, answers.Done):
+            ticket = done.ticket
+            # A program that is resumed ends by itself, which changes the driver too.
+            revocations = None if request.traits.for_program else done.revocations
         async with asyncio.timeout(seconds):
             async for state in self.states():
                 if state.stopped is not None:
                     raise RefusedError(state.stopped)
+                if revocations is not None and state.revocations != revocations:
+                    raise RefusedError("The arm was stopped or changed hands on the way.")
                 if state.ticket >= (ticket or 0) and not state.moving:
                     return state
         raise LostError("The server has hung up.")

@@ -89,8 +89,9 @@ class MotionPlan:
     def run(self, client: Client, dt: float = 0.02) -> State:
         """Drive the arm of a server along this plan; return its state once it rests at the end.
 
-        The arm first goes to the start, then follows the joint angles as a stream. A stop ends the
-        run: nothing of the plan is sent after the server has refused a command.
+        The arm first goes to the start, then follows the joint angles as a stream. A stop or a
+        change of driver ends the run, even if the stop is cleared at once: the server refuses the
+        rest of the plan.
 
         Args:
             client: a connection, from `katana450.connect`.

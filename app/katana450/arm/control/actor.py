@@ -40,8 +40,8 @@ class Actor:
     Attributes:
         person: the identity, to which the lease is given.
         channel: where the command was given.
-        seen: number of revocations (``CommandGate.revocations``) when the gesture was received;
-            None for a command that is handled on receipt.
+        seen: number of revocations (``CommandGate.revocations``) when the gesture was received, or
+            that an API program knows of; None for a command that is handled on receipt.
         grounds: why the command was accepted; None until ``CommandGate`` has accepted it.
     """
 

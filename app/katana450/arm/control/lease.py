@@ -97,6 +97,13 @@ class Lease:
             raise LeaseError("You have not asked for the arm.")
         return self._without(person)
 
+    def decline(self, holder: Person, person: Person) -> Self:
+        """Return the lease without the request of ``person``, which the holder declines."""
+        self._check_holds(holder)
+        if person not in self.waiting:
+            raise LeaseError("The request for the arm was withdrawn.")
+        return self._without(person)
+
     def hand_over(self, giver: Person, taker: Person, t: float) -> Self:
         """The holder gives the arm to ``taker``, who need not have asked."""
         self._check_holds(giver)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import ACCEPTED, Outcome, Reason, State, Verdict
+from katana450.arm.control.messages import told
+from katana450.arm.control.state import ACCEPTED, Outcome, PartRefusal, Reason, State, Verdict
 from katana450.arm.control.things import MOST, named
 from katana450.arm.control.transitions import Effect, effect_of
 
@@ -42,7 +43,7 @@ def take_all(
     for part in command.commands:
         state, part_outcome = take_all(take, state, part)
         outcomes.append(part_outcome)
-    return state, _merged(outcomes)
+    return state, _merged(command, outcomes)
 
 
 def refusal(state: State, command: cmd.Command) -> str:
@@ -94,11 +95,21 @@ def _held(state: State, name: str) -> str:
     return f"The gripper holds {name!r}: open it first."
 
 
-def _merged(parts: list[Outcome]) -> Outcome:
-    """Return the outcome of a batch of ``parts``: refused if all are."""
-    findings = tuple(found for part in parts for found in part.findings)
-    why = next((part.why for part in parts if part.why), "")
-    verdicts = {part.verdict for part in parts}
-    if len(verdicts) == 1:
-        return Outcome(verdicts.pop(), findings, why)
-    return Outcome(Verdict.LIMITED, findings, why) if verdicts else ACCEPTED
+def reason(refusal: Outcome) -> str:
+    """Return in words why a command is refused."""
+    return refusal.why or "; ".join(told(each) for each in refusal.findings) + "."
+
+
+def _merged(batch: cmd.Batch, outcomes: list[Outcome]) -> Outcome:
+    """Return the outcome of ``batch`` by those of its parts: refused if all are."""
+    findings = tuple(found for each in outcomes for found in each.findings)
+    refusals = tuple(
+        PartRefusal(part, type(command).__name__, reason(each))
+        for part, (command, each) in enumerate(zip(batch.commands, outcomes, strict=True))
+        if each.verdict is Verdict.REFUSED
+    )
+    if refusals and len(refusals) == len(outcomes):
+        why = " ".join(dict.fromkeys(each.why for each in refusals))
+        return Outcome(Verdict.REFUSED, findings, why, refusals)
+    limited = refusals or findings
+    return Outcome(Verdict.LIMITED, findings, refused=refusals) if limited else ACCEPTED

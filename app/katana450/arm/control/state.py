@@ -36,6 +36,7 @@ __all__ = [
     "Finding",
     "JointTarget",
     "Outcome",
+    "PartRefusal",
     "PoseTarget",
     "Reason",
     "State",
@@ -121,18 +122,35 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True)
+class PartRefusal:
+    """A refused part of a batch.
+
+    Attributes:
+        part: its place in the batch, from 0.
+        command: name of its class.
+        why: the reason in words.
+    """
+
+    part: int
+    command: str
+    why: str
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """What became of one command.
+    """The outcome of one command.
 
     Attributes:
         verdict: how far it takes effect.
         findings: what limits it.
-        why: the reason in words, where the verdict is not ACCEPTED and no finding says it.
+        why: the reason in words, where the verdict is REFUSED and no finding says it.
+        refused: the parts of a batch that take no effect.
     """
 
     verdict: Verdict = Verdict.ACCEPTED
     findings: tuple[Finding, ...] = ()
     why: str = ""
+    refused: tuple[PartRefusal, ...] = ()
 
 
 ACCEPTED = Outcome()

@@ -257,8 +257,9 @@ class FrontEnd:
             command = replace(command, t=MonotonicClock().now())
         with self._sending:
             if command.traits.safety:
-                # What has not gone yet is dead the moment it comes.
-                self.board.outcomes.note((each.number, DROPPED) for each in self._unsent)
+                # What has not gone yet is dropped; an earlier stop is fulfilled by this one.
+                unsent = (each for each in self._unsent if not each.command.traits.safety)
+                self.board.outcomes.note((each.number, DROPPED) for each in unsent)
                 self._unsent.clear()
             elif age > UNANSWERED:
                 raise InputError(

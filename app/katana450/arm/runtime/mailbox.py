@@ -83,10 +83,12 @@ class Mailbox:
         """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
         self._check(command)
         with self._lock:
-            replaced = []
+            replaced: list[int] = []
             if command.traits.safety:
-                # Never refused, and what waits before it is dead the moment it comes.
-                self._dropped += [ticket for each in self._of_waiting for ticket in each]
+                # Never refused, and what waits before it is dropped; an earlier stop is fulfilled.
+                for each, tickets in zip(self._waiting, self._of_waiting, strict=True):
+                    earlier = each.command.traits.safety
+                    (replaced if earlier else self._dropped).extend(tickets)
                 self._waiting, self._of_waiting = [], []
             elif self._waiting and command.replaces(self._waiting[-1].command):
                 self._waiting.pop()

@@ -5,22 +5,56 @@ from __future__ import annotations
 
 import msgspec
 
-from katana450.server.api.fields import VERSION, Id
+from katana450.server.api.fields import VERSION, Answer, Numbers
+from katana450.server.api.outcome_answers import Done, Finding, PartRefusal, Refused
+from katana450.server.api.scene_answers import (
+    Field,
+    Link,
+    Links,
+    Mesh,
+    Node,
+    Scene,
+    Thing,
+    Things,
+    Value,
+    Values,
+    World,
+)
 
-Numbers = list[float]
-
-
-class Answer(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    tag_field="is",
-    tag=str.lower,
-):
-    """Any of them; ``is`` is the name of the class in small letters, ``id`` that of the request."""
-
-    id: Id = None
+__all__ = [
+    "Answer",
+    "AnyAnswer",
+    "Arm",
+    "Branches",
+    "Choice",
+    "Done",
+    "Echo",
+    "Field",
+    "Finding",
+    "Ledger",
+    "Line",
+    "Link",
+    "Links",
+    "Loop",
+    "Margins",
+    "Mesh",
+    "Node",
+    "Numbers",
+    "PartRefusal",
+    "Progress",
+    "Refused",
+    "Scene",
+    "State",
+    "Thing",
+    "Things",
+    "Value",
+    "Values",
+    "Water",
+    "Welcome",
+    "World",
+    "decoded",
+    "encoded",
+]
 
 
 class Welcome(Answer, frozen=True, kw_only=True):
@@ -37,45 +71,10 @@ class Welcome(Answer, frozen=True, kw_only=True):
     api: int = VERSION
 
 
-class Done(Answer, frozen=True, kw_only=True):
-    """The request of that id is done. A command of the arm has a ``ticket``: it is in every state
-    whose ticket is no smaller. Its ``outcome``: accepted, limited by the ``findings``, or unknown
-    if the arm's process has not told within 1 s. ``rotation_misfit``, of a pose: the largest entry
-    of R^T R - I; the nearest rotation is used, and more than 1e-3 is refused."""
-
-    ticket: int | None = None
-    outcome: str | None = None
-    findings: tuple[Finding, ...] = ()
-    rotation_misfit: float | None = None
-
-
-class Refused(Answer, frozen=True, kw_only=True):
-    """Nothing has changed; ``why`` says why and what to do. ``retry`` [s]: ask again then."""
-
-    why: str
-    retry: float | None = None
-
-
 class Echo(Answer, frozen=True, kw_only=True):
     """To a sign of life."""
 
     n: int
-
-
-class Finding(msgspec.Struct, frozen=True, kw_only=True):
-    """One reason why the arm does not do what was wished.
-
-    ``said`` in words; ``amount`` in ``unit``, both null when there is none; ``axis`` counts from 1;
-    ``parts``: the two that are about to meet; ``seconds``: how long a stop takes.
-    """
-
-    reason: str
-    said: str
-    amount: float | None = None
-    unit: str | None = None
-    axis: int | None = None
-    parts: tuple[str, str] | None = None
-    seconds: float | None = None
 
 
 class Margins(msgspec.Struct, frozen=True, kw_only=True):
@@ -124,14 +123,6 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     why: str = ""
 
 
-class Value(msgspec.Struct, frozen=True, kw_only=True):
-    """What a field of a node of the VRML world is: a number, or as many as its type has."""
-
-    node: str
-    field: str
-    value: float | Numbers
-
-
 class State(Answer, frozen=True, kw_only=True):
     """What the arm does.
 
@@ -156,6 +147,7 @@ class State(Answer, frozen=True, kw_only=True):
         speed: share of full speed. holder: name of who holds the arm.
         stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
             newer than the request is stopped, then confirmed.
+        revocations: number of stops and of losses of the lease so far.
         windows: pages and programs that are open. water: of the cup; null where there is none.
         program: planned, running or run last. fields: of the VRML world that are watched.
     """
@@ -188,6 +180,7 @@ class State(Answer, frozen=True, kw_only=True):
     holder: str | None
     stopped: str | None
     stop: str | None
+    revocations: int
     age: float
     windows: int
     water: Water | None
@@ -283,92 +276,6 @@ class Loop(Answer, frozen=True, kw_only=True):
     late_p99: float
     late_most: float
     lost: int
-
-
-class Thing(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
-    ``fixed``: to the hand. ``colour``: null for its own."""
-
-    name: str
-    form: str
-    size: Numbers
-    T: list[Numbers]
-    can_be_held: bool
-    held: bool
-    mesh: str | None = None
-    scale: float = 1.0
-    colour: str | None = None
-    opacity: float = 1.0
-    hidden: bool = False
-    fixed: bool = False
-
-
-class Things(Answer, frozen=True, kw_only=True):
-    """All of them."""
-
-    things: list[Thing]
-
-
-class Values(Answer, frozen=True, kw_only=True):
-    """What the fields are that were asked for, in that order."""
-
-    values: list[Value]
-
-
-class Field(msgspec.Struct, frozen=True, kw_only=True):
-    """One of a node's; ``type`` as VRML97 calls it. ``settable``: by ``set``, else only read."""
-
-    field: str
-    type: str
-    value: float | Numbers
-    settable: bool
-
-
-class Node(msgspec.Struct, frozen=True, kw_only=True):
-    """A node of the VRML world by its DEF name, and what it is of: a joint, link or thing."""
-
-    node: str
-    kind: str
-    of: str
-    fields: list[Field]
-
-
-class World(Answer, frozen=True, kw_only=True):
-    """All that can be set and got by name. Lengths in m, angles in rad, z up."""
-
-    nodes: list[Node]
-
-
-class Link(msgspec.Struct, frozen=True, kw_only=True):
-    """Where a link is: ``T`` (4, 4) in the base frame."""
-
-    name: str
-    T: list[Numbers]
-
-
-class Links(Answer, frozen=True, kw_only=True):
-    """All of them, the base first."""
-
-    links: list[Link]
-
-
-class Mesh(Answer, frozen=True, kw_only=True):
-    """An uploaded file. ``key``: for ``place``. ``name``: its own, and of no thing there is.
-    ``said``: what was read. ``size``: along x, y, z [m]."""
-
-    key: str
-    name: str
-    said: str
-    size: Numbers
-    triangles: int
-
-
-class Scene(Answer, frozen=True, kw_only=True):
-    """A scene that was uploaded and can now be loaded. ``key``: for ``load``."""
-
-    key: str
-    things: list[str]
-    said: str
 
 
 AnyAnswer = (

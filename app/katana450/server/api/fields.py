@@ -1,4 +1,4 @@
-"""What requests are made of: what they have in common, and what their fields can be."""
+"""What requests and answers are made of: what they have in common, and their fields."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ MOST_JOINTS = 32
 Rates = tuple[float, float, float, float, float]
 """Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
 
+Numbers = list[float]
 Vector3 = tuple[float, float, float]
 Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
@@ -123,9 +124,24 @@ class Request(
 ):
     """Base of all requests; ``do`` is the name of the class as ``tag_of`` gives it.
 
-    Each class declares ``traits``.
+    Each class declares ``traits``. ``revocations``: of a state or an answer; a command is refused
+    if there was a stop or a change of driver since then.
     """
 
     traits: ClassVar[RequestTraits]
+
+    id: Id = None
+    revocations: Annotated[int, Meta(ge=0)] | None = None
+
+
+class Answer(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    tag_field="is",
+    tag=str.lower,
+):
+    """Base of all answers; ``is`` is the class name in lower case, ``id`` the request's."""
 
     id: Id = None

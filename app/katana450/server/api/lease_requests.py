@@ -1,4 +1,4 @@
-"""Requests about who holds the arm."""
+"""Requests about the lease, the right to drive the arm."""
 
 from __future__ import annotations
 
@@ -8,37 +8,51 @@ from katana450.server.api.fields import LEASE, Request, RequestTraits
 
 
 class Acquire(Request, frozen=True):
-    """Have the arm if nobody has it. A command by whoever holds nothing asks for this by itself."""
+    """Acquire the lease if it is free. A command does this by itself while the lease is free."""
 
     traits: ClassVar[RequestTraits] = LEASE
 
 
 class Take(Request, frozen=True):
-    """Have it even so: for admins."""
+    """Take the lease from its holder. For admins only."""
 
     traits: ClassVar[RequestTraits] = LEASE
 
 
 class Ask(Request, frozen=True):
-    """Ask whoever has it."""
+    """Ask the holder for the arm; the owner of the program that runs is asked for its program."""
 
     traits: ClassVar[RequestTraits] = LEASE
 
 
 class Withdraw(Request, frozen=True):
-    """Ask no more."""
+    """Withdraw the own request for the arm."""
 
     traits: ClassVar[RequestTraits] = LEASE
 
 
 class ReleaseLease(Request, frozen=True):
-    """Give up the arm, so that others can have it."""
+    """Release the lease, so that others can acquire it."""
 
     traits: ClassVar[RequestTraits] = LEASE
 
 
 class Give(Request, frozen=True, kw_only=True):
-    """Give it to the window or program of that number."""
+    """Give the arm to the window or program of that number.
+
+    The owner of the program that runs may do this too, which ends the program.
+    """
+
+    traits: ClassVar[RequestTraits] = LEASE
+
+    to: int
+
+
+class Decline(Request, frozen=True, kw_only=True):
+    """Decline the request for the arm of the window or program of that number.
+
+    For the holder of the arm, or the owner of the program that runs.
+    """
 
     traits: ClassVar[RequestTraits] = LEASE
 

@@ -36,6 +36,7 @@ from katana450.server.api.fields import (
 from katana450.server.api.lease_requests import (
     Acquire,
     Ask,
+    Decline,
     Give,
     ReleaseLease,
     Take,
@@ -75,6 +76,7 @@ __all__ = [
     "Attach",
     "Branch",
     "ClearStop",
+    "Decline",
     "EndDrag",
     "Fill",
     "Form",
@@ -256,6 +258,7 @@ AnyRequest = (
     | Withdraw
     | ReleaseLease
     | Give
+    | Decline
     | Jog
     | Speed
     | Joint

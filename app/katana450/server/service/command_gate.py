@@ -55,10 +55,11 @@ class CommandGate:
         self._jogged = -cmd.JOG_TIME
 
     def submit(self, command: cmd.Command, actor: Actor) -> int:
-        """Give ``command`` of ``actor`` to the arm; return its ticket, 0 without an arm.
+        """Give ``command`` of ``actor`` to the arm; return its ticket.
 
-        Raises LeaseError with the reason why ``actor`` may not give it now, and InputError for a
-        command that the arm cannot be given. Takes the lease for ``actor`` if it is free.
+        The ticket of a stop, or of clearing one, is 0 while there is no arm. Raises LeaseError with
+        the reason why ``actor`` may not give it now, and InputError for a command that the arm
+        cannot be given. Takes the lease for ``actor`` if it is free.
         """
         with self._lock:
             if isinstance(command, cmd.Stop):
@@ -68,8 +69,12 @@ class CommandGate:
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
                 raise LeaseError("The server itself does not move the arm.")
             granted = self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
+            clears = isinstance(command, cmd.ClearStop)
+            if not clears:
+                # Without an arm nothing can be done but to clear a stop.
+                self.present()
             ticket = 0 if self.arm is None else self.arm.deliver(command, granted)
-            if isinstance(command, cmd.ClearStop):
+            if clears:
                 self.stopped = None
             elif isinstance(command, cmd.Jog):
                 self._jogged = self._clock() if command.rates.any() else -cmd.JOG_TIME

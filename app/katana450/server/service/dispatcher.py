@@ -1,4 +1,4 @@
-"""Where requests are done, whichever way they come."""
+"""Dispatch of API requests from every channel: page, WebSocket, TCP, HTTP."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ BARE: dict[type[requests.Request], cmd.Command] = {
     requests.Hold: cmd.Hold(),
     requests.Pause: cmd.Pause(),
     requests.Resume: cmd.Resume(),
+    requests.ClearStop: cmd.ClearStop(),
 }
-"""What says all there is to say by its name."""
+"""Commands of the requests that have no fields."""
 
 
-ACCEPTED, UNKNOWN = Verdict.ACCEPTED.value, "unknown"
+ACCEPTED, UNKNOWN, REQUESTED = Verdict.ACCEPTED.value, "unknown", "requested"
 """Outcomes in answers that do not come from the arm's process."""
 
 OUTCOME_SECONDS = 1.0
-"""[s] Time in which the arm's process tells the outcome of a command; a tick takes 10 ms."""
+"""[s] Time in which the arm's process reports the outcome of a command; a tick takes 10 ms."""
 
 
 def driver_key(hub: Hub, window: Window) -> str:
@@ -46,19 +47,23 @@ def driver_key(hub: Hub, window: Window) -> str:
 
 
 class Dispatcher:
-    """Does what a window asks, or raises the LeaseError or InputError that says why not."""
+    """Executes requests on behalf of a window.
+
+    Raises LeaseError if it may not drive and InputError for an invalid request; neither changes
+    any state.
+    """
 
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
         self._placing = ObjectRequests(hub)
 
     def do(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
-        """The answer, once it is done. Whatever is asked is a sign of life.
+        """Execute ``request`` and return its answer. Counts as a heartbeat of ``window``.
 
         The outcome of a command may be still to come, see ``is_pending``.
 
-        What it costs is taken from ``budget``; raises BusyError when that is used up. A request
-        that is ``free`` costs nothing, nor does what steers the arm for whoever holds it.
+        The processor time is taken from ``budget``; raises BusyError when that is used up. A
+        ``free`` request costs nothing, and neither do commands of the driver.
         """
         question, driver = request.traits.question, driver_key(self._hub, window)
         free = request.traits.free or (driver and not question)
@@ -76,21 +81,22 @@ class Dispatcher:
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.Named(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
+            case requests.Stop(press=press):
+                # Waits for nothing: the states tell when the arm has confirmed it.
+                return _done(hub.stop(window.actor, press), REQUESTED)
         if isinstance(request, hub.runner.request_types):
             return hub.runner.handle(window, request)
-        if isinstance(request, requests.Set):
-            return answers.Done(ticket=hub.move(window, self._setting(request)))
         command = self._command(request)
         if command is None:
             self._arrange(window, request)
-            return answers.Done(outcome=ACCEPTED if request.traits.stream else None)
+            return answers.Done()
+        # Read before: a stop that comes in between is newer than the answer.
+        revocations = hub.gate.revocations
+        ticket = hub.move(window, command, request.revocations)
         # A stream is not held up by its answers, and what is planned first has no ticket yet.
-        at_once = request.traits.stream or command.traits.planned
-        return answers.Done(
-            ticket=hub.move(window, command),
-            outcome=ACCEPTED if at_once else None,
-            rotation_misfit=_misfit(request),
-        )
+        at_once = request.traits.stream or command.traits.planned or not ticket
+        done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
+        return msgspec.structs.replace(done, revocations=revocations)
 
     @staticmethod
     def is_pending(answer: answers.Answer) -> bool:
@@ -100,7 +106,7 @@ class Dispatcher:
         return answer.ticket is not None and answer.outcome is None
 
     async def concluded(self, pending: answers.Answer) -> answers.Answer:
-        """Return ``pending`` with what became of its command, once the arm's process has told.
+        """Return ``pending`` with the outcome of its command, once the arm's process reports it.
 
         A command that the session refuses becomes ``answers.Refused``.
         """
@@ -114,13 +120,9 @@ class Dispatcher:
         return serialize.concluded(pending, outcome)
 
     def _arrange(self, window: Window, request: requests.Request) -> None:
-        """What is about who drives, and how."""
+        """Execute a request about the lease, which is no command."""
         hub = self._hub
         match request:
-            case requests.Stop(press=press):
-                hub.stop(window.actor, press)
-            case requests.ClearStop():
-                hub.clear_stop(window)
             case requests.Acquire():
                 hub.acquire(window)
             case requests.Take():
@@ -133,13 +135,11 @@ class Dispatcher:
                 hub.release_lease(window)
             case requests.Give(to=number):
                 hub.hand_over(window, number)
-            case requests.Jog(rates=rates, frame=frame):
-                hub.jog(window, rates, frame)
-            case requests.Speed(value=value):
-                hub.set_speed(window, value)
+            case requests.Decline(to=number):
+                hub.decline(window, number)
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
-        """What the arm is told, where the request is one for the arm."""
+        """Return the command of ``request``; None for a request that is none."""
         if type(request) in BARE:
             return BARE[type(request)]
         match request:
@@ -149,26 +149,37 @@ class Dispatcher:
                 return cmd.SetJoints(np.array(q))
             case requests.Nudge(axis=axis, by=by):
                 return cmd.Nudge(axis - 1, by)
+            case requests.Jog(rates=rates, frame=frame):
+                return cmd.Jog(np.array(rates), frame)
+            case requests.Speed(value=value):
+                return cmd.SpeedScale(value)
             case requests.Servo(q=q, qd=qd):
                 return cmd.Servo(np.array(q), None if qd is None else np.array(qd))
+            case requests.Gripper(angle=angle):
+                return cmd.SetGripper(angle)
+            case requests.Set():
+                return self._setting(request)
+        return self._tool_command(request) or self._placing.command(request)
+
+    def _tool_command(self, request: requests.Request) -> cmd.Command | None:
+        """Return the command of a request about the tool; None for another request."""
+        match request:
             case requests.Pose(T=T, frame=frame):
                 return cmd.SetPose(self._in_shoulder(frame) @ se3.printed(T))
             case requests.Position(p=p, frame=frame):
                 return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
             case requests.Turn(pitch=pitch, roll=roll):
                 return cmd.TurnTool(pitch, roll)
-            case requests.Gripper(angle=angle):
-                return cmd.SetGripper(angle)
             case requests.Tool(name=name):
                 return cmd.SetTool(name)
             case requests.Read(reading=reading):
                 return cmd.SetReading(reading)
             case requests.Branch(shoulder=shoulder, elbow=elbow):
                 return cmd.TakeBranch(Branch(shoulder, elbow))
-        return self._placing.command(request)
+        return None
 
     def _setting(self, asked: requests.Set) -> cmd.Command:
-        """What sets fields of the VRML world, all at once."""
+        """Return the command that sets fields of the VRML world, all at once."""
         arm = self._hub.present()
         first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
         return arm.nodes.command(arm.state, (first, *asked.more))
@@ -204,6 +215,11 @@ class Dispatcher:
             case "world":
                 return arm.nodes.world(arm.state)
         return serialize.things(arm)
+
+
+def _done(ticket: int | None, outcome: str | None, misfit: float | None = None) -> answers.Done:
+    """Return the answer to a command; a ``ticket`` of 0 is none."""
+    return answers.Done(ticket=ticket or None, outcome=outcome, rotation_misfit=misfit)
 
 
 def _misfit(request: requests.Request) -> float | None:

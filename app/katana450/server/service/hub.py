@@ -7,18 +7,14 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
-from katana450.maths.kinematics.velocity import JogFrame
-from katana450.server.api.fields import Rates
 from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.command_gate import CommandGate
 from katana450.server.service.event_log import Journal
@@ -53,6 +49,13 @@ class Window:
         return Actor(self.person, self.channel)
 
 
+class Takeover(NamedTuple):
+    """The newest take-over of the arm. drivers: keys of the windows that drove until then."""
+
+    taker: Person
+    drivers: frozenset[str]
+
+
 class Hub:
     """The participants and their heartbeats. Times are in seconds."""
 
@@ -80,6 +83,7 @@ class Hub:
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
         self._presses = Presses()
+        self._takeover: Takeover | None = None
 
     @property
     def arm(self) -> Arm | None:
@@ -112,11 +116,7 @@ class Hub:
         it gives its commands.
         """
         key = key_of(visitor, page)
-        known = self._remembered.pop(key) if key in self._remembered else None
-        person, number = known or self._meet(key, visitor)
-        self._remembered[key] = (person, number)
-        while len(self._remembered) > REMEMBERED:
-            self._remembered.pop(next(iter(self._remembered)))
+        person, number = self._known(key, visitor)
         window = Window(person, number, tell, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
         self.beat(window)
@@ -187,17 +187,15 @@ class Hub:
 
     # What people do
 
-    def stop(self, actor: Actor, press: str | None = None) -> None:
-        """Anybody may, at any time. A ``press`` counts once, however often it is told."""
-        if self._presses.is_new(press):
-            self.gate.submit(cmd.Stop(), actor)
+    def stop(self, actor: Actor, press: str | None = None) -> int:
+        """Stop the arm for ``actor``, who may be anybody; return the ticket.
 
-    def clear_stop(self, window: Window) -> None:
-        """End a stop; the arm stays where it is until somebody moves it afresh."""
-        self.gate.submit(cmd.ClearStop(), window.actor)
+        A repeated ``press`` counts once: it changes nothing, and the ticket is 0.
+        """
+        return self.gate.submit(cmd.Stop(), actor) if self._presses.is_new(press) else 0
 
     def may_clear_stop(self, window: Window) -> bool:
-        """Whether ``clear_stop`` is not refused to the window."""
+        """Return whether the window may clear a stop."""
         holder = self.lease.holder
         return window.person.role.may_drive and holder in (None, window.person)
 
@@ -205,7 +203,11 @@ class Hub:
         self.gate.acquire(window.person)
 
     def take(self, window: Window) -> None:
+        driving = [
+            each.person.key for each in self.windows if self.giver(each) == self.lease.holder
+        ]
         self.gate.change(lambda lease, t: lease.take(window.person, t), window.actor)
+        self._takeover = Takeover(window.person, frozenset(driving))
 
     def request(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.request(window.person))
@@ -213,33 +215,50 @@ class Hub:
     def withdraw(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.withdraw(window.person))
 
+    def taken_by(self, window: Window) -> str | None:
+        """Return who took the arm over from ``window`` and still holds it."""
+        takeover = self._takeover
+        if takeover is None or window.person.key not in takeover.drivers:
+            return None
+        return takeover.taker.name if self.lease.holder == takeover.taker else None
+
     def release_lease(self, window: Window) -> None:
         self.gate.change(lambda lease, _: lease.release(window.person), window.actor)
+        self._takeover = None
 
     def hand_over(self, window: Window, number: int) -> None:
-        """To the window of that number."""
-        taker = next((each for each in self.windows if each.number == number), None)
-        if taker is None:
-            raise LeaseError("They have closed their window.")
+        """Give the arm to the window of that number; a program of ``window`` that holds it ends."""
+        taker = self._numbered(number)
         self.gate.change(
-            lambda lease, t: lease.hand_over(window.person, taker.person, t), window.actor
+            lambda lease, t: lease.hand_over(self.giver(window), taker.person, t), window.actor
         )
+
+    def decline(self, window: Window, number: int) -> None:
+        """Decline the request for the arm of the window of that number, and tell it."""
+        asker = self._numbered(number)
+        self.gate.change(lambda lease, _: lease.decline(self.giver(window), asker.person))
+        asker.tell({"is": "refused", "why": f"{window.person.name} declined your request."})
+
+    def giver(self, window: Window) -> Person:
+        """Return as whom ``window`` may give the arm away: as its program, if that holds it."""
+        program = self.gate.program
+        owns = program is not None and program.owner == window.person.key
+        return program.person if program is not None and owns else window.person
+
+    def _numbered(self, number: int) -> Window:
+        found = next((each for each in self.windows if each.number == number), None)
+        if found is None:
+            raise LeaseError("That window or program is gone.")
+        return found
 
     def beat(self, window: Window) -> None:
         """A message of the window is being handled: a sign of life as of when it was received."""
         window.heartbeat.note()
         self._hear()
 
-    def jog(self, window: Window, rates: Rates, frame: JogFrame) -> None:
-        """Go with ``rates`` until the next jog, at most for JOG_TIME."""
-        self.move(window, cmd.Jog(np.array(rates), frame))
-
-    def move(self, window: Window, command: cmd.Command) -> int:
-        """Submit ``command`` of ``window``; return its ticket."""
-        return self.gate.submit(command, window.actor)
-
-    def set_speed(self, window: Window, speed: float) -> None:
-        self.move(window, cmd.SpeedScale(speed))
+    def move(self, window: Window, command: cmd.Command, seen: int | None = None) -> int:
+        """Submit ``command`` of ``window``; return its ticket. ``seen``: see ``Actor``."""
+        return self.gate.submit(command, replace(window.actor, seen=seen))
 
     # What time does
 
@@ -283,6 +302,18 @@ class Hub:
             self.gate.protect(f"{holder.name} {why} while the arm moved.")
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
+
+    def person_of(self, visitor: Identity, page: str) -> Person:
+        """Return who speaks for ``page``, whether or not its control socket is open now."""
+        return self._known(key_of(visitor, page), visitor)[0]
+
+    def _known(self, key: str, visitor: Identity) -> tuple[Person, int]:
+        """Return person and number of the page of that key; a new page gets new ones."""
+        known = self._remembered.pop(key, None) or self._meet(key, visitor)
+        self._remembered[key] = known
+        while len(self._remembered) > REMEMBERED:
+            self._remembered.pop(next(iter(self._remembered)))
+        return known
 
     def _meet(self, key: str, visitor: Identity) -> tuple[Person, int]:
         self._numbers += 1

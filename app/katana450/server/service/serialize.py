@@ -12,6 +12,7 @@ from katana450.arm.control.choices import Choice
 from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.messages import sentence, told
+from katana450.arm.control.outcome import reason
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
 from katana450.arm.robot.mounted_arm import MountedArm
@@ -24,6 +25,7 @@ from katana450.maths.kinematics.velocity import tool_speed
 from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
+from katana450.server.api.fields import tag_of
 from katana450.server.service.derived import once
 from katana450.server.service.event_log import UNITS, Line
 from katana450.server.service.hub import Hub
@@ -47,10 +49,16 @@ def finding(found: control.Finding) -> answers.Finding:
 def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | answers.Refused:
     """Return ``done`` with the outcome of its command, or the refusal that this is."""
     if outcome.verdict is control.Verdict.REFUSED:
-        why = outcome.why or "; ".join(told(each) for each in outcome.findings) + "."
-        return answers.Refused(id=done.id, why=why)
-    findings = tuple(finding(each) for each in outcome.findings)
-    return msgspec.structs.replace(done, outcome=outcome.verdict.value, findings=findings)
+        return answers.Refused(id=done.id, why=reason(outcome))
+    return msgspec.structs.replace(
+        done,
+        outcome=outcome.verdict.value,
+        findings=tuple(finding(each) for each in outcome.findings),
+        refused=tuple(
+            answers.PartRefusal(part=each.part + 1, command=tag_of(each.command), why=each.why)
+            for each in outcome.refused
+        ),
+    )
 
 
 def state(hub: Hub) -> answers.State:
@@ -64,6 +72,7 @@ def state(hub: Hub) -> answers.State:
         holder=None if holder is None else holder.name,
         stopped=None if stopped is None else stopped.why,
         stop=None if stopped is None else stopped.stage,
+        revocations=hub.gate.revocations,
         age=arm.age,
         windows=len(hub.windows),
         program=hub.runner.progress(),
@@ -103,6 +112,7 @@ def _state(arm: Arm, snapshot: Snapshot) -> answers.State:
         holder=None,
         stopped=None,
         stop=None,
+        revocations=0,
         age=0.0,
         windows=0,
         water=water(arm.pouring, now),

@@ -63,6 +63,10 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
     """The part that is its own."""
     person, lease = window.person, hub.lease
     mine = lease.holder == person
+    # The owner of a program decides while the program drives.
+    decides = hub.giver(window) == lease.holder
+    program = hub.runner.progress()
+    taker = hub.taken_by(window)
     age = hub.age(window)
     clears = hub.may_clear_stop(window)
     other = lease.holder.name if lease.holder is not None else "whoever may drive"
@@ -77,13 +81,15 @@ def of(hub: Hub, window: Window) -> dict[str, Any]:
         "asking": [
             {"number": each.number, "name": each.person.name}
             for each in hub.windows
-            if mine and each.person in lease.waiting
+            if decides and each.person in lease.waiting
         ],
         "others": [
             {"number": each.number, "name": each.person.name}
             for each in hub.windows
             if mine and each.person != person and each.person.role.may_drive
         ],
+        "taken": "" if taker is None else f"{taker} took over from you.",
+        "planning": program is not None and program.status == "planning",
         "orders": list(hub.runner.orders(window)) if hub.arm is not None else [],
         "age": round(age, 1) if age >= AGE_WORTH_TELLING else 0,
     }

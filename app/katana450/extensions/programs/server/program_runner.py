@@ -12,7 +12,7 @@ from contextlib import suppress
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.state import State
+from katana450.arm.control.state import State, Verdict
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
 from katana450.extensions.programs.bench import PlanContext
@@ -91,7 +91,9 @@ class ProgramRunner(Runner):
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(window, text, more=more, speed=speed)
             case requests.Steer(order=order):
-                self.steer(window, order)
+                if ticket := self.steer(window, order):
+                    return answers.Done(ticket=ticket)
+                return answers.Done(outcome=Verdict.ACCEPTED.value)
         return answers.Done()
 
     def then(self, order: Order | None) -> None:
@@ -138,47 +140,48 @@ class ProgramRunner(Runner):
         self._owner, self._run, self._then = window, None, None
         self._seen = self.hub.clock()
 
-    def steer(self, window: Window, order: Order) -> None:
+    def steer(self, window: Window, order: Order) -> int | None:
         """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
 
         While it is planned, RUN and STEP are done as soon as it is, PAUSE and RESUME decide whether
         it then starts paused, and END cancels the planning.
+
+        Return the ticket of the command that this gives the arm now; None for none.
         """
         self._check_may_drive(window.person)
         planning = self._planning
         if planning is not None and planning.busy:
             self._check_owns(window.person)
-            self._steer_planning(planning, window, order)
-            return
+            return self._steer_planning(planning, window, order)
         if order in (Order.RUN, Order.STEP) and not self.running:
-            self._begin(window, order)
-            return
+            return self._begin(window, order)
         if not self.running or self._run is None:
             raise LeaseError("No program runs.")
         self._check_owns(window.person)
         match order:
             case Order.RUN | Order.RESUME:
-                self._tell(cmd.Resume())
+                return self._tell(cmd.Resume())
             case Order.STEP:
                 self._run, commands = runner.stepping(self._run)
-                self._tell(*commands)
+                return self._tell(*commands)
             case Order.PAUSE:
-                self._tell(cmd.Pause())
+                return self._tell(cmd.Pause())
             case Order.END:
-                self._end(f"{window.person.name} ended it.")
+                return self._end(f"{window.person.name} ended it.")
 
-    def _steer_planning(self, planning: Planning, window: Window, order: Order) -> None:
+    def _steer_planning(self, planning: Planning, window: Window, order: Order) -> int | None:
         match order:
             case Order.RUN | Order.STEP:
                 self.hub.gate.check_not_stopped()
                 self._then, planning.note = order, ""
             case Order.PAUSE:
-                self.hub.move(window, cmd.Pause())
+                return self.hub.move(window, cmd.Pause())
             case Order.RESUME:
-                self.hub.move(window, cmd.Resume())
+                return self.hub.move(window, cmd.Resume())
             case Order.END:
                 self._then = None
                 planning.cancel(f"{window.person.name} cancelled the planning.")
+        return None
 
     def stopped(self) -> None:
         self._forget_run("STOP was pressed while it was planned")
@@ -278,7 +281,7 @@ class ProgramRunner(Runner):
             assert self._planning is not None
             self._planning.refused = str(error)
 
-    def _begin(self, window: Window, order: Order) -> None:
+    def _begin(self, window: Window, order: Order) -> int | None:
         """Run the program that is planned; where the arm or the scene is not as it was planned for,
         plan it anew first."""
         planning, hub = self._planning, self.hub
@@ -295,7 +298,7 @@ class ProgramRunner(Runner):
                 hub.lease.acquire(window.person, hub.clock())
             self._plan(window, planning.text, planning.speed, changed)
             self._then = order
-            return
+            return None
         planning.refused, planning.note = None, ""
         program = planning.program
         visitor = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
@@ -309,7 +312,7 @@ class ProgramRunner(Runner):
                 hub.acquire(joined)
             # What was wanted before is over; a pause lasts until somebody resumes. This also finds
             # out whether the arm is stopped.
-            hub.move(joined, cmd.Hold())
+            ticket = hub.move(joined, cmd.Hold())
         except LeaseError:
             hub.leave(joined, for_good=True)
             raise
@@ -319,11 +322,15 @@ class ProgramRunner(Runner):
         self._allowed = 1.0
         self._run = Run(self._seen, single=order is Order.STEP)
         log.info("%s runs the program %s.", window.person.name, program.name)
+        return ticket
 
-    def _tell(self, *commands: cmd.Command) -> None:
+    def _tell(self, *commands: cmd.Command) -> int | None:
+        """Give ``commands`` to the arm; return the ticket of the last."""
         assert self._self is not None
+        ticket = None
         for command in commands:
-            self.hub.move(self._self, self._as_allowed(command))
+            ticket = self.hub.move(self._self, self._as_allowed(command))
+        return ticket
 
     def _as_allowed(self, command: cmd.Command) -> cmd.Command:
         """``command``, no faster than a person has allowed since the program began."""
@@ -332,13 +339,15 @@ class ProgramRunner(Runner):
         self._commanded = min(command.value, self._allowed)
         return cmd.SpeedScale(self._commanded)
 
-    def _end(self, why: str) -> None:
+    def _end(self, why: str) -> int | None:
         assert self._run is not None
         self._run, commands = runner.stopped(self._run, why)
+        ticket = None
         # A stopped arm takes no commands, nor does one that does not answer.
         with suppress(LeaseError, InputError):
-            self._tell(*commands)
+            ticket = self._tell(*commands)
         self._leave_with(Phase.STOPPED, why)
+        return ticket
 
     def _leave_with(self, phase: Phase, why: str) -> None:
         """Give up the arm, which is at rest or comes to it."""

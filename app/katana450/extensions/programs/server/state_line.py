@@ -57,4 +57,4 @@ def orders(
     pause = () if stopped else (Order.RESUME if state.paused else Order.PAUSE,)
     if program.status == Stage.PLANNING.value:
         return (*(pause if waits else ()), Order.END)
-    return pause if program.status in RUNS else ()
+    return (*pause, Order.END) if program.status in RUNS else ()

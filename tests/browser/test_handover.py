@@ -1,0 +1,75 @@
+"""The arm changes hands: what the pages of those who had it, have it and want it show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser.conftest import OpenPage
+from tests.browser.page import ViserPage
+from tests.browser.server import APP, AppServer
+from tests.browser.test_gateway import Truth, bar
+
+SCRIPT = """\
+name: Wave
+speed: 0.2
+steps:
+  - joints: [100, -60, 85, 8, 0]
+  - joints: [-100, -60, 85, 8, 0]
+"""
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[AppServer]:
+    (tmp_path / "Wave.yaml").write_text(SCRIPT)
+    with AppServer((*APP, "--programs", str(tmp_path))) as server:
+        yield server
+
+
+def shown(page: ViserPage, *labels: str, within: str) -> None:
+    buttons = page.page.locator(f"#{within} button")
+    page.wait_until(lambda: buttons.all_inner_texts() == list(labels), f"{labels}", seconds=30.0)
+
+
+def run(page: ViserPage) -> None:
+    page.click_button("Run")
+    page.wait_until(lambda: "Wave, step" in bar(page, "headline"), "the program", seconds=60.0)
+
+
+def test_a_program_is_ended_in_the_bar_and_its_owner_decides_who_drives_next(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    truth = Truth(server)
+    owner, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
+    me, they = (bar(each, "name").partition(",")[0] for each in (owner, other))
+    owner.frame.get_by_text("Programs", exact=True).click()
+    owner.choose("Script", "Wave")
+    run(owner)
+    shown(owner, "Pause", "End", within="orders")
+    shown(other, within="orders")
+    other.press_in_bar("Request")
+    shown(owner, "Allow", "Refuse", within="acts")
+    assert bar(owner, "name") == f"{they} asks for it"
+    owner.keep(artefacts / "handover-request.png")
+    owner.press_in_bar("Refuse")
+    other.wait_until(lambda: bar(other, "toast") == f"{me} declined your request.", "the refusal")
+    assert truth.status()["holder"] == "Wave"
+    other.press_in_bar("Request")
+    shown(owner, "Allow", "Refuse", within="acts")
+    owner.press_in_bar("Allow")
+    other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
+    assert truth.status()["program"]["status"] == "stopped"
+    shown(owner, within="orders")
+    owner.press_in_bar("Take over")
+    why = f"{me} took over from you."
+    other.wait_until(lambda: why in bar(other, "why"), why)
+    other.keep(artefacts / "handover-taken.png")
+    run(owner)
+    owner.page.locator("#orders").get_by_role("button", name="End", exact=True).click()
+    owner.wait_until(lambda: truth.status()["program"]["status"] == "stopped", "the end")
+    assert truth.status()["program"]["why"] == f"{me} ended it."
+    truth.wait(5.0, moving=False, stopped=None)
+    assert owner.errors == []
+    assert other.errors == []

@@ -1,0 +1,162 @@
+"""A page whose server is killed, whose line falls silent, or that is reloaded in mid-drag."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from tests.browser.conftest import OpenPage
+from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.test_app import Robot
+from tests.browser.test_gateway import MOVE, Truth, bar, camera, clear_stop, take
+from tests.gateway.slow_link import SlowLink
+
+
+def test_a_killed_server_is_told_at_once_and_the_page_comes_back(
+    open_page: OpenPage, artefacts: Path
+) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        robot = Robot(page)
+        started = camera(page)
+        page.page.mouse.move(300, 500)
+        page.page.mouse.down()
+        page.page.mouse.move(420, 560, steps=5)
+        page.page.mouse.up()
+        page.page.mouse.wheel(0, 300)
+        page.page.wait_for_timeout(800)
+        looked = camera(page)
+        assert not np.allclose(looked, started, atol=0.02)
+        server.kill()
+        killed = time.monotonic()
+        page.page.wait_for_selector("#banner.lost")
+        told = time.monotonic() - killed
+        page.keep(artefacts / "gateway-lost.png")
+        assert "No line" in bar(page, "link")
+        assert bar(page, "headline") == "Out of touch"
+        assert told < 1.0
+        robot.since = time.time()
+        server.restart()
+        back = time.monotonic()
+        page.page.wait_for_selector("#banner", state="hidden")
+        page.wait_until(lambda: page.connected, "viser to come back")
+        page.wait_until(lambda: bar(page, "headline") != "Out of touch", "the state to be told")
+        print(f"told after {told:.2f} s, back after {time.monotonic() - back:.2f} s")
+        page.wait_ready(("/arm", MOVE))
+        robot.settle()
+        # viser starts from its first view, and the camera is brought back from there.
+        page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
+        page.page.wait_for_timeout(1500)
+        assert np.allclose(camera(page), looked, atol=2e-3)
+        page.drag_arrow(MOVE, "z", 0.03)
+        robot.settle()
+
+
+LATE_RESET = """() => {
+  const { camera } = __viserMutable;
+  const kept = camera.position.clone();
+  let away = false;
+  window.wasReset = false;
+  const timer = setInterval(() => {
+    const distance = camera.position.distanceTo(kept);
+    away ||= distance > 0.05;
+    if (!away || distance > 1e-3) return;
+    clearInterval(timer);
+    // viser has told by then that the camera is back.
+    setTimeout(() => {
+      __viserMutable.resetCameraPose(false);
+      window.wasReset = true;
+    }, 300);
+  }, 10);
+}"""
+"""Do once more what viser does when the scene is there, but after the camera was brought back."""
+
+
+def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
+    with AppServer() as server:
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        page.page.mouse.move(300, 500)
+        page.page.mouse.down()
+        page.page.mouse.move(420, 560, steps=5)
+        page.page.mouse.up()
+        page.page.wait_for_timeout(800)
+        looked = camera(page)
+        page.frame.evaluate(LATE_RESET)
+        server.restart()
+        page.wait_until(lambda: page.frame.evaluate("wasReset"), "the reset", seconds=60.0)
+        page.page.wait_for_timeout(2000)
+        assert np.allclose(camera(page), looked, atol=2e-3)
+        # Who turns the camera then has it.
+        page.page.mouse.down()
+        page.page.mouse.move(300, 500, steps=5)
+        page.page.mouse.up()
+        page.page.wait_for_timeout(2000)
+        assert not np.allclose(camera(page), looked, atol=0.02)
+
+
+def test_a_line_that_falls_silent_is_told_and_the_arm_stops(open_page: OpenPage) -> None:
+    with AppServer(ATTENTIVE_APP) as server, SlowLink(server.port, 1e9) as line:
+        truth = Truth(server)
+        page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
+        page.type_number("Axis 1", -150.0)
+        truth.wait(mood="moving")
+        scene = page.page.locator("#scene")
+        place = scene.bounding_box()
+        line.cut = True
+        took = truth.wait(1.0, mood="stopped")
+        assert "fell silent while the arm moved" in truth.status()["stopped"]
+        page.page.wait_for_selector("#banner:not([hidden])", timeout=2500)
+        # What is true of a line that is only silent, and nothing shifts the scene in the hand.
+        assert bar(page, "banner") == "Nothing heard from the arm: what you see is old."
+        assert scene.bounding_box() == place
+        truth.wait(5.0, holder=None)
+        line.cut = False
+        page.page.wait_for_selector("#banner", state="hidden", timeout=10_000)
+        clear_stop(page, truth)
+        assert page.errors == []
+    print(f"stopped {1e3 * took:.0f} ms after the line was cut")
+
+
+SLOW = 0.05
+"""Fraction of full speed at which the arm still moves when a page is back."""
+
+
+def test_reload_in_mid_drag_stops_the_arm_and_says_why(
+    open_page: OpenPage, artefacts: Path
+) -> None:
+    with AppServer(ATTENTIVE_APP) as server:
+        truth = Truth(server)
+        page = open_page(server.url, nodes=("/arm", MOVE))
+        take(page)
+        page.type_number("Speed", 100 * SLOW)
+        truth.wait(speed=SLOW)
+        grip = page.grip_arrow(MOVE, "z")
+        grip.__enter__()
+        grip.sweep(0.1, 4)
+        truth.wait(moving=True, stopped=None)
+        name = truth.status()["holder"]
+        goal = truth.status()["goal"]
+        # The hand still holds the handle: its drag never ends.
+        page.page.reload(wait_until="commit")
+        truth.wait(5.0, stop="confirmed")
+        lost = f"{name} lost the connection while the arm moved."
+        silent = f"{name} fell silent while the arm moved."
+        assert truth.status()["stopped"] in (lost, silent)
+        truth.wait(5.0, moving=False)
+        rest = truth.status()["q"]
+        assert not np.allclose(rest, goal, atol=1e-3)
+        page.page.mouse.up()
+        page.page.locator("#why", has_text=truth.status()["stopped"]).wait_for()
+        assert bar(page, "headline") == "Stopped"
+        assert "Nothing moves until" in bar(page, "why")
+        page.keep(artefacts / "reloaded-in-mid-drag.png")
+        page.page.wait_for_timeout(1500)
+        assert truth.status()["q"] == rest
+        # Clearing the stop begins no motion either.
+        page.page.locator("#clear-stop").click()
+        truth.wait(stopped=None)
+        page.page.wait_for_timeout(1500)
+        assert truth.status()["q"] == rest
+        assert page.errors == []

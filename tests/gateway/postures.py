@@ -1,0 +1,8 @@
+"""Joint angles that tests of the gateway drive to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
+THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))

@@ -1,0 +1,150 @@
+"""Motions and objects that a program asks a real server for."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.weight import loads_of
+from katana450.client import Client, RefusedError
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.statics import holding_torques
+from katana450.maths.kinematics.velocity import limit_distances
+from katana450.server.api import answers, requests
+from katana450.server.api.fields import Matrix4
+from tests.gateway.postures import READY, THERE
+
+
+def test_a_program_drives_the_joints_and_knows_when_they_are_there(
+    program: Client, arm: MountedArm
+) -> None:
+    there = program.joints(THERE)
+    assert there.status == "ok"
+    assert there.why == ""
+    np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.array(there.T), forward(arm.chain, THERE), rtol=0, atol=1e-12)
+    assert there.holder == program.welcome.name == "Test"
+    described = program.query(answers.Arm)
+    assert described.joints == list(arm.chain.names)
+    np.testing.assert_array_equal(described.ready, READY)
+    np.testing.assert_array_equal(described.T_base_shoulder, arm.T_base_shoulder)
+
+
+@pytest.mark.parametrize("frame", list(requests.Frame))
+def test_a_pose_may_be_in_either_frame(
+    program: Client, arm: MountedArm, frame: requests.Frame
+) -> None:
+    T = forward(arm.chain, THERE)
+    asked = T if frame is requests.Frame.SHOULDER else arm.T_base_shoulder @ T
+    there = program.go(requests.Pose(T=asked.tolist(), frame=frame))
+    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=1e-9)
+    p = asked[:3, 3] + [0.0, 0.0, 0.02]
+    there = program.go(requests.Position(p=tuple(p), frame=frame))
+    np.testing.assert_allclose(np.array(there.T)[:3, 3], T[:3, 3] + [0, 0, 0.02], rtol=0, atol=1e-9)
+    assert there.pitch is not None
+    there = program.go(requests.Turn(pitch=there.pitch, roll=0.25))
+    assert there.roll == pytest.approx(0.25, abs=1e-12)
+
+
+def test_what_the_arm_cannot_do_comes_with_its_reason(program: Client) -> None:
+    there = program.go(requests.Position(p=(0.9, 0.0, 0.0)))
+    assert there.status == "limited"
+    assert there.findings[0].reason == "out of reach"
+    assert there.findings[0].unit == "m"
+    assert there.findings[0].amount == pytest.approx(
+        0.9 - math.hypot(*np.array(there.T)[:3, 3]), abs=0.02
+    )
+    with pytest.raises(RefusedError, match="There is no tool 'spoon'; this arm has"):
+        program.ask(requests.Tool(name="spoon"))
+    with pytest.raises(RefusedError, match="5 joints, the command 3"):
+        program.ask(requests.Joints(q=[0.0, 0.0, 0.0]))
+    skewed = ((1.0, 0.0, 0.0, 0.3), (0.0, 1.0, 0.5, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
+    with pytest.raises(RefusedError, match=r"[Rr]otation"):
+        program.ask(requests.Pose(T=skewed))
+
+
+def test_a_state_tells_what_follows_from_the_posture(
+    program: Client, robot: Robot, arm: MountedArm
+) -> None:
+    q = THERE + np.array((0.3, 0.0, 0.0, 0.0, 0.0))
+    program.joints(q)
+    time.sleep(0.3)
+    state = program.query(answers.State)
+    assert state.told > state.t + 0.2
+    assert (state.setpoint, state.tool_speed) == (state.q, 0.0)
+    assert (state.touching, state.held) == ([], None)
+    assert state.holding == pytest.approx(holding_torques(arm.chain, q, loads_of(robot)))
+    distances = limit_distances(arm.chain, q)
+    assert state.margins is not None
+    assert state.margins.limit == pytest.approx(distances.min())
+    assert state.margins.axis == distances.argmin() + 1
+    assert state.margins.clearance is not None
+    assert state.margins.clearance > 0.005
+    program.tell(requests.Joints(q=THERE.tolist()))
+    deadline = time.monotonic() + 5.0
+    while (program.query(answers.State).tool_speed or 0.0) < 0.05:
+        assert time.monotonic() < deadline
+
+
+def test_another_branch_is_taken_on_a_way_that_is_clear(program: Client) -> None:
+    program.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
+    there = program.go(requests.Branch(shoulder="front", elbow="down"))
+    assert there.branch == ("front", "down")
+    assert there.status == "ok"
+    back = program.go(requests.Branch(shoulder="front", elbow="up"))
+    assert back.branch == ("front", "up")
+    # A STOP while the way is being worked out ends that too.
+    program.ask(requests.Branch(shoulder="front", elbow="down"))
+    program.ask(requests.Stop())
+    program.ask(requests.ClearStop())
+    time.sleep(2.0)
+    rest = program.query(answers.State)
+    assert not rest.moving
+    assert rest.q == back.q
+
+
+def _rows(T: npt.ArrayLike) -> Matrix4:
+    rows: Matrix4 = msgspec.convert(np.asarray(T).tolist(), Matrix4)
+    return rows
+
+
+def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> None:
+    known = {each.name: each for each in program.query(answers.Things).things}
+    assert set(known) == {"cup", "basin"}
+    T = np.array(known["cup"].T)
+    T[:2, 3] = (0.1, -0.45)
+    program.ask(requests.Place(name="cup", T=_rows(T)))
+    wall = np.eye(4)
+    wall[:3, 3] = (0.25, 0.3, 0.0)
+    program.ask(
+        requests.Place(name="wall", T=_rows(wall), form=requests.Form.BOX, size=[0.05, 0.3, 0.5])
+    )
+    met = program.go(requests.Joint(axis=1, value=1.2))
+    assert met.status == "blocked"
+    assert "wall" in (met.findings[0].parts or ())
+    assert "wall" in met.why
+    program.ask(requests.Remove(name="wall"))
+    assert program.go(requests.Joint(axis=1, value=1.2)).status == "ok"
+    now = {each.name: each for each in program.query(answers.Things).things}
+    assert set(now) == {"cup", "basin"}
+    np.testing.assert_array_equal(now["cup"].T, T)
+    beyond_the_table = T.copy()
+    beyond_the_table[:2, 3] = (1.5, 0.0)
+    for wrong in (
+        requests.Place(name="ball", T=_rows(wall)),
+        requests.Place(name="ball", T=_rows(wall), form=requests.Form.BOX, size=[0.1]),
+        requests.Place(name="table", T=_rows(wall)),
+        requests.Place(name="wrist_link", T=_rows(wall), form=requests.Form.SPHERE, size=[0.1]),
+        requests.Place(name="cup", T=_rows(np.zeros((4, 4)))),
+        requests.Place(name="cup", T=_rows(beyond_the_table)),
+    ):
+        with pytest.raises(RefusedError):
+            program.ask(wrong)
+    program.ask(requests.Place(name="cup", T=_rows(known["cup"].T)))

@@ -1,0 +1,60 @@
+"""STOP and silence while a program drives the arm of a real server."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+
+import pytest
+
+from katana450.client import AsyncClient, Client, RefusedError, aconnect, connect
+from katana450.server.api import answers, requests
+from tests.browser.server import AppServer
+from tests.gateway.client import ask, websocket
+from tests.gateway.postures import READY, THERE
+
+
+def test_stop_is_anybodys_and_ends_what_a_program_does(server: AppServer, program: Client) -> None:
+    program.ask(requests.Speed(value=0.2))
+    program.ask(requests.Joints(q=THERE.tolist()))
+    with connect(server.url, "Watcher") as other, pytest.raises(RefusedError, match=r"Test.*holds"):
+        other.ask(requests.Home())
+    status, _, _ = ask(f"{server.url}/api/v1/stop", data=b"", X_Name="bystander")
+    assert status == 204
+    assert program.query(answers.State).stopped == "bystander pressed STOP."
+    with pytest.raises(RefusedError, match="clear the stop first"):
+        program.joints(READY)
+    while (rest := program.query(answers.State)).moving:
+        time.sleep(0.02)
+    program.ask(requests.ClearStop())
+    time.sleep(0.3)
+    assert program.query(answers.State).q == rest.q
+    ledger = program.query(answers.Ledger)
+    assert any(line.who == "bystander" and line.began for line in ledger.lines)
+
+
+def test_a_program_that_falls_silent_stops_the_arm(server: AppServer) -> None:
+    async def act() -> None:
+        async with (
+            websocket(server.url, "/api/v1/socket?name=Frozen") as silent,
+            aconnect(server.url, "Watcher") as watcher,
+        ):
+            await silent.send('{"do": "speed", "value": 0.1}')
+            await silent.send(json.dumps({"do": "joints", "q": THERE.tolist()}))
+            async with asyncio.timeout(5.0):
+                while (await watcher.query(answers.State)).stopped is None:
+                    await asyncio.sleep(0.02)
+            state = await watcher.query(answers.State)
+            assert state.stopped == "Frozen fell silent while the arm moved."
+            await _freed(watcher)
+            await watcher.ask(requests.ClearStop())
+            await watcher.go(requests.Home())
+
+    asyncio.run(act())
+
+
+async def _freed(client: AsyncClient) -> None:
+    async with asyncio.timeout(10.0):
+        while (await client.query(answers.State)).holder is not None:
+            await asyncio.sleep(0.05)

@@ -1,0 +1,147 @@
+"""Requests for the arm, take-overs, and the name behind a STOP, on a real server."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.browser.server import AppServer
+from tests.gateway.client import Control, ask, controlling, enter, page_name
+
+SCRIPT = """\
+name: Wave
+speed: 0.2
+steps:
+  - joints: [100, -60, 85, 8, 0]
+  - joints: [-100, -60, 85, 8, 0]
+"""
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+def state_of(server: AppServer) -> dict[str, Any]:
+    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
+    return state
+
+
+async def until_program(server: AppServer, status: str) -> None:
+    async with asyncio.timeout(30.0):
+        while (state_of(server).get("program") or {}).get("status") != status:
+            await asyncio.sleep(0.05)
+
+
+async def run_program(server: AppServer, owner: Control) -> None:
+    await owner.say("program", text=SCRIPT)
+    await until_program(server, "ready")
+    await owner.say("steer", order="run")
+    await owner.wait(holder="Wave")
+
+
+async def clean_up(driver: Control) -> None:
+    await driver.say("stop")
+    await driver.wait(stop="confirmed")
+    await driver.say("clear_stop")
+    await driver.wait(stopped=None)
+    await driver.say("release_lease")
+    await driver.wait(holder=None)
+
+
+def test_owner_of_a_running_program_decides_about_requests(server: AppServer) -> None:
+    async def act() -> None:
+        async with (
+            controlling(server.url, enter(server.url)) as owner,
+            controlling(server.url, enter(server.url)) as other,
+        ):
+            await run_program(server, owner)
+            await owner.wait(orders=["pause", "end"], planning=False, asking=[])
+            await other.say("ask")
+            await other.wait(asked=True)
+            (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
+            # Nobody else decides.
+            await other.say("decline", to=asking["number"])
+            assert "do not hold" in (await other.notice("refused"))["why"]
+            await owner.say("decline", to=asking["number"])
+            refused = await other.notice("refused")
+            assert refused["why"] == f"{owner.status['name']} declined your request."
+            await other.wait(asked=False)
+            await owner.wait(asking=[], holder="Wave")
+            await other.say("ask")
+            await owner.wait(asking=[asking])
+            await owner.say("give", to=asking["number"])
+            await other.wait(mine=True)
+            await until_program(server, "stopped")
+            await owner.wait(mine=False, orders=[], holder=other.status["name"])
+            await clean_up(other)
+
+    asyncio.run(act())
+
+
+async def numbered(owner: Control, other: Control) -> dict[str, Any]:
+    """Return ``other`` as the only one in the list of ``owner`` of who asks."""
+    async with asyncio.timeout(5.0):
+        while not owner.status["asking"]:
+            await asyncio.sleep(0.01)
+    (asking,) = owner.status["asking"]
+    assert asking["name"] == other.status["name"]
+    return dict(asking)
+
+
+@pytest.mark.parametrize("by_program", [False, True])
+def test_former_driver_is_told_who_took_over(server: AppServer, by_program: bool) -> None:
+    async def act() -> None:
+        async with (
+            controlling(server.url, enter(server.url)) as driver,
+            controlling(server.url, enter(server.url)) as other,
+        ):
+            if by_program:
+                await run_program(server, driver)
+            else:
+                await driver.say("acquire")
+                await driver.wait(mine=True)
+            assert driver.status["taken"] == ""
+            await other.say("take")
+            await other.wait(mine=True, taken="")
+            await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
+            await other.say("release_lease")
+            await driver.wait(holder=None, taken="")
+            await driver.say("acquire")
+            await driver.wait(mine=True, taken="")
+            await clean_up(driver)
+
+    asyncio.run(act())
+
+
+def test_stop_names_the_page_that_pressed_it_after_a_restart() -> None:
+    page = page_name()
+
+    def press(server: AppServer, cookie: str) -> str | None:
+        stop = f"{server.url}/stop?press=one&page={page}"
+        assert ask(stop, data=b"", Origin=server.url, Cookie=cookie)[0] == 204
+        stopped: str | None = state_of(server)["stopped"]
+        return stopped
+
+    async def name(server: AppServer, cookie: str) -> str:
+        async with controlling(server.url, cookie, page) as control:
+            said: str = (await control.wait())["name"]
+            return said
+
+    with AppServer() as server:
+        cookie = enter(server.url)
+        assert press(server, cookie) == f"{asyncio.run(name(server, cookie))} pressed STOP."
+        server.restart()
+        # The page has no socket yet, and is the same person once it has one.
+        stopped = press(server, cookie)
+        assert stopped == f"{asyncio.run(name(server, cookie))} pressed STOP."
+        assert "Somebody" not in stopped
+        # A page that says no name of its own cannot be told from others.
+        server.restart()
+        page = "short"
+        assert press(server, cookie) == "Somebody pressed STOP."
