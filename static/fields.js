@@ -10,6 +10,7 @@ const Fields = (() => {
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   let box = null; // the box that has the focus
   let sending = false;
+  /** @type {(words: string) => void} */
   let tell = () => {};
 
   const isBox = (target) => target instanceof Element && target.matches(BOX);

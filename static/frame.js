@@ -27,10 +27,11 @@
   // which are not used here; nobody need hear of it.
   const refusal = new EvalError("No text becomes code here.");
   const Code = window.Function;
-  window.Function = function () {
+  const NoCode = function () {
     throw refusal;
   };
-  window.Function.prototype = Code.prototype;
+  NoCode.prototype = Code.prototype;
+  window.Function = /** @type {any} */ (NoCode);
   window.addEventListener(
     "unhandledrejection",
     (event) => event.reason === refusal && event.preventDefault(),
@@ -96,8 +97,8 @@
 
   const Plain = window.Worker;
   window.Worker = class extends Plain {
-    constructor(...args) {
-      super(...args);
+    constructor(url, options) {
+      super(url, options);
       // Before viser's own listener, which is set later.
       this.addEventListener("message", (event) => this.#hear(event.data));
     }

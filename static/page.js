@@ -13,8 +13,13 @@
   const ORDERS = { pause: "Pause", resume: "Resume", end: "Cancel" };
   const CAMERA = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
 
+  /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
+  /** @type {HTMLInputElement} */
+  const speedInput = document.querySelector("#speed input");
+  /** @type {HTMLOutputElement} */
+  const speedOutput = document.querySelector("#speed output");
   const page = name();
   const worker = new Worker("static/link.js");
   const say = (message) => worker.postMessage({ say: message });
@@ -28,7 +33,9 @@
 
   // A page that is loaded anew is the same page; a second tab is another.
   function name() {
-    const again = performance.getEntriesByType("navigation")[0]?.type === "reload";
+    /** @type {any[]} */
+    const [entry] = performance.getEntriesByType("navigation");
+    const again = entry?.type === "reload";
     const old = again && sessionStorage.getItem("page");
     const fresh = unheardOf();
     sessionStorage.setItem("page", old || fresh);
@@ -165,9 +172,9 @@
       const made = (order) => act(ORDERS[order], { do: "steer", order }, order !== "end");
       byId("orders").replaceChildren(...status.orders.map(made));
     }
-    const slider = document.querySelector("#speed input");
-    if (document.activeElement !== slider) slider.value = Math.round(100 * status.speed);
-    document.querySelector("#speed output").value = `${Math.round(100 * status.speed)} %`;
+    const percent = String(Math.round(100 * status.speed));
+    if (document.activeElement !== speedInput) speedInput.value = percent;
+    speedOutput.value = `${percent} %`;
   }
 
   // What the arm does now cannot be told from here.
@@ -256,9 +263,9 @@
       show(other, false);
       show(id, byId(id).hidden);
     });
-  document.querySelector("#speed input").addEventListener("input", ({ target }) => {
-    document.querySelector("#speed output").value = `${target.value} %`;
-    say({ do: "speed", value: target.value / 100 });
+  speedInput.addEventListener("input", () => {
+    speedOutput.value = `${speedInput.value} %`;
+    say({ do: "speed", value: Number(speedInput.value) / 100 });
   });
   Jog.begin({ say, stop });
   Objects.begin({ say });
@@ -288,8 +295,8 @@
     }
     panel?.show(button.getAttribute("aria-expanded") === "true");
   }
-  byId("instruments-button").addEventListener("click", ({ currentTarget }) =>
-    showInstruments(currentTarget.getAttribute("aria-expanded") !== "true"),
+  byId("instruments-button").addEventListener("click", () =>
+    showInstruments(byId("instruments-button").getAttribute("aria-expanded") !== "true"),
   );
 
   // Coming in

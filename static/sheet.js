@@ -18,6 +18,7 @@
 
   let folded = null; // the panel that was folded already; a person may open it
   const fold = () => {
+    /** @type {HTMLElement | null} */
     const handle = document.querySelector(HANDLE);
     if (handle && handle !== folded) handle.click();
     folded = handle;
