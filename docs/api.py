@@ -91,7 +91,7 @@ Simulink connect alike: [simulink](simulink.md).
 
 ## By hand
 
-```
+```sh
 KEY=$(openssl rand -hex 16)  # a secret: whoever knows it speaks for this program
 curl -H "X-Program: $KEY" -H 'X-Name: By hand' -d '{{"do": "joint", "axis": 1, "value": 0.4}}' http://127.0.0.1:8080/api/v{version}/do
 curl http://127.0.0.1:8080/api/v{version}/state

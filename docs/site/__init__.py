@@ -1,1 +1,1 @@
-"""The documentation site: its pages are the Markdown files of the project and a reference of the library."""
+"""The documentation site: the Markdown files of the project and a reference of the library."""

@@ -27,6 +27,7 @@ ASSETS = (
 
 PAGES = (
     "*.md",
+    "CITATION.cff",
     "LICENSE",
     "docs/*.md",
     "docs/decisions/*.md",

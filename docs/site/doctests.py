@@ -26,7 +26,7 @@ def fenced(text: str) -> str:
 class FencedDoctests(griffe.Extension):
     """Fences the doctest examples of every docstring in a package."""
 
-    def on_instance(self, *, obj: griffe.Object, **kwargs: Any) -> None:
+    def on_instance(self, *, obj: griffe.Object, **_kwargs: Any) -> None:
         """Fence the examples in the docstring of one object, if it has any."""
         if obj.docstring is not None:
             obj.docstring.value = fenced(obj.docstring.value)
