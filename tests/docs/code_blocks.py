@@ -12,7 +12,7 @@ DOCUMENTS = sorted(
         *ROOT.glob("*.md"),
         *ROOT.glob("docs/**/*.md"),
         *ROOT.glob("examples/**/*.md"),
-        *ROOT.glob("tests/**/[A-Z]*.md"),
+        *ROOT.glob("tests/exchange/**/*.md"),
     }
 )
 FENCE = re.compile(r"^```(.*)\n((?:.*\n)*?)```$", re.MULTILINE)
@@ -53,7 +53,6 @@ def code_blocks(*languages: str) -> list[CodeBlock]:
             found[2],
         )
         for document in DOCUMENTS
-        if "node_modules" not in document.parts
         for text in [document.read_text(encoding="utf-8")]
         for found in FENCE.finditer(text)
         if not languages or found[1].strip() in languages

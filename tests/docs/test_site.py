@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 import katana450
-from tests.browser.server import ROOT
+from tests.docs.code_blocks import DOCUMENTS, FENCE, ROOT
 
+ITEM = re.compile(r"(?:[-*]|\d+\.) ")
 LOADED = re.compile(r'<(?:script|img|iframe|link)\b[^>]*?(?:src|href)="(https?:[^"]+)"')
 
 
@@ -47,3 +49,14 @@ def test_examples_of_docstrings_are_shown_as_code(site: Path) -> None:
     text = (site / "reference" / "arms.html").read_text(encoding="utf-8")
     assert '<span class="gp">&gt;&gt;&gt; ' in text
     assert "<blockquote>" not in text
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_list_begins_after_an_empty_line(document: Path) -> None:
+    text = FENCE.sub("", document.read_text(encoding="utf-8"))
+    lines = ["", *text.splitlines()]
+    for before, line in pairwise(lines):
+        if ITEM.match(line) and before and not before.startswith(" "):
+            assert ITEM.match(before) or before.startswith("#"), (
+                f"the site runs this item into the paragraph above it: {line}"
+            )
