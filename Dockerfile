@@ -1,10 +1,12 @@
 # docker build -t katana450 .
 # Here alone:       docker run --rm -p 127.0.0.1:8080:8080 katana450 serve --host 0.0.0.0 --insecure
 # Other machines:   docker run --rm -p 8080:8080 --user $(id -u) -v ./access.json:/access.json katana450
-FROM python:3.12.11-slim-bookworm AS build
+# Any image with Python 3.11 or newer and its venv module will do.
+ARG BASE=docker.io/library/python:3.12.11-slim-bookworm
+FROM ${BASE} AS build
 WORKDIR /src
 COPY requirements.lock ./
-RUN python -m venv /opt/katana450 \
+RUN python3 -m venv /opt/katana450 \
  && /opt/katana450/bin/pip install --no-cache-dir --require-hashes --requirement requirements.lock
 COPY pyproject.toml README.md LICENSE ./
 COPY app app
@@ -12,7 +14,7 @@ COPY robot_description robot_description
 COPY static static
 RUN /opt/katana450/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
 
-FROM python:3.12.11-slim-bookworm
+FROM ${BASE}
 COPY --from=build /opt/katana450 /opt/katana450
 RUN useradd --system --create-home --uid 10450 katana
 USER katana

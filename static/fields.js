@@ -8,6 +8,7 @@ const Fields = (() => {
   const controls = new Map(); // the range and step of each control, by its id
   let box = null; // the box that has the focus
   let sending = false;
+  /** @type {(words: string) => void} */
   let tell = () => {};
 
   const isBox = (target) => target instanceof Element && target.matches(Viser.NUMBER_BOX);

@@ -17,12 +17,15 @@ const Jog = (() => {
 
   const none = () => [0, 0, 0, 0, 0];
   const byId = (id) => document.getElementById(id);
+  /** @returns {NodeListOf<HTMLButtonElement>} */
+  const holdButtons = () => document.querySelectorAll("[data-hold]");
   const keys = new Set();
   const pads = { plane: none(), lift: none() };
   const holds = new Set();
   let mouse = { rates: none(), at: 0 };
   let open = false;
   let moving = false;
+  /** @type {(request: object) => void} */
   let say = () => {};
   let stop = () => {};
 
@@ -37,7 +40,7 @@ const Jog = (() => {
   function show() {
     for (const kbd of document.querySelectorAll("#jog kbd"))
       kbd.classList.toggle("on", keys.has(`Key${kbd.textContent}`));
-    for (const button of document.querySelectorAll("[data-hold]"))
+    for (const button of holdButtons())
       button.classList.toggle("on", holds.has(button.dataset.hold));
   }
 
@@ -98,7 +101,7 @@ const Jog = (() => {
     stopHeld = pressed(1);
     if (!pressed(4) && !pressed(5)) return none();
     const [x = 0, y = 0, u = 0, v = 0] = found.axes;
-    return [-bent(y), -bent(x), -bent(v), pressed(12) - pressed(13), bent(u)];
+    return [-bent(y), -bent(x), -bent(v), Number(pressed(12)) - Number(pressed(13)), bent(u)];
   }
 
   function report({ reportId, data }) {
@@ -149,7 +152,9 @@ const Jog = (() => {
     if (any && moving && performance.now() - sentAt < EVERY / 2) return;
     moving = any;
     sentAt = performance.now();
-    say({ do: "jog", rates: now, frame: document.querySelector("[name=frame]:checked").value });
+    /** @type {HTMLInputElement} */
+    const frame = document.querySelector("[name=frame]:checked");
+    say({ do: "jog", rates: now, frame: frame.value });
   }
 
   function begin(options) {
@@ -162,7 +167,7 @@ const Jog = (() => {
       rates[2] = -bent(down);
       return [0, down];
     });
-    for (const button of document.querySelectorAll("[data-hold]")) {
+    for (const button of holdButtons()) {
       const { hold } = button.dataset;
       button.addEventListener("pointerdown", (event) => {
         event.preventDefault();

@@ -2,7 +2,9 @@
 "use strict";
 const Objects = (() => {
   const API = "api/v1/";
+  /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
+  /** @type {(request: object) => void} */
   let say = () => {};
   let file = null; // the last that was chosen
   let placed = null; // and the name it stands under
@@ -15,6 +17,7 @@ const Objects = (() => {
 
   // What is sent, and the answer; what is refused is told where it was asked.
   async function ask(path, body) {
+    /** @type {NodeListOf<HTMLButtonElement | HTMLSelectElement>} */
     const busy = document.querySelectorAll("#objects button, #objects select");
     for (const each of busy) each.disabled = true;
     try {

@@ -11,8 +11,13 @@
   const OPEN = "katana450.instruments.open";
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
+  /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const [body, stopButton, scene] = [document.body, byId("stop"), byId("scene")];
+  /** @type {HTMLInputElement} */
+  const speedInput = document.querySelector("#speed input");
+  /** @type {HTMLOutputElement} */
+  const speedOutput = document.querySelector("#speed output");
   const page = name();
   const worker = new Worker("static/link.js");
   const say = (message) => worker.postMessage({ say: message });
@@ -26,7 +31,9 @@
 
   // A page that is loaded anew is the same page; a second tab is another.
   function name() {
-    const again = performance.getEntriesByType("navigation")[0]?.type === "reload";
+    /** @type {any[]} */
+    const [entry] = performance.getEntriesByType("navigation");
+    const again = entry?.type === "reload";
     const old = again && sessionStorage.getItem("page");
     const fresh = unheardOf();
     sessionStorage.setItem("page", old || fresh);
@@ -170,9 +177,9 @@
       const made = (order) => act(label(order), { do: "steer", order }, order !== "end");
       byId("orders").replaceChildren(...status.orders.map(made));
     }
-    const slider = document.querySelector("#speed input");
-    if (document.activeElement !== slider) slider.value = Math.round(100 * status.speed);
-    document.querySelector("#speed output").value = `${Math.round(100 * status.speed)} %`;
+    const percent = String(Math.round(100 * status.speed));
+    if (document.activeElement !== speedInput) speedInput.value = percent;
+    speedOutput.value = `${percent} %`;
   }
 
   // What the arm does now cannot be told from here.
@@ -261,9 +268,9 @@
       show(other, false);
       show(id, byId(id).hidden);
     });
-  document.querySelector("#speed input").addEventListener("input", ({ target }) => {
-    document.querySelector("#speed output").value = `${target.value} %`;
-    say({ do: "speed", value: target.value / 100 });
+  speedInput.addEventListener("input", () => {
+    speedOutput.value = `${speedInput.value} %`;
+    say({ do: "speed", value: Number(speedInput.value) / 100 });
   });
   Jog.begin({ say, stop });
   Objects.begin({ say });
@@ -293,8 +300,8 @@
     }
     panel?.show(button.getAttribute("aria-expanded") === "true");
   }
-  byId("instruments-button").addEventListener("click", ({ currentTarget }) =>
-    showInstruments(currentTarget.getAttribute("aria-expanded") !== "true"),
+  byId("instruments-button").addEventListener("click", () =>
+    showInstruments(byId("instruments-button").getAttribute("aria-expanded") !== "true"),
   );
 
   // Coming in

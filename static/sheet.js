@@ -15,6 +15,7 @@
 
   let folded = null; // the panel that was folded already; a person may open it
   const fold = () => {
+    /** @type {HTMLElement | null} */
     const handle = document.querySelector(PANEL_HANDLE);
     if (handle && handle !== folded) handle.click();
     folded = handle;

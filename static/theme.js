@@ -4,6 +4,7 @@
 const Theme = (() => {
   const KEPT = "katana450.theme";
   const system = matchMedia("(prefers-color-scheme: dark)");
+  /** @type {(name: string) => void} */
   let follow = () => {};
 
   if (new URLSearchParams(location.search).has("darkMode") && !sessionStorage.getItem(KEPT))

@@ -28,10 +28,11 @@ const Viser = (() => {
   function forgoCode() {
     const refusal = new EvalError("No text becomes code here.");
     const Code = window.Function;
-    window.Function = function () {
+    const NoCode = function () {
       throw refusal;
     };
-    window.Function.prototype = Code.prototype;
+    NoCode.prototype = Code.prototype;
+    window.Function = /** @type {any} */ (NoCode);
     window.addEventListener(
       "unhandledrejection",
       (event) => event.reason === refusal && event.preventDefault(),

@@ -66,7 +66,7 @@ export class Board {
   }
 
   #place() {
-    const focus = document.activeElement;
+    const focus = /** @type {HTMLElement | null} */ (document.activeElement);
     this.#layout.forEach((place, n) => {
       const card = this.#cards.get(place.id);
       if (this.grid.children[n] !== card.element) this.grid.insertBefore(card.element, this.grid.children[n] ?? null);
@@ -119,6 +119,7 @@ export class Board {
   #follow() {
     this.grid.addEventListener("pointermove", ({ clientX, clientY }) => {
       if (!this.#lifted) return;
+      /** @type {HTMLElement | null | undefined} */
       const found = document.elementFromPoint(clientX, clientY)?.closest(".card");
       const over = found && this.#cards.get(found.dataset.id);
       // Once a card that it has passed: the same may lie under the hand again.
@@ -134,7 +135,7 @@ export class Board {
       });
     const sight = new IntersectionObserver((entries) => {
       for (const { target, isIntersecting } of entries) {
-        const card = this.#cards.get(target.dataset.id);
+        const card = this.#cards.get(/** @type {HTMLElement} */ (target).dataset.id);
         card.seen = isIntersecting;
         card.instrument.plot?.refresh();
       }

@@ -23,6 +23,7 @@ export class Plot {
   #cursor = null; // share of the width
   #stale = true;
   #drawn = 0;
+  /** @type {any} */
   #colours = { at: -Infinity };
 
   // channels: their numbers in the history. view: {span, end} [s] of all plots, end null while they

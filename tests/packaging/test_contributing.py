@@ -20,7 +20,7 @@ def test_files_that_the_recipes_name_exist() -> None:
         path.relative_to(ROOT).as_posix()
         for top in ("app", "docs", "static", "tests")
         for path in (ROOT / top).rglob("*")
-    }
+    } | {path.name for path in ROOT.glob("*.md")}
     for name in (each for each in named if "NAME" not in each):
         assert any(path == name or path.endswith(f"/{name}") for path in known), name
 

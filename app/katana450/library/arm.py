@@ -260,11 +260,12 @@ class Arm:
         """Plan a straight line of the tool point, pitch and roll turning evenly.
 
         Args:
-            to: (3,) where the line ends [m]. by: (3,) how far it goes, instead of ``to`` [m]. With
-                neither the tool turns on the spot.
+            to: (3,) end of the line [m].
+            by: (3,) vector from its start to its end [m], instead of ``to``. With neither the tool
+                turns on the spot.
             start: (n,) joint angles where it begins [rad]; None for `ready`.
-            pitch, roll: of the tool at the end [rad]; None to keep them. Pitch is positive
-                downwards.
+            pitch: pitch of the tool at the end [rad], positive downwards; None to keep it.
+            roll: roll of the tool at the end [rad]; None to keep it.
 
         Raises InputError where the line leaves the arm's reach or its limits, and BlockedError
         where bodies would meet: how far along, where, and what to do.
@@ -327,8 +328,10 @@ class Arm:
         Args:
             voxel: edge of a voxel [m]; half of it takes eight times as long.
             table: height of the table in the base frame [m].
-            pitches, rolls: steps in which pitch and roll are tried.
-            samples: random postures whose tool points are returned as ``cloud``. seed: of those.
+            pitches: number of pitches that are tried.
+            rolls: number of rolls that are tried.
+            samples: number of random postures whose tool points are returned as ``cloud``.
+            seed: seed of these postures.
 
         Returns a map with ``points`` (N, 3) [m] in the base frame whatever the frame of poses,
         ``share`` (N,), the fraction of orientations, and ``cloud`` (K, 3) [m].

@@ -1,0 +1,1 @@
+"""The documentation site: the Markdown files of the project and a reference of the library."""

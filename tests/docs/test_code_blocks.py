@@ -1,0 +1,215 @@
+"""Every code block of the documents is run or read as it is printed."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+from katana450.cli.main import _parser
+from katana450.client import connect
+from katana450.extension import Extension
+from katana450.server.api import requests
+from tests.browser.server import ROOT, AppServer
+from tests.docs.code_blocks import CodeBlock, code_block, code_blocks
+
+PRINTED_URL = "http://127.0.0.1:8080"
+SECONDS = 120
+
+# Languages that a test below runs or reads.
+CHECKED = {"console", "csv", "json", "python", "sh", "toml", "yaml"}
+# Other languages, and why nothing runs them.
+NOT_CHECKED = {
+    "text": "a diagram, or a summary of options, which is compared with the help",
+    "caddy": "the configuration of another program, which is not installed here",
+    "nginx": "the configuration of another program, which is not installed here",
+}
+# Commands of shell blocks that are neither ours nor targets of make, and where they are run.
+ELSEWHERE = {
+    "apt-get": "changes the system",
+    "docker": "needs a container service; .ci/image builds and runs the image without one",
+    "export": "sets a variable for docker",
+    "git": "reads the history, which an archive of the sources does not have",
+    "./viewer": "tests/exchange compiles and runs it",
+    "make": "tests/exchange runs the Makefile that is exported with the viewer",
+    "KEY=": "test_requests_of_the_shell_are_answered",
+    "curl": "test_requests_of_the_shell_are_answered",
+}
+# Commands that are run: those that end by themselves. The options of all others are read.
+RUN = ("katana450 access give", "katana450 run square.yaml --dry-run")
+RUN_LONG = (
+    "katana450 demo circle --headless",
+    "katana450 run square.yaml --headless",
+    "katana450 workspace",
+)
+
+
+def identifier(block: CodeBlock) -> str:
+    return str(block)
+
+
+SHELL = [
+    pytest.param(block, command, id=f"{block}-{command}")
+    for block in code_blocks("sh")
+    for command in block.commands
+]
+
+
+@pytest.fixture(scope="module")
+def running() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def server(running: AppServer) -> AppServer:
+    """A server whose arm may move: a program that hangs up while the arm moves stops it."""
+    with connect(running.url) as client:
+        client.ask(requests.ClearStop())
+        client.ask(requests.ReleaseLease())
+    return running
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder with the commands of this environment, and what the blocks take as given."""
+    (tmp_path / ".venv").symlink_to(Path(sys.executable).parents[1])
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    script = code_block("docs/programs.md", "name: Square").text
+    for name in ("square.yaml", "my_script.yaml"):
+        (tmp_path / name).write_text(script, encoding="utf-8")
+    (tmp_path / "my_arm.urdf").write_bytes((ROOT / "examples" / "my_own_arm.urdf").read_bytes())
+    return tmp_path
+
+
+def own(command: str) -> str:
+    """Return a command without the folder of the environment and without ``&``."""
+    return command.removesuffix(" &").removeprefix(".venv/bin/")
+
+
+def run(command: str) -> str:
+    """Run a shell command and return what it prints; it has to succeed."""
+    done = subprocess.run(
+        ["bash", "-c", f"set -e; {command}"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=SECONDS,
+    )
+    assert done.returncode == 0, f"{command}\n{done.stderr}"
+    return done.stdout
+
+
+def test_every_block_names_a_language_that_is_checked_or_has_a_reason() -> None:
+    blocks = code_blocks()
+    assert len(blocks) > 25
+    unknown = [str(each) for each in blocks if each.language not in CHECKED | set(NOT_CHECKED)]
+    assert not unknown, f"name the language behind the fence; one of {sorted(CHECKED)} if it can be"
+
+
+@pytest.mark.parametrize("block", code_blocks("python"), ids=identifier)
+def test_python_runs(block: CodeBlock, folder: Path, server: AppServer) -> None:
+    namespace: dict[str, object] = {"__name__": "printed"}
+    exec(compile(block.text.replace(PRINTED_URL, server.url), str(block), "exec"), namespace)
+    if "savefig" in block.text:
+        assert (folder / "circle.png").read_bytes().startswith(b"\x89PNG")
+    if isinstance(extension := namespace.get("EXTENSION"), Extension):
+        assert [command.name for command in extension.commands] == ["weather"]
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("block", code_blocks("console"), ids=identifier)
+def test_output_of_the_console_is_as_printed(block: CodeBlock) -> None:
+    prompt, _, output = block.text.partition("\n")
+    assert prompt.startswith("$ ")
+    assert run(prompt.removeprefix("$ ")) == output
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(("block", "command"), SHELL)
+def test_command_runs_or_its_options_exist(block: CodeBlock, command: str) -> None:
+    command = own(command)
+    if command.startswith(RUN):
+        run(command)
+    elif command.startswith("katana450 "):
+        assert _parser().parse_args(shlex.split(command)[1:]).command
+    elif (target := re.fullmatch(r"make ([\w-]+)", command)) is not None:
+        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+        assert re.search(rf"^{target[1]}:", makefile, re.MULTILINE), target[1]
+    else:
+        assert command.startswith(tuple(ELSEWHERE)), f"{block}: nothing runs {command!r}"
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(("block", "command"), SHELL)
+def test_command_that_takes_longer_runs(block: CodeBlock, command: str) -> None:
+    if not own(command).startswith(RUN_LONG):
+        pytest.skip(f"{block}: read or run by the test above")
+    run(own(command))
+
+
+@pytest.mark.usefixtures("folder")
+def test_requests_of_the_shell_are_answered(server: AppServer) -> None:
+    block = code_block("docs/api.md", "KEY=")
+    first, second = (
+        run(block.text.replace(PRINTED_URL, server.url)).replace("}{", "}\n{").split("\n")
+    )
+    assert json.loads(first)["outcome"] == "accepted"
+    assert json.loads(second)["is"] == "state"
+
+
+@pytest.mark.parametrize("block", code_blocks("json"), ids=identifier)
+def test_requests_are_understood(block: CodeBlock) -> None:
+    for line in block.text.splitlines():
+        requests.decoded(line)
+
+
+@pytest.mark.parametrize("block", code_blocks("toml"), ids=identifier)
+def test_toml_is_read(block: CodeBlock) -> None:
+    assert tomllib.loads(block.text)
+
+
+# Scripts are planned and run by the commands of docs/programs.md, see `folder`; the scene is loaded
+# by tests/exchange/test_scene_file.py.
+@pytest.mark.parametrize("block", code_blocks("yaml"), ids=identifier)
+def test_yaml_is_read(block: CodeBlock) -> None:
+    assert yaml.safe_load(block.text)
+
+
+@pytest.mark.parametrize("block", code_blocks("csv"), ids=identifier)
+def test_table_of_joint_values_is_exported(block: CodeBlock, folder: Path) -> None:
+    (folder / "motion.csv").write_text(block.text, encoding="utf-8")
+    run("katana450 export glb --trajectory motion.csv --out out")
+    assert list((folder / "out").glob("*.glb"))
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    sorted(
+        {
+            (" ".join(line.split()[:2]), option)
+            for block in code_blocks("text")
+            for line in block.text.splitlines()
+            if line.startswith("katana450 ")
+            for option in re.findall(r"--[a-z-]+", line)
+        }
+    ),
+)
+def test_option_of_a_summary_exists(
+    command: str, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        _parser().parse_args([command.split()[1], "--help"])
+    assert re.search(rf"{option}\b", capsys.readouterr().out)
