@@ -18,7 +18,9 @@ import yaml
 from katana450.cli.main import _parser
 from katana450.client import connect
 from katana450.extension import Extension
+from katana450.extensions.programs.requests import Program, Steer
 from katana450.server.api import requests
+from katana450.server.api.requests import RequestDecoder
 from tests.browser.server import ROOT, AppServer
 from tests.docs.code_blocks import CodeBlock, code_block, code_blocks
 
@@ -172,8 +174,9 @@ def test_requests_of_the_shell_are_answered(server: AppServer) -> None:
 
 @pytest.mark.parametrize("block", code_blocks("json"), ids=identifier)
 def test_requests_are_understood(block: CodeBlock) -> None:
+    decoder = RequestDecoder((Program, Steer))
     for line in block.text.splitlines():
-        requests.decoded(line)
+        decoder.decoded(line)
 
 
 @pytest.mark.parametrize("block", code_blocks("toml"), ids=identifier)

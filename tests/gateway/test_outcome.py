@@ -15,9 +15,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError, aconnect
+from katana450.extensions.programs.requests import Order, Program, Steer
 from katana450.maths.kinematics.reading import Reading
 from katana450.server.api import answers, requests, schema
-from katana450.server.api.fields import Order
 from katana450.server.service import dispatcher, serialize
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
@@ -111,9 +111,9 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Remove: [requests.Remove(name="ball")],
         requests.Fill: [requests.Fill(ml=150.0)],
         requests.Load: [requests.Load(scene=key)],
-        requests.Program: [requests.Program(text="steps:\n  - wait: 20\n")],
-        requests.Steer: [
-            requests.Steer(order=order)
+        Program: [Program(text="steps:\n  - wait: 20\n")],
+        Steer: [
+            Steer(order=order)
             for order in (Order.RUN, Order.PAUSE, Order.RESUME, Order.STEP, Order.END)
         ],
     }
@@ -122,18 +122,18 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
         requests.Give, requests.Decline,
     }  # fmt: skip
-    assert set(samples) | no_commands == set(schema.kinds(requests.AnyRequest))
+    assert set(samples) | no_commands == {*schema.kinds(requests.AnyRequest), Program, Steer}
     for kind, several in samples.items():
         for request in several:
             before = program.query(answers.State).ticket
             answer = done(program.ask(request))
-            if kind is requests.Program:
+            if kind is Program:
                 wait_until_planned(program)
             time.sleep(0.05)
             if answer.outcome is None:
                 # Nothing became a command then.
                 assert program.query(answers.State).ticket == before, request
-                assert kind is requests.Program
+                assert kind is Program
             else:
                 expected = ("requested",) if kind is requests.Stop else ("accepted", "limited")
                 assert answer.outcome in expected, request

@@ -73,9 +73,10 @@ def test_started_front_has_the_newest_state(ends: Ends) -> None:
     until(lambda: ends.loop.board.snapshot.state.stopped is not None)
     until(theirs.poll)
     time.sleep(0.05)
-    assert slow.board.snapshot.state.stopped is None
+    newest: list[bool] = [slow.board.snapshot.state.stopped is not None]
     slow.start()
-    assert slow.board.snapshot.state.stopped is not None
+    newest.append(slow.board.snapshot.state.stopped is not None)
+    assert newest == [False, True]
     arm_end.close()
 
 

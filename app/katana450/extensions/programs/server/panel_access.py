@@ -40,7 +40,10 @@ class PanelAccess:
 
     def steer(self, order: Order, actor: Actor) -> None:
         """Steer the program for ``actor``. Raises LeaseError with the reason why not."""
-        self._call(lambda: self._runner.steer(self._window_of(actor), order))
+        self._call(lambda: self._steer(order, actor))
+
+    def _steer(self, order: Order, actor: Actor) -> None:
+        self._runner.steer(self._window_of(actor), order)
 
     def _plan(self, text: str, then: Order | None, actor: Actor) -> None:
         window = self._window_of(actor)
