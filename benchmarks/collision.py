@@ -29,7 +29,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.collision import engine as engines
 from katana450.maths.collision.clearance import advance
 from katana450.maths.collision.shape import half_space
-from katana450.maths.collision.world import World, obstacle
+from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.settings import READY_POSTURE_DEG
 
@@ -71,7 +71,7 @@ def without_coal() -> Iterator[None]:
     engines.engine.cache_clear()
 
 
-def world_on_table(robot: Robot) -> World:
+def world_on_table(robot: Robot) -> CollisionWorld:
     """The arm's bodies above the table."""
     world, _ = world_of(robot)
     if world is None:
@@ -82,7 +82,7 @@ def world_on_table(robot: Robot) -> World:
 class RawMeshes:
     """The visible triangles of each link, without hulls, for the pairs of a world but the table."""
 
-    def __init__(self, robot: Robot, world: World) -> None:
+    def __init__(self, robot: Robot, world: CollisionWorld) -> None:
         self._world = world
         bodies = {body.name: body for body in robot.links}
         self._meshes = {}
@@ -139,7 +139,9 @@ def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
     return 1e6 * best
 
 
-def nearest_rows(robot: Robot, world: World, by_fcl: World, postures: FloatArray) -> list[Row]:
+def nearest_rows(
+    robot: Robot, world: CollisionWorld, by_fcl: CollisionWorld, postures: FloatArray
+) -> list[Row]:
     """The ways to find the nearest pair."""
     every = np.arange(len(world.first))
     raw = RawMeshes(robot, world)
@@ -166,7 +168,7 @@ def nearest_rows(robot: Robot, world: World, by_fcl: World, postures: FloatArray
     ]
 
 
-def tick_rows(arm: MountedArm, world: World) -> list[Row]:
+def tick_rows(arm: MountedArm, world: CollisionWorld) -> list[Row]:
     """What one tick of each drive takes."""
     rows = []
     speed = np.append(arm.chain.speed, arm.gripper.speed)

@@ -57,10 +57,10 @@ def serve() -> None:
     address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
     listening = listen("127.0.0.1", 0)
     port = listening.getsockname()[1]
-    hub, door = Hub(time.monotonic), Authenticator(None, port, address)
-    proxy = Proxy(hub, door, Guard(server), server.get_port(), KEY)
+    hub, authenticator = Hub(time.monotonic), Authenticator(None, port, address)
+    proxy = Proxy(hub, authenticator, Guard(server), server.get_port(), KEY)
     config = uvicorn.Config(
-        application(hub, door, Budgets(hub.clock), proxy, address, Acceptor(listening)),
+        application(hub, authenticator, Budgets(hub.clock), proxy, address, Acceptor(listening)),
         ws="websockets-sansio",
         ws_per_message_deflate=False,
         lifespan="off",

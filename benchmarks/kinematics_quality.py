@@ -20,9 +20,9 @@ _SAME_ANGLES = 1e-6  # rad; answers nearer than this in every joint are one bran
 class Quality:
     """Over all poses.
 
-    solved: share of poses with an answer that is right. worst: greatest position error of any
+    solved: fraction of poses with an answer that is right. worst: greatest position error of any
     answer given as exact [m]. branches, inside: distinct right answers a pose, and how many of them
-    lie inside the limits. usable: share of poses with one that does.
+    lie inside the limits. usable: fraction of poses with one that does.
     """
 
     solved: float

@@ -62,17 +62,17 @@ def _single_cells(row: Row) -> Cells:
     return [
         *_time_cells(row),
         _ratio(row),
-        _share(found.solved),
+        _fraction(found.solved),
         f"{1e3 * found.worst:.1e}",
         f"{found.branches:.2f}",
         f"{found.inside:.2f}",
-        _share(found.usable),
+        _fraction(found.usable),
     ]
 
 
 def _batch_cells(row: Row) -> Cells:
     found = _found(row)
-    return [*_time_cells(row), _ratio(row), _share(found.solved), f"{1e3 * found.worst:.1e}"]
+    return [*_time_cells(row), _ratio(row), _fraction(found.solved), f"{1e3 * found.worst:.1e}"]
 
 
 def _time_cells(row: Row) -> Cells:
@@ -93,7 +93,7 @@ def _found(row: Row) -> Quality:
     return row.quality
 
 
-def _share(value: float) -> str:
+def _fraction(value: float) -> str:
     # Rounded down: 100 % is said only of all.
     return "100 %" if value == 1.0 else f"{np.floor(1e4 * value) / 1e2:.2f} %"
 

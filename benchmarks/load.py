@@ -27,11 +27,11 @@ import msgspec
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 
-from katana450.arm.runtime.loop_timing import LOOKED_AT
+from katana450.arm.runtime.loop_timing import TIMED_TICKS
 from katana450.client import AsyncClient, aconnect
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
-from katana450.server.service.budget import DEBT, EACH
+from katana450.server.service.budget import IDENTITY_BUDGET, MAX_DEBT
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import SUBPROTOCOL, Peer, enter, page_name, websocket
 
@@ -47,7 +47,7 @@ SILENT = 1100
 ASKING, ASKED = 30, 390.0
 """Programs that ask for the branches, and how many times a second each."""
 
-RECOVERY = DEBT / EACH + 1.0
+RECOVERY = MAX_DEBT / IDENTITY_BUDGET + 1.0
 """[s] Between two turns."""
 
 TURN_SECONDS = 120.0
@@ -209,14 +209,14 @@ async def _turn(
         await asyncio.sleep(2.0)
         took = await stop_times(arm, stops)
         period = (await arm.query(answers.Loop)).period
-        await asyncio.sleep(LOOKED_AT * period)
+        await asyncio.sleep(TIMED_TICKS * period)
         loop = await arm.query(answers.Loop)
         for task in (*tasks, swinging):
             task.cancel()
     p50, p99 = 1e3 * np.percentile(took, (50, 99), axis=0)
     print(
         f"{name:20} ticks late p50 {1e3 * loop.late_p50:5.2f} p99 {1e3 * loop.late_p99:5.2f} most "
-        f"{1e3 * loop.late_most:6.2f} ms   STOP brakes p50 {p50[0]:5.1f} p99 {p99[0]:5.1f}, "
+        f"{1e3 * loop.late_max:6.2f} ms   STOP brakes p50 {p50[0]:5.1f} p99 {p99[0]:5.1f}, "
         f"known p50 {p50[1]:5.1f} p99 {p99[1]:5.1f} ms",
         flush=True,
     )

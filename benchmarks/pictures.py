@@ -24,11 +24,11 @@ from benchmarks.peers import prepare
 from benchmarks.pictures_scene import PictureScene
 from katana450.arm.control import commands as cmd
 from katana450.arm.robot.props import load_props
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.media import room
 from katana450.extensions.media.report_pictures import FOV, ON_TABLE
-from katana450.extensions.media.scene import Scene
-from katana450.extensions.media.stage import Stage
+from katana450.extensions.media.scene import RenderScene
+from katana450.extensions.media.stage import RenderStage
 from katana450.resources import URDF_PATH
 from katana450.server.viser_bridge.themes import THEMES
 from katana450.settings import Settings
@@ -44,13 +44,13 @@ TIMEOUT = 600.0
 
 def scenes(size: tuple[int, int]) -> dict[str, PictureScene]:
     """Return the scene of each theme, for pictures of width and height ``size`` [px]."""
-    robot, session, _ = described(Settings(), URDF_PATH, None)
-    stage = Stage(robot, session, load_props())
+    robot, session, _ = describe_robot(Settings(), URDF_PATH, None)
+    stage = RenderStage(robot, session, load_props())
     begin = session.begin(session.ready, 0.0, 0.0)
     state = session.step(begin, [cmd.Fill(FILLING)], 0.01)
     solid, water = stage.items(state), stage.water(state)
     every = [*solid, *(each.item for each in water)]
-    scene = Scene.of(every)
+    scene = RenderScene.of(every)
     materials = [item.shape.material for item in every]
     return {
         name: PictureScene(

@@ -15,7 +15,7 @@ begun = time.perf_counter()
 import numpy as np  # noqa: E402
 
 from benchmarks.pictures_scene import PictureScene, measured  # noqa: E402
-from katana450.arm.robot.surfaces import Material, Shape  # noqa: E402
+from katana450.arm.robot.surfaces import Material, VisualMesh  # noqa: E402
 from katana450.extensions.media.camera import Camera  # noqa: E402
 from katana450.extensions.media.picture import Picture, Translucent, picture  # noqa: E402
 from katana450.extensions.media.scene import Item  # noqa: E402
@@ -44,7 +44,7 @@ def _item(scene: PictureScene, number: int) -> Item:
     red, green, blue = scene.colour[number].tolist()
     metallic, rough = float(scene.metallic[number]), float(scene.rough[number])
     material = Material(str(number), (red, green, blue), metallic, rough)
-    shape = Shape(material, scene.vertices[used], scene.normals[used], faces.reshape(-1, 3))
+    shape = VisualMesh(material, scene.vertices[used], scene.normals[used], faces.reshape(-1, 3))
     return Item(str(number), shape, np.eye(4))
 
 

@@ -158,8 +158,8 @@ def _rectangles(sides: Any, height: float, rgb: Any) -> Any:
 
 def _environment(sky: Any, floor: Any) -> Any:
     """Return a panorama from the floor's colour below to the sky's above, that surfaces mirror."""
-    share = np.linspace(0.0, 1.0, 64)[:, None, None]
-    picture = np.tile(floor + share * (sky - floor), (1, 128, 1))
+    fraction = np.linspace(0.0, 1.0, 64)[:, None, None]
+    picture = np.tile(floor + fraction * (sky - floor), (1, 128, 1))
     pixels = numpy_to_vtk((255.0 * picture).astype(np.uint8).reshape(-1, 3), deep=True)
     image = vtk.vtkImageData()
     image.SetDimensions(128, 64, 1)

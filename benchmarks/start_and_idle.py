@@ -106,7 +106,7 @@ def wait_for_port(port: int) -> None:
 
 
 def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | None]:
-    """The times of one start, and the share of a core used at rest if ``idle`` [s] is not 0."""
+    """The times of one start, and the fraction of a core used at rest if ``idle`` [s] is not 0."""
     command, nodes = APPS[app]
     server = AppServer(command)
     with ThreadPoolExecutor(1) as starter, closing(server):
@@ -121,20 +121,20 @@ def one_start(browser: Browser, app: str, idle: float) -> tuple[Times, float | N
         began = time.perf_counter()
         page = ViserPage.open(browser, server.url, nodes=nodes, drawing=Drawing.ALWAYS)
         times = Times(port, usable, time.perf_counter() - began)
-        share = None
+        fraction = None
         if idle:
             time.sleep(SETTLE_SECONDS)
             pids = [server.pid] if app == "bare" else [server.pid, server.front]
             before = cpu_seconds(pids)
             time.sleep(idle)
-            share = (cpu_seconds(pids) - before) / idle
+            fraction = (cpu_seconds(pids) - before) / idle
             if app == "app":
                 print("over the wire:", end=" ")
                 # This thread runs Playwright's loop.
                 sizes = starter.submit(over_the_wire, server.url).result().items()
                 print(", ".join(f"{name} {size / 1e3:.0f} kB" for name, size in sizes))
         page.close()
-    return times, share
+    return times, fraction
 
 
 def main() -> None:
@@ -144,12 +144,12 @@ def main() -> None:
     parser.add_argument("--idle", type=float, default=20.0, help="seconds at rest (default: 20)")
     options = parser.parse_args()
     times: dict[str, list[Times]] = defaultdict(list)
-    shares: dict[str, float | None] = {}
+    fractions: dict[str, float | None] = {}
     with launched() as browser:
         for number in range(1, options.starts + 1):
             for app in APPS:
                 last = number == options.starts
-                taken, shares[app] = one_start(browser, app, options.idle if last else 0.0)
+                taken, fractions[app] = one_start(browser, app, options.idle if last else 0.0)
                 times[app].append(taken)
                 print(
                     f"{app:5} port {taken.port:.2f} s  usable {taken.usable:.2f} s  "
@@ -162,7 +162,7 @@ def main() -> None:
         load = statistics.median(each.load for each in all_taken)
         print(f"{app:5} median: port {port:.2f} s, usable page {usable:.2f} s", end="")
         print(f", loaded anew {load:.2f} s", end="")
-        print(f", at rest {100.0 * (shares[app] or 0.0):.1f} % of a core")
+        print(f", at rest {100.0 * (fractions[app] or 0.0):.1f} % of a core")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 from katana450.maths.motion.pursuit import stream_step
 from katana450.maths.motion.stream import Stream
 
@@ -96,12 +96,12 @@ class Feed:
 
 def ours(limiter: Limiter, feed: Feed) -> FloatArray:
     """The app's own follower: (ticks, 3) q, qd, qdd."""
-    now, stream, found = Motion.rest(np.zeros(1)), None, []
+    now, stream, found = JointMotion.rest(np.zeros(1)), None, []
     for number, samples in enumerate(feed.ticks):
         for t, q, qd in samples:
             sample = np.array([q]), None if qd is None else np.array([qd])
             stream = (
-                Stream.begun(t, *sample)
+                Stream.begin(t, *sample)
                 if stream is None
                 else stream.followed_by(t, *sample, limiter.limits.acceleration)
             )
@@ -141,7 +141,7 @@ def ruckigs(limiter: Limiter, feed: Feed) -> FloatArray:
 
 def smoothed(limiter: Limiter, feed: Feed) -> FloatArray:
     """A first-order filter of the samples, and the limits behind it."""
-    now, goal, low, found = Motion.rest(np.zeros(1)), None, np.zeros(1), []
+    now, goal, low, found = JointMotion.rest(np.zeros(1)), None, np.zeros(1), []
     for samples in feed.ticks:
         for _, q, _ in samples:
             goal = np.array([q])

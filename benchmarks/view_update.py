@@ -24,7 +24,7 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.robot.collision import standing_around, world_of
+from katana450.arm.robot.collision import initial_objects, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -64,7 +64,7 @@ def loop_of(robot: Robot, settings: Settings) -> tuple[ControlLoop, Session, Mai
     arm = robot.require_arm()
     world, _ = world_of(robot)
     assert world is not None
-    world = world.with_obstacles(standing_around(load_props()))
+    world = world.with_obstacles(initial_objects(load_props()))
     session = Session(arm, arm.ready(settings.ready), world)
     mailbox, clock = Mailbox(session.check), Hand()
     driver = SimulatedDriver(arm, session.ready, gripper=0.0)
@@ -114,7 +114,7 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     view = View(
         server,
         robot,
-        loop.board,
+        loop.state_publisher,
         RecordedGestures(),
         lambda: mailbox.last_ticket,
         session,
@@ -125,17 +125,17 @@ def drive(said: Callable[[int, Session, State], Command | None]) -> None:
     floor: list[float] = []
     began = time.perf_counter()
     for tick in range(TICKS):
-        command = said(tick, session, loop.board.snapshot.state)
+        command = said(tick, session, loop.state_publisher.snapshot.state)
         if command is not None:
             mailbox.put(command)
         clock.t += 1.0 / settings.rate
         # At the pace of the app: what is shown ten times a second comes in every fourth frame.
         time.sleep(max(0.0, began + clock.t - time.perf_counter()))
         loop.tick()
-        if tick % EVERY or not loop.board.snapshot.state.moving:
+        if tick % EVERY or not loop.state_publisher.snapshot.state.moving:
             continue
-        ours.append(timed(lambda: view.show(loop.board.snapshot)))
-        floor.append(timed(lambda: nodes.move(loop.board.snapshot.state.q)))
+        ours.append(timed(lambda: view.show(loop.state_publisher.snapshot)))
+        floor.append(timed(lambda: nodes.move(loop.state_publisher.snapshot.state.q)))
     print(f"{said.__name__.replace('_', ' ')}, {len(ours)} frames")
     for name, times in (("katana450", ours), ("turns alone, by viser's setter", floor)):
         p50, p95 = 1e3 * np.percentile(times, (50, 95))

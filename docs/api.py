@@ -25,7 +25,7 @@ PREFACE = """\
 <!-- Written by `python -m docs.api` from the shapes in app/katana450/server/api. -->
 
 What the page can ask of the arm a program can ask too, by the same rules: one holds the arm at a
-time, everybody may stop it, and whoever holds it gives ten signs of life a second. Each message is a
+time, everybody may stop it, and whoever holds it gives ten heartbeats a second. Each message is a
 JSON object. A request says what to `do`; with an `id`, a number or a text of your own, it is answered
 by a message that bears it. Lengths are in m, angles in rad, times in s.
 
@@ -36,13 +36,13 @@ by a message that bears it. Lengths are in m, angles in rad, times in s.
 | **websocket** `/api/v{version}/socket?name=NAME` | requests up, answers and states down |
 | **TCP**, a JSON object a line | `katana450 serve --lines PORT`, for programs of the same machine; the first line is a `hello` |
 | **HTTP** `POST /api/v{version}/do` | one request; a header `X-Program` with a secret key of 16 to 64 letters and digits, chosen by the program, tells programs apart; `X-Name` is the name that others see |
-| **HTTP** `GET /api/v{version}/state`, `arm`, `ledger`, `branches`, `loop`, `things`, `world`, `links` | what `query` tells |
+| **HTTP** `GET /api/v{version}/state`, `arm`, `event_log`, `branches`, `loop`, `objects`, `world`, `links` | what `query` tells |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf file, to be placed by the key in the answer |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | what stands around as a .zip ([scenes](scenes.md)); one that is brought waits for a `load` |
 | **HTTP** `POST /api/v{version}/stop` | STOP |
 | **HTTP** `GET /api/v{version}/openapi.json` | all this as OpenAPI |
 
-Every request is a sign of life. Where the server asks for a link ([access](access.md)) the token
+Every request is a heartbeat. Where the server asks for a link ([access](access.md)) the token
 behind its `#` comes as `Authorization: Bearer TOKEN`, or in the `hello`. A moving arm is stopped when
 whoever holds it falls silent or hangs up; after a stop nothing moves before a `clear_stop` and a new
 command. A script that a program has the server run ends at rest once nothing is received from that
@@ -76,14 +76,14 @@ with connect("http://127.0.0.1:8080", name="My script") as arm:
     there = arm.go(requests.Position(p=(0.45, 0.1, 0.0)))  # the tool point, pitch and roll kept
     print(there.why or "all as wished")
     done = arm.ask(requests.Joint(axis=5, value=4.0))
-    print(done.outcome, [found.said for found in done.findings])  # limited, axis 5 at its limit
+    print(done.outcome, [found.text for found in done.findings])  # limited, axis 5 at its limit
 ```
 
 `arm.upload(Path("bracket.stl"))` brings a mesh, `arm.ask(requests.Place(name="bracket",
-form=requests.Form.MESH, mesh=key))` stands it in front of the arm; `arm.save_scene()` and
+shape=requests.Shape.MESH, mesh=key))` stands it in front of the arm; `arm.save_scene()` and
 `arm.load_scene(data)` keep what stands around.
 
-`connect` gives the signs of life by itself. `aconnect` is the same for asyncio. What is refused
+`connect` gives the heartbeats by itself. `aconnect` is the same for asyncio. What is refused
 raises `RefusedError`, whose text says why and what to do. No call waits for ever: a server that does
 not answer raises `LostError`.
 
@@ -128,7 +128,7 @@ def page() -> str:
                 )
                 parts += [_kind(kind, tag) for kind in kinds]
     parts.append("### In requests\n")
-    parts += [_kind(kind, None) for kind in (requests.Named, requests.Setting)]
+    parts += [_kind(kind, None) for kind in (requests.FieldName, requests.FieldSetting)]
     parts.append("### In answers\n")
     parts += [
         _kind(kind, None)
@@ -137,9 +137,9 @@ def page() -> str:
                 answers.Finding,
                 answers.PartRefusal,
                 answers.Water,
-                answers.Line,
-                answers.Choice,
-                answers.Thing,
+                answers.LogLine,
+                answers.BranchOption,
+                answers.SceneObject,
             ),
             *(answers.Value, answers.Node, answers.Field, answers.Link),
         )

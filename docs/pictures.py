@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from katana450.client import Client, connect
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.requests import Order, Program, Steer
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers
-from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
+from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 from tests.browser.chromium import launched
 from tests.browser.page import Camera, Drawing, ViserPage
 from tests.browser.server import AppServer
@@ -117,15 +117,15 @@ def pouring(page: ViserPage) -> None:
     with connect(url, "Pictures") as arm:
         send(arm, PourDemo().text)
         program(arm, lambda told: told.status in ("ready", "refused"))
-        arm.ask(Steer(order=Order.RUN))
-        for task, share in STAGES:
-            program(arm, lambda told, t=task, s=share: told.task == t and told.share >= s)  # type: ignore[misc]
-            arm.ask(Steer(order=Order.PAUSE))
+        arm.ask(Steer(order=ProgramOrder.RUN))
+        for task, fraction in STAGES:
+            program(arm, lambda told, t=task, s=fraction: told.task == t and told.fraction >= s)  # type: ignore[misc]
+            arm.ask(Steer(order=ProgramOrder.PAUSE))
             page.page.wait_for_timeout(700)
             page.wait_drawn()
             pictures.append(tile(page))
-            arm.ask(Steer(order=Order.RESUME))
-        arm.ask(Steer(order=Order.END))
+            arm.ask(Steer(order=ProgramOrder.RESUME))
+        arm.ask(Steer(order=ProgramOrder.END))
     sheet = np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
     imageio.imwrite(IMAGES / "pouring.jpg", sheet, quality=85)
 
@@ -139,12 +139,12 @@ def instruments(page: ViserPage) -> None:
         page.press_in_bar("Instruments")
         send(arm, CircleDemo(tool="tcp").text)
         program(arm, lambda told: told.status in ("ready", "refused"))
-        arm.ask(Steer(order=Order.RUN))
-        # The way to its start counts as a share of its own.
-        program(arm, lambda told: told.task == "circle" and told.share > 0.75)
-        program(arm, lambda told: told.task == "circle" and 0.05 < told.share < 0.3)
-        program(arm, lambda told: told.share > 0.75)
-        arm.ask(Steer(order=Order.PAUSE))
+        arm.ask(Steer(order=ProgramOrder.RUN))
+        # The way to its start counts as a fraction of its own.
+        program(arm, lambda told: told.task == "circle" and told.fraction > 0.75)
+        program(arm, lambda told: told.task == "circle" and 0.05 < told.fraction < 0.3)
+        program(arm, lambda told: told.fraction > 0.75)
+        arm.ask(Steer(order=ProgramOrder.PAUSE))
         page.page.locator("#instruments").get_by_role("button", name="Pause").click()
         page.page.wait_for_timeout(3000)
         page.screenshot(IMAGES / "instruments.png")
@@ -180,7 +180,7 @@ def tile(page: ViserPage) -> NDArray[np.uint8]:
 
 
 PICTURES: dict[Callable[[ViserPage], None], Camera] = {
-    app: Camera(LOOKS[Preset.FREE].position, LOOKS[Preset.FREE].target, FOV),
+    app: Camera(CAMERA_POSES[Preset.FREE].position, CAMERA_POSES[Preset.FREE].target, FOV),
     gallery: Camera(),
     pouring: Camera((1.19, 0.68, 0.80), (0.2, 0.09, 0.2), math.radians(50.0)),
     instruments: Camera((0.9, -0.75, 0.7), (0.25, 0.0, 0.2), math.radians(45.0)),

@@ -5,7 +5,7 @@ const Jog = (() => {
   const EVERY = 40; // ms
   const LINEAR = 0.25; // m/s at full deflection
   const ANGULAR = 1.2; // rad/s
-  const DEAD = 0.12; // share of a stick's way that counts as nothing
+  const DEAD = 0.12; // fraction of a stick's way that counts as nothing
   const MOUSE_FULL = 350; // what a SpaceMouse reports at full deflection
   const MOUSE_FRESH = 150; // ms; it reports all the time while it is held
   // x, y, z, pitch, roll
@@ -50,7 +50,7 @@ const Jog = (() => {
     if (event.type === "keydown") keys.add(event.code);
     else keys.delete(event.code);
     show();
-    beat();
+    sendJog();
     return true;
   }
 
@@ -69,7 +69,7 @@ const Jog = (() => {
       const [shownRight, shownDown] = place(rates, right, down);
       pad.querySelector("i").style.translate =
         `${(shownRight * (width - 38)) / 2}px ${(shownDown * (height - 38)) / 2}px`;
-      beat();
+      sendJog();
     };
     pad.addEventListener("pointerdown", (event) => {
       if (event.button) return;
@@ -82,7 +82,7 @@ const Jog = (() => {
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
       pad.addEventListener(end, () => {
         centre(pad, rates);
-        beat();
+        sendJog();
       });
   }
 
@@ -118,7 +118,7 @@ const Jog = (() => {
       return;
     } else return;
     mouse = { rates, at: performance.now() };
-    beat();
+    sendJog();
   }
 
   async function connect() {
@@ -145,7 +145,7 @@ const Jog = (() => {
   }
 
   let sentAt = 0;
-  function beat() {
+  function sendJog() {
     const now = rates();
     const any = now.some((value) => value !== 0);
     if (!any && !moving) return;
@@ -174,13 +174,13 @@ const Jog = (() => {
         button.setPointerCapture(event.pointerId);
         holds.add(hold);
         show();
-        beat();
+        sendJog();
       });
       for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
         button.addEventListener(end, () => {
           holds.delete(hold);
           show();
-          beat();
+          sendJog();
         });
       button.addEventListener("contextmenu", (event) => event.preventDefault());
     }
@@ -190,7 +190,7 @@ const Jog = (() => {
       navigator.hid.getDevices().then((known) => known.forEach(adopt)).catch(() => {});
     }
     document.addEventListener("visibilitychange", () => document.hidden && quiet());
-    setInterval(beat, EVERY);
+    setInterval(sendJog, EVERY);
   }
 
   return {
@@ -200,7 +200,7 @@ const Jog = (() => {
     show(shown) {
       open = shown;
       quiet();
-      beat();
+      sendJog();
     },
   };
 })();

@@ -10,7 +10,7 @@ let socket = null;
 let count = 0;
 let heard = 0;
 let opened = 0;
-const beats = new Map();
+const heartbeats = new Map();
 let pace = null; // of asking for states, while somebody looks at them
 const looks = new Map();
 
@@ -20,7 +20,7 @@ function connect() {
   const mine = socket;
   mine.onopen = () => {
     heard = performance.now();
-    beats.clear();
+    heartbeats.clear();
     looks.clear();
     postMessage({ link: "up" });
   };
@@ -29,9 +29,9 @@ function connect() {
     const message = JSON.parse(data);
     if (looks.has(message.id)) return shown(message);
     if (message.is !== "echo") return postMessage({ heard: message });
-    const sent = beats.get(message.n);
+    const sent = heartbeats.get(message.n);
     if (sent !== undefined) postMessage({ trip: heard - sent });
-    for (const n of beats.keys()) if (n <= message.n) beats.delete(n);
+    for (const n of heartbeats.keys()) if (n <= message.n) heartbeats.delete(n);
   };
   mine.onclose = ({ code }) => {
     if (mine !== socket) return;
@@ -77,7 +77,7 @@ setInterval(() => {
     postMessage({ link: "down", code: 0 });
     setTimeout(connect, AGAIN);
   } else if (open) {
-    beats.set(++count, now);
+    heartbeats.set(++count, now);
     say({ do: "heartbeat", n: count });
     postMessage({ silent: now - heard });
   }

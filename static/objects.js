@@ -42,8 +42,8 @@ const Objects = (() => {
     if (!mesh) return;
     // Another unit is for the object that stands there already.
     placed = again && placed ? placed : mesh.name;
-    say({ do: "place", name: placed, form: "mesh", mesh: mesh.key });
-    tell(`${placed}: ${mesh.said}`);
+    say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key });
+    tell(`${placed}: ${mesh.text}`);
   }
 
   async function load(scene) {
@@ -51,7 +51,7 @@ const Objects = (() => {
     const answer = await ask("scene", scene);
     if (!answer) return;
     say({ do: "load", scene: answer.key });
-    tell(answer.said);
+    tell(answer.text);
   }
 
   async function save() {

@@ -8,7 +8,7 @@ import signal
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import Session
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
@@ -49,6 +49,6 @@ def arm(robot: Robot) -> MountedArm:
 
 
 @pytest.fixture
-def session(arm: Arm) -> Session:
+def session(arm: ArmModel) -> Session:
     """A session of it with the app's own ready posture."""
     return Session(arm, np.array(Settings().ready))

@@ -16,7 +16,7 @@ class CancelledError(KatanaError):
 
 
 class BlockedError(InputError):
-    """A way that is asked for would bring two things too near to each other."""
+    """A way that is asked for would bring two objects too near to each other."""
 
 
 class RobotDescriptionError(KatanaError):

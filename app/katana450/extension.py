@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
+    from katana450.arm.control.scene_objects import Environment
     from katana450.arm.control.session import Session
-    from katana450.arm.control.things import Environment
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.server.service.nodes import Nodes

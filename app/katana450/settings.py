@@ -21,7 +21,7 @@ class Settings:
         rate: control ticks a second [Hz].
         frame_rate: most view updates a second [Hz].
         ready: posture the arm starts in and Home returns to [rad].
-        silence: time without a sign of life of whoever drives that stops an arm that moves [s].
+        silence: time without a heartbeat of whoever drives that stops an arm that moves [s].
         access: file of the links by which people come in; without it nobody is asked.
         insecure: other machines may come in unasked.
         tls_cert, tls_key: files of a certificate and its key, for https.

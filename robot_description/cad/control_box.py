@@ -60,7 +60,9 @@ def _drum() -> Manifold:
         for z, across in levels
     ]
     top = inset(plan, DRUM_EDGE)
-    rings += [np.column_stack((top * share, np.full(len(top), TOP_CENTRE))) for share in TOP_RINGS]
+    rings += [
+        np.column_stack((top * fraction, np.full(len(top), TOP_CENTRE))) for fraction in TOP_RINGS
+    ]
     return loft(rings).warp_batch(_saddle)
 
 

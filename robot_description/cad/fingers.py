@@ -47,7 +47,7 @@ WINDOW_LENGTH, WINDOW_HEIGHT, WINDOW_CORNER = 9.0, 6.0, 1.6
 WINDOW_GAP, WINDOW_SUNK, WINDOW_DEPTH = 0.5, 0.25, 1.3
 CONTACT_DIAMETER, CONTACT_SUNK, CONTACT_GAP = 2.6, 0.15, 0.3
 
-# Sensor windows: (piece of the strip, share of its length, on the inner side).
+# Sensor windows: (piece of the strip, fraction of its length, on the inner side).
 WINDOWS = ((1, 0.66, True), (3, 0.52, True), (3, 0.52, False))
 CONTACTS = ((3, 0.84), (3, 0.20))
 
@@ -114,12 +114,12 @@ def _outward(along: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([-along[1], along[0]])
 
 
-def _face(piece: int, share: float, inner: bool) -> NDArray[np.float64]:
+def _face(piece: int, fraction: float, inner: bool) -> NDArray[np.float64]:
     """Return the (3, 4) frame on a pad's surface: x along the strip, z out of the pad."""
     start, end = np.array(STRIP[piece]), np.array(STRIP[piece + 1])
     along = _along(piece)
     out = -_outward(along) if inner else _outward(along)
-    at = start + share * (end - start) + (STRIP_THICK / 2 + PAD_THICK) * out
+    at = start + fraction * (end - start) + (STRIP_THICK / 2 + PAD_THICK) * out
     x, z = np.array([*along, 0.0]), np.array([*out, 0.0])
     return np.column_stack((x, np.cross(z, x), z, np.array([*at, 0.0])))
 
@@ -157,8 +157,8 @@ def _crown() -> list[Manifold]:
     ring = rod(2 * outer, root, CROWN_BACK) - rod(2 * inner, root - 1.0, CROWN_BACK + 1.0)
     half = (CROWN_SECTOR / 2.0) * step
     wedge = [
-        (40.0 * math.cos(middle + share * half), 40.0 * math.sin(middle + share * half))
-        for share in (-1.0, -0.5, 0.0, 0.5, 1.0)
+        (40.0 * math.cos(middle + fraction * half), 40.0 * math.sin(middle + fraction * half))
+        for fraction in (-1.0, -0.5, 0.0, 0.5, 1.0)
     ]
     sector = ring ^ prism(on_grid(np.array([(0.0, 0.0), *wedge])), 0.0, 20.0)
     solids = [sector]
@@ -168,9 +168,9 @@ def _crown() -> list[Manifold]:
         points = []
         for radius in (inner + 0.3, outer - 0.1):
             width = radius * step
-            for z, share in ((root + 0.2, 0.30), (tips, 0.12)):
+            for z, fraction in ((root + 0.2, 0.30), (tips, 0.12)):
                 for side in (-1.0, 1.0):
-                    v = side * share * width
+                    v = side * fraction * width
                     points.append((radius * c - v * s, radius * s + v * c, z))
         solids.append(Manifold.hull_points(on_grid(np.array(points))))
     return solids
@@ -195,15 +195,15 @@ def _pads(part: Part, path: Outline) -> None:
         u, v = length / 2, height / 2
         return prism(rectangle((-u, u), (-v, v), WINDOW_CORNER), *levels)
 
-    for piece, share, inner in WINDOWS:
-        frame = _face(piece, share, inner)
+    for piece, fraction, inner in WINDOWS:
+        frame = _face(piece, fraction, inner)
         gap = 2 * WINDOW_GAP
         hole = pane(WINDOW_LENGTH + gap, WINDOW_HEIGHT + gap, (-WINDOW_DEPTH, 1.0))
         part.cut(hole.transform(frame), of=PAD)
         glass = pane(WINDOW_LENGTH, WINDOW_HEIGHT, (-WINDOW_DEPTH - 0.3, -WINDOW_SUNK))
         part.add(LENS, glass.transform(frame))
-    for piece, share in CONTACTS:
-        frame = _face(piece, share, True)
+    for piece, fraction in CONTACTS:
+        frame = _face(piece, fraction, True)
         hole = rod(CONTACT_DIAMETER + 2 * CONTACT_GAP, -0.8, 1.0, segments=12)
         part.cut(hole.transform(frame), of=PAD)
         stud = rod(CONTACT_DIAMETER, -1.2, -CONTACT_SUNK, edge=0.3, segments=12)

@@ -79,8 +79,12 @@ def _cone() -> Manifold:
     """Return the body's blank: turned to a slight barrel, with four flats towards the tip."""
     low, high = CONE_X
     profile = [
-        (low + share * (high - low), CONE_RADIUS - CONE_TAPER * share * (1.0 + share) / 2.0, 0.0)
-        for share in (k / CONE_RINGS for k in range(1, CONE_RINGS + 1))
+        (
+            low + fraction * (high - low),
+            CONE_RADIUS - CONE_TAPER * fraction * (1.0 + fraction) / 2.0,
+            0.0,
+        )
+        for fraction in (k / CONE_RINGS for k in range(1, CONE_RINGS + 1))
     ]
     turned = lathe([(low, CONE_RADIUS, 0.8), *profile], "+x", segments=SEGMENTS)
     sides = prism(_wedge(TIP_HALF_Y), -40.0, 40.0, 0.0, "z")
@@ -113,9 +117,9 @@ def _window() -> list[Manifold]:
 def _pinion() -> Manifold:
     step = 2.0 * math.pi / PINION_TEETH
     points = [
-        (radius * math.cos((k + share) * step), radius * math.sin((k + share) * step))
+        (radius * math.cos((k + fraction) * step), radius * math.sin((k + fraction) * step))
         for k in range(PINION_TEETH)
-        for share, radius in (
+        for fraction, radius in (
             (-0.30, PINION_ROOT),
             (-0.12, PINION_TIP),
             (0.12, PINION_TIP),

@@ -1,7 +1,7 @@
 """Mass, centre of mass and inertia of each link, from its solids, written into the URDF.
 
 A link is the outer shape drawn here with a motor inside. The castings are hollow and hold gears and
-boards that are not drawn, so each link counts its materials at one share of their density: the
+boards that are not drawn, so each link counts its materials at one fraction of their density: the
 share that, with the motor, gives the link its mass. Overlapping bodies count once, as the denser.
 """
 
@@ -115,7 +115,7 @@ class Moments:
 class Inertial:
     """What a URDF says of a link: kg, centre of mass (3,) in m, inertia (3, 3) about it in kg m^2.
 
-    ``fill`` is the share of the materials' density that the link's hollow castings have.
+    ``fill`` is the fraction of the materials' density that the link's hollow castings have.
     """
 
     mass: float

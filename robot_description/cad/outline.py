@@ -135,15 +135,16 @@ def toothed(
     count: int,
     at: tuple[float, float] = (0.0, 0.0),
 ) -> Outline:
-    """Return a circle with ``count`` teeth: each (share of the pitch, depth below ``radius``)."""
+    """Return a circle with ``count`` teeth: each (fraction of the pitch, depth below
+    ``radius``)."""
     step = 2.0 * math.pi / count
     points = [
         (
-            at[0] + (radius - depth) * math.cos((k + share) * step),
-            at[1] + (radius - depth) * math.sin((k + share) * step),
+            at[0] + (radius - depth) * math.cos((k + fraction) * step),
+            at[1] + (radius - depth) * math.sin((k + fraction) * step),
         )
         for k in range(count)
-        for share, depth in teeth
+        for fraction, depth in teeth
     ]
     return on_grid(np.array(points))
 
@@ -166,8 +167,8 @@ def inset(outline: Outline, distance: float) -> Outline:
     length = np.sqrt(side[:, 0] ** 2 + side[:, 1] ** 2)
     inward = np.column_stack((-side[:, 1], side[:, 0])) / length[:, None]
     previous = np.roll(inward, 1, axis=0)
-    share = 1.0 + previous[:, 0] * inward[:, 0] + previous[:, 1] * inward[:, 1]
-    moved = outline + distance * (inward + previous) / share[:, None]
+    fraction = 1.0 + previous[:, 0] * inward[:, 0] + previous[:, 1] * inward[:, 1]
+    moved = outline + distance * (inward + previous) / fraction[:, None]
     kept = np.roll(moved, -1, axis=0) - moved
     if float((kept * side).sum(axis=1).min()) <= 0.0:
         raise ValueError(

@@ -64,8 +64,8 @@ def _ring() -> Manifold:
 
 def _dome() -> Manifold:
     crown = [  # a shallow cap, 12 degrees a facet are smooth
-        (DOME_TOP - DOME_CROWN * share * share, (DOME_RADIUS - 1.0) * share, 0.0)
-        for share in (0.7, 0.35)
+        (DOME_TOP - DOME_CROWN * fraction * fraction, (DOME_RADIUS - 1.0) * fraction, 0.0)
+        for fraction in (0.7, 0.35)
     ]
     return lathe(
         [

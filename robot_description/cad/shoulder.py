@@ -36,8 +36,8 @@ def _apron(foot: float, top: float, height: float) -> Manifold:
     outward = 1.0 if foot > 0.0 else -1.0
     corners = [(outward * 12.0, SKIRT_TOP - 1.0), (foot, SKIRT_TOP - 1.0)]
     for k in range(count):
-        for share, depth in ((0.15, 0.0), (0.45, 0.0), (0.8, APRON_DEPTH)):
-            along = (k + share) / count
+        for fraction, depth in ((0.15, 0.0), (0.45, 0.0), (0.8, APRON_DEPTH)):
+            along = (k + fraction) / count
             x = foot + along * (top - foot) - outward * depth
             corners.append((x, SKIRT_TOP + along * (height - SKIRT_TOP)))
     corners += [(top, height), (outward * 12.0, height)]

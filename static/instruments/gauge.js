@@ -3,7 +3,7 @@ import { arc, clamp, html, set, svg, write } from "./shape.js";
 
 const RING = 44;
 const [FROM, TO] = [-120, 120]; // degrees of the dial
-const HIGH = 0.9; // share of a limit from which a bar warns
+const HIGH = 0.9; // fraction of a limit from which a bar warns
 
 export class Gauge {
   #options;
@@ -92,9 +92,9 @@ export class Bars {
 
   show(values) {
     this.#rows.forEach(({ row, bar, value, limit }, i) => {
-      const share = clamp(values[i] / limit, -1, 1);
-      bar.style.transform = `scaleX(${share.toFixed(4)})`;
-      set(row, "data-tone", Math.abs(share) > HIGH ? "warn" : "ok");
+      const fraction = clamp(values[i] / limit, -1, 1);
+      bar.style.transform = `scaleX(${fraction.toFixed(4)})`;
+      set(row, "data-tone", Math.abs(fraction) > HIGH ? "warn" : "ok");
       write(value, this.#text(values[i]));
       set(row, "aria-valuenow", values[i].toFixed(1));
     });

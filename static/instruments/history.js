@@ -16,7 +16,7 @@ export class History {
   }
 
   take(state) {
-    const t = state.told - state.t > AT_REST ? state.told : state.t;
+    const t = state.sent - state.t > AT_REST ? state.sent : state.t;
     if (t < this.newest - ANEW) this.#count = 0;
     if (t <= this.newest) return;
     const slot = this.#count % CAPACITY;

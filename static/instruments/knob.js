@@ -4,7 +4,7 @@ import { arc, clamp, html, onDial, set, svg, write } from "./shape.js";
 const RING = 47;
 const MOST = 330; // degrees that a dial may go round
 const DEAF = 10; // px round the middle where a direction means nothing
-const FINE = 0.1; // share of a step with Shift
+const FINE = 0.1; // fraction of a step with Shift
 const PAGE = 10; // steps
 const SHAKEN = 600; // ms
 

@@ -9,7 +9,7 @@ const APART = { 10: 2, 30: 5, 120: 20 };
 const LABEL_WIDTH = 56; // px for the time below a line; the outermost ones are not centred
 const COLOURS_KEPT = 500; // ms
 const SERIES = 5; // colours in instruments.css; more lines have them again
-const READ_BY = 0.01; // share of the width a key moves the cursor
+const READ_BY = 0.01; // fraction of the width a key moves the cursor
 
 export class Plot {
   #history;
@@ -20,7 +20,7 @@ export class Plot {
   #legend;
   #canvas = html("canvas", { tabindex: 0, role: "img" });
   #size = { width: 0, height: 0 };
-  #cursor = null; // share of the width
+  #cursor = null; // fraction of the width
   #stale = true;
   #drawn = 0;
   /** @type {any} */
@@ -91,8 +91,8 @@ export class Plot {
       canvas.height = Math.round(clientHeight * devicePixelRatio);
       this.refresh();
     }).observe(canvas);
-    const read = (share) => {
-      this.#cursor = share === null ? null : clamp(share, 0, 1);
+    const read = (fraction) => {
+      this.#cursor = fraction === null ? null : clamp(fraction, 0, 1);
       this.refresh();
     };
     const across = ({ offsetX }) => (offsetX - MARGIN.left) / (this.#size.width - MARGIN.left - MARGIN.right);

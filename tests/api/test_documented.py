@@ -45,7 +45,7 @@ def test_every_request_class_is_a_request_and_declares_its_traits() -> None:
     assert [kind for kind in EVERY_REQUEST if kind.traits.safety] == [requests.Stop]
 
 
-def test_who_holds_the_arm_and_heartbeats_cost_nothing() -> None:
+def test_lease_requests_and_heartbeats_cost_no_budget() -> None:
     kinds = [kind for kind in EVERY_REQUEST if kind.traits.free]
     assert {kind.__name__ for kind in kinds} == {
         *("Stop", "ClearStop", "Heartbeat"),

@@ -84,7 +84,7 @@ class Robot:
             return np.allclose(self.sent(), self.reported(), atol=1e-6)
 
         def rests() -> bool:
-            if "Moving" in self.said() or not arrived():
+            if "Moving" in self.text() or not arrived():
                 return False
             # What the hand did last may still be on its way to the arm.
             before = self.q
@@ -96,7 +96,7 @@ class Robot:
         assert np.allclose(self.drawn(), self.reported(), atol=1e-5)
         assert np.allclose(self.gizmo(), self.reported()[:3, 3], atol=1e-5)
 
-    def said(self) -> str:
+    def text(self) -> str:
         """The status and its sentence."""
         return self.page.text_of(".k450 .status")
 
@@ -150,7 +150,7 @@ def test_the_arm_follows_the_arrow_it_is_dragged_by(robot: Robot, artefacts: Pat
     end = robot.drawn()
     assert end[:3, 3] - start[:3, 3] == pytest.approx([0.0, 0.0, 0.06], abs=PIXEL)
     assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
-    assert "On target" in robot.said()
+    assert "On target" in robot.text()
     robot.page.keep(artefacts / "app-arrow.png")
 
 
@@ -245,7 +245,7 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
 
         def told() -> bool:
             gap = float(np.linalg.norm(robot.gizmo() - robot.drawn()[:3, 3]))
-            return f"{1e3 * gap:.0f} mm out of reach" in robot.said()
+            return f"{1e3 * gap:.0f} mm out of reach" in robot.text()
 
         page.wait_until(told, "how far the arm ends from the handle")
         page.keep(artefacts / "app-out-of-reach.png")
@@ -253,7 +253,7 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
     page.wait_until(
         lambda: np.allclose(robot.gizmo(), robot.drawn()[:3, 3], atol=1e-5), "the handle to return"
     )
-    assert "out of reach" in robot.said()
+    assert "out of reach" in robot.text()
     colours = [
         tuple(m.body["updates"]["color"])
         for m in page.messages("SceneNodeUpdateMessage")
@@ -264,7 +264,7 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
     # At the goal, with the reason gone, there is no ghost any more.
     go_home(robot)
     page.wait_until(lambda: not ghost_is_shown(robot), "the ghost to go")
-    assert "On target" in robot.said()
+    assert "On target" in robot.text()
 
 
 def ghost_is_shown(robot: Robot) -> bool:
@@ -276,8 +276,8 @@ def test_before_the_table_the_arm_stops_says_why_and_is_tinted(
     robot: Robot, artefacts: Path
 ) -> None:
     robot.page.drag_slider("Axis 2", 5.0)
-    robot.page.wait_until(lambda: "mm apart" in robot.said(), "the reason", seconds=20.0)
-    said = robot.said()
+    robot.page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
+    said = robot.text()
     assert "finger and table" in said
     finger = "left" if "Left" in said else "right"
     coat = f"{robot.path[f'finger_{finger}_link']}/contact0"
@@ -285,7 +285,7 @@ def test_before_the_table_the_arm_stops_says_why_and_is_tinted(
     robot.page.wait_drawn()
     robot.page.keep(artefacts / "app-contact.png")
     go_home(robot)
-    robot.page.wait_until(lambda: "On target" in robot.said(), "the reason to go")
+    robot.page.wait_until(lambda: "On target" in robot.text(), "the reason to go")
     (last,) = robot.page.messages("SetSceneNodeVisibilityMessage", node=coat, last=1)
     assert not last.body["visible"]
 
@@ -296,12 +296,12 @@ def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None
         for index, value in enumerate(values):
             page.type_number(label, value, index=index)
     page.click_button("Go to pose")
-    page.wait_until(lambda: "yaw is fixed by position" in robot.said(), "the reason")
+    page.wait_until(lambda: "yaw is fixed by position" in robot.text(), "the reason")
     robot.settle()
     assert robot.drawn()[:3, 3] == pytest.approx([0.35, 0.0, 0.2745], abs=1e-6)
     # The tool's x axis leaves the arm's plane by asin(cos 30 sin 23).
     off = math.degrees(math.asin(math.cos(math.radians(30.0)) * math.sin(math.radians(23.0))))
-    assert f"{off:.0f}° off" in robot.said()
+    assert f"{off:.0f}° off" in robot.text()
 
 
 def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(

@@ -125,7 +125,7 @@ def test_a_circle_is_looked_at_run_and_traced(
 
 def test_the_arm_is_taken_from_a_program(stage: Stage) -> None:
     stage.run(CIRCLE)
-    stage.wait(lambda state: program(state).task == "circle" and program(state).share > 0.1)
+    stage.wait(lambda state: program(state).task == "circle" and program(state).fraction > 0.1)
     stage.page.press_in_bar("Take over")
     state = stage.wait_for("stopped")
     assert "taken" in program(state).why

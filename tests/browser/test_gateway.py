@@ -170,7 +170,7 @@ STOPS = 50 if "KATANA450_LONG" in os.environ else 3
 """In each of four situations; all of them with `make test-long`."""
 
 
-def test_stop_stops_every_time_whatever_else_goes_on(
+def test_stop_works_under_any_load(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
     """Clicked while a key jogs, by keys in a drag, from the far end of a thin line."""
@@ -217,7 +217,7 @@ def test_stop_stops_every_time_whatever_else_goes_on(
     )
 
 
-def test_nothing_of_before_a_stop_moves_after_it(page: ViserPage, truth: Truth) -> None:
+def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, truth: Truth) -> None:
     q = [page.slider_value(f"Axis {axis}") for axis in range(1, 6)]
     with page.grip_arrow(MOVE, "z") as grip:
         page.page.keyboard.press("Space")

@@ -191,7 +191,7 @@ def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -
     page.wait_until(lambda: truth.status()["speed"] == 1.0, "the speed")
 
 
-def test_a_watchers_knob_springs_back_and_says_why(
+def test_knob_of_a_spectator_springs_back_with_the_reason(
     page: ViserPage, server: AppServer, truth: Truth
 ) -> None:
     page.press_in_bar("Let go")
@@ -219,7 +219,7 @@ def test_stop_is_stop_on_a_knob_too(page: ViserPage, truth: Truth, key: str) -> 
     pause = page.page.locator("#instruments .toolbar").get_by_role("button", name="Pause")
     with slowly(page, truth):
         turn(page, "axis-1", -60.0)
-        wished = goal(page, "axis-1")
+        desired = goal(page, "axis-1")
         dial(page, "axis-1").focus()
         truth.wait(mood="moving")
         page.page.keyboard.press(key)
@@ -228,7 +228,7 @@ def test_stop_is_stop_on_a_knob_too(page: ViserPage, truth: Truth, key: str) -> 
         page.wait_until(lambda: bar(page, "toast").startswith("The arm is stopped"), "why not")
         truth.wait(5.0, moving=False)
         rests = math.degrees(truth.status()["q"][0])
-        assert rests > wished + 5.0
+        assert rests > desired + 5.0
         page.wait_until(lambda: goal(page, "axis-1") == pytest.approx(rests, abs=0.1), "the knob")
         # On a button too, which is not pressed by it.
         pause.focus()

@@ -14,9 +14,7 @@ from tests.browser.test_gateway import MOVE, Truth, bar, camera, clear_stop, tak
 from tests.gateway.slow_link import SlowLink
 
 
-def test_a_killed_server_is_told_at_once_and_the_page_comes_back(
-    open_page: OpenPage, artefacts: Path
-) -> None:
+def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefacts: Path) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm", MOVE))
         robot = Robot(page)
@@ -96,7 +94,7 @@ def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
         assert not np.allclose(camera(page), looked, atol=0.02)
 
 
-def test_a_line_that_falls_silent_is_told_and_the_arm_stops(open_page: OpenPage) -> None:
+def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) -> None:
     with AppServer(ATTENTIVE_APP) as server, SlowLink(server.port, 1e9) as line:
         truth = Truth(server)
         page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))

@@ -12,7 +12,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 
 MOVE = "/target/move"
-SHAPE = "/things/3/shape"
+SHAPE = "/objects/3/shape"
 HANDLE = "/handles/3"
 """Cup and basin are there before it."""
 
@@ -22,7 +22,7 @@ def said(page: ViserPage) -> str:
 
 
 def place_of(page: ViserPage) -> np.ndarray:
-    return np.asarray(page.node_pose("/things/3")[:3, 3])
+    return np.asarray(page.node_pose("/objects/3")[:3, 3])
 
 
 def test_an_object_is_brought_moved_changed_and_removed(
@@ -47,7 +47,7 @@ def test_an_object_is_brought_moved_changed_and_removed(
 
         for label in ("Show", "Objects"):
             page.frame.get_by_text(label, exact=True).click()
-        page.frame.get_by_text("Handles on things", exact=True).click()
+        page.frame.get_by_text("Handles on objects", exact=True).click()
         page.wait_ready((HANDLE,))
         assert page.chosen("Object") == "ring"
         page.drag_arrow(HANDLE, "y", 0.12)
@@ -85,7 +85,7 @@ def test_an_object_is_brought_moved_changed_and_removed(
         )
         page.click_button("Remove")
         page.wait_until(
-            lambda: page.messages("RemoveSceneNodeMessage", node="/things/3", last=1), "it to go"
+            lambda: page.messages("RemoveSceneNodeMessage", node="/objects/3", last=1), "it to go"
         )
         page.wait_until(lambda: page.chosen("Object") == "cup", "another object to be chosen")
         refused = [each for each in page.errors if "422" not in each]

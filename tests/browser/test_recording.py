@@ -71,14 +71,14 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
         page.wait_for_function("n => window.__viserMutable?.nodeRefFromName[n]", arg=PAN)
         assert page.evaluate(FAINTEST) == "1"
         page.locator("button").first.click()
-        for share in (0.2, 0.9, 0.5):
+        for fraction in (0.2, 0.9, 0.5):
             box = page.locator(TRACK).bounding_box()
             assert box is not None
-            page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+            page.mouse.click(box["x"] + fraction * box["width"], box["y"] + 0.5 * box["height"])
             # It may still take a step; then it rests.
             page.wait_for_timeout(500)
             t = float(page.evaluate(NOW))
-            assert t == pytest.approx(share * SECONDS, abs=0.15)
+            assert t == pytest.approx(fraction * SECONDS, abs=0.15)
             assert pan(page) == pytest.approx(TURN * t / SECONDS, abs=0.02)
         assert not errors
         assert all(url.startswith(("file:", "blob:", "data:")) for url in asked)
@@ -86,7 +86,7 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
         context.close()
 
 
-def test_picture_stays_as_bright_when_somebody_seeks(browser: Browser, recording: Path) -> None:
+def test_recording_keeps_its_brightness_after_seeking(browser: Browser, recording: Path) -> None:
     """The light of the room is decoded once, and not again with every step backwards."""
     page = browser.new_page(viewport={"width": 480, "height": 320})
     page.add_init_script(COUNT_IMAGES)
@@ -98,10 +98,10 @@ def test_picture_stays_as_bright_when_somebody_seeks(browser: Browser, recording
         page.locator("button").first.click()
         before = settled_brightness(page)
         images = page.evaluate("() => window.images")
-        for share in (0.8, 0.1, 0.6, 0.3):
+        for fraction in (0.8, 0.1, 0.6, 0.3):
             box = page.locator(TRACK).bounding_box()
             assert box is not None
-            page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+            page.mouse.click(box["x"] + fraction * box["width"], box["y"] + 0.5 * box["height"])
             page.wait_for_timeout(300)
             assert brightness(page) == pytest.approx(before, rel=0.1)
         assert page.evaluate("() => window.images") == images

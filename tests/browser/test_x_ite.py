@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Route
 
-from katana450.arm.robot.camera import camera
+from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.vrml import vrml_files

@@ -1,4 +1,4 @@
-"""A viser app with one of each thing that our scripts touch in viser's page."""
+"""A viser app with one of each object that our scripts touch in viser's page."""
 
 from __future__ import annotations
 

@@ -138,16 +138,19 @@ def test_workers_without_katana450_are_refused(
     assert "cannot run katana450: No module named 'app'" in capsys.readouterr().err
 
 
-def test_a_scheduler_without_workers_is_told(
+def test_scheduler_without_workers_is_reported(
     processes: Processes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
     _, address = processes.scheduler()
-    with pytest.raises(ConfigurationError, match="has no workers"), cluster.connected(address):
+    with (
+        pytest.raises(ConfigurationError, match="has no workers"),
+        cluster.connect_cluster(address),
+    ):
         pass
 
 
-def test_a_scheduler_that_dies_is_told(
+def test_dead_scheduler_is_reported(
     scheduler: tuple[subprocess.Popen[str], str], arm: MountedArm
 ) -> None:
     """The last test of this file, because nobody is left to answer after it."""
@@ -155,7 +158,7 @@ def test_a_scheduler_that_dies_is_told(
     reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.0, 4, 4)
     survey = Survey(reachability, voxel=0.05, samples=0, seed=0)
     chunks = survey.grid.chunks(50)
-    with cluster.connected(address) as connection:
+    with cluster.connect_cluster(address) as connection:
         arriving = connection.counts(survey, chunks)
         number, counts = next(arriving)
         assert np.array_equal(counts, survey.count(chunks[number]))

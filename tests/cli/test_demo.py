@@ -122,7 +122,7 @@ def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     assert places == sorted(places)
 
 
-def test_a_bound_that_is_missed_is_told(tmp_path: Path) -> None:
+def test_missed_bound_is_reported(tmp_path: Path) -> None:
     script = tmp_path / "impossible.yaml"
     script.write_text(
         "gripper: none\nsteps:\n  - joints: [0, -60, 80, 8, 0]\n"
@@ -134,7 +134,7 @@ def test_a_bound_that_is_missed_is_told(tmp_path: Path) -> None:
     assert "path_length_mm was not measured" in done.stderr
 
 
-def test_what_is_wrong_with_a_script_is_told_like_a_compiler_does(tmp_path: Path) -> None:
+def test_script_errors_are_reported_with_line_and_column(tmp_path: Path) -> None:
     script = tmp_path / "wrong.yaml"
     script.write_text("steps:\n  - hme\n  - wait: x\n")
     done = katana450("run", str(script), "--headless")

@@ -80,7 +80,7 @@ def test_ik_states_what_is_lost_of_a_pose_no_5_axis_arm_can_take() -> None:
     assert answer["residual_mm"] == pytest.approx(1000.0 - 631.8, abs=1e-6)
 
 
-def test_ik_with_badges_says_what_each_solution_costs() -> None:
+def test_ik_with_metrics_gives_the_cost_of_each_solution() -> None:
     q = [0.3, -0.9, 0.8, 0.4, 1.0]
     (pose,) = ask("fk", [{"q": q}])
     plain, badged = ask("ik", [pose])[0], ask("ik", [pose | {"q": q}], "--badges")[0]

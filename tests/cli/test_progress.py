@@ -25,7 +25,7 @@ def test_items_pass_and_a_terminal_sees_how_many() -> None:
     assert text.endswith("\n")
 
 
-def test_what_is_left_is_told() -> None:
+def test_remaining_distance_is_reported() -> None:
     terminal = Terminal()
     for _ in progress(range(4), 4, "Work", terminal):
         time.sleep(0.11)

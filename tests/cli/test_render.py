@@ -50,6 +50,6 @@ def test_what_cannot_be_done_is_said(
     "words",
     [("--size", "9x9"), ("--size", "big"), ("--camera", "moon"), ("--run", "pour", "--pose", "0")],
 )
-def test_words_that_mean_nothing_are_not_understood(tmp_path: Path, words: tuple[str, ...]) -> None:
+def test_unknown_words_are_refused(tmp_path: Path, words: tuple[str, ...]) -> None:
     with pytest.raises(SystemExit):
         main(["render", "--out", str(tmp_path / "a.png"), *words])

@@ -43,7 +43,7 @@ def test_it_serves_the_page_on_this_machine_only() -> None:
             assert addresses == {"0100007F"}  # 127.0.0.1
 
 
-def test_a_busy_port_is_told_with_the_way_out() -> None:
+def test_busy_port_is_reported_with_the_remedy() -> None:
     with socket.socket() as other:
         other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         other.bind(("127.0.0.1", free_port()))
@@ -70,7 +70,7 @@ def test_two_servers_do_not_share_a_port() -> None:
         (("--host", "192.0.2.1", "--port", "8299"), "--host"),
     ],
 )
-def test_an_address_that_cannot_be_is_told(options: tuple[str, ...], said: str) -> None:
+def test_invalid_address_is_reported(options: tuple[str, ...], said: str) -> None:
     done = serve(*options)
     assert done.returncode != 0
     assert said in done.stderr
@@ -78,7 +78,7 @@ def test_an_address_that_cannot_be_is_told(options: tuple[str, ...], said: str) 
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_it_stops_when_told(number: signal.Signals) -> None:
+def test_viewer_stops_on_request(number: signal.Signals) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "katana450", "serve", "--port", str(free_port())],
         stdout=subprocess.PIPE,
@@ -99,7 +99,7 @@ def test_it_stops_when_told(number: signal.Signals) -> None:
     assert output == ""
 
 
-def test_a_start_that_fails_late_says_why_and_no_more(tmp_path: Path) -> None:
+def test_late_start_failure_reports_only_its_reason(tmp_path: Path) -> None:
     (tmp_path / "map.npz").write_text("no map")
     done = serve("--port", str(free_port()), "--workspace", str(tmp_path / "map.npz"))
     assert done.returncode == 1

@@ -28,7 +28,7 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
     said = capsys.readouterr()
     stored = load_map(out)
     assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in said.out
-    assert f"{stored.share.max():.1%}" in said.out
+    assert f"{stored.fraction.max():.1%}" in said.out
     assert f"Written: {ply}" in said.out
     assert said.err == ""
     assert sorted(tmp_path.iterdir()) == [out, ply]
@@ -73,7 +73,7 @@ def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
         (["--scheduler", ""], "missing port"),
     ],
 )
-def test_what_cannot_be_done_is_told_before_the_work(
+def test_impossible_options_are_refused_before_the_work(
     options: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start = time.monotonic()

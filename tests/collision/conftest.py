@@ -13,7 +13,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.collision import engine as engines
 from katana450.maths.collision.engine import Engine
 from katana450.maths.collision.shape import half_space
-from katana450.maths.collision.world import World, obstacle
+from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -30,7 +30,7 @@ def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
 
 
 @pytest.fixture(scope="module")
-def bare(robot: Robot, engine: Engine) -> World:
+def bare(robot: Robot, engine: Engine) -> CollisionWorld:
     """The arm without anything round it."""
     world, notes = world_of(robot)
     assert world is not None
@@ -40,7 +40,7 @@ def bare(robot: Robot, engine: Engine) -> World:
 
 
 @pytest.fixture(scope="module")
-def world(bare: World) -> World:
+def world(bare: CollisionWorld) -> CollisionWorld:
     """The arm on its table."""
     return bare.with_obstacles([obstacle("table", np.eye(4), half_space())])
 

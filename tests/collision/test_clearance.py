@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.maths.collision.clearance import CREEP, GRAZE, SETTLING, STOP, advance
-from katana450.maths.collision.linkage import Linkage, Mover
+from katana450.maths.collision.clearance import (
+    MAX_UNCHECKED_PATH,
+    MIN_STOP_TIME,
+    MIN_TRAVEL,
+    STOP,
+    advance,
+)
+from katana450.maths.collision.linkage import Linkage, RigidGroup
 from katana450.maths.collision.shape import box, cylinder
-from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -30,18 +36,18 @@ def at(x: float, y: float, z: float) -> FloatArray:
 
 
 @pytest.fixture(scope="module")
-def bar() -> World:
+def bar() -> CollisionWorld:
     """A bar 1 m long that turns about z, a wall a quarter turn away, and a reed half way."""
-    linkage = Linkage([Mover(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
+    linkage = Linkage([RigidGroup(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
     parts = [
         Part("bar", 1, (at(0.6, 0.0, 0.0),), (box((1.0, 0.02, 0.02)),)),
         obstacle("wall", at(0.0, 1.0, 0.0), box((0.02, 1.0, 1.0))),
         obstacle("reed", at(0.6, -0.6, 0.0), cylinder(0.0005, 1.0)),
     ]
-    return World(linkage, parts, [(0, 1), (0, 2)])
+    return CollisionWorld(linkage, parts, [(0, 1), (0, 2)])
 
 
-def turned(bar: World, start: float, goal: float, speed: float) -> Iterator[FloatArray]:
+def turned(bar: CollisionWorld, start: float, goal: float, speed: float) -> Iterator[FloatArray]:
     """The postures of the bar, tick by tick, until it rests."""
     x, end = np.array([start]), np.array([goal])
     for _ in range(2000):
@@ -54,15 +60,15 @@ def turned(bar: World, start: float, goal: float, speed: float) -> Iterator[Floa
 
 
 @pytest.mark.parametrize("speed", [0.2, 2.0, 20.0])
-def test_the_bar_stops_before_the_wall(bar: World, speed: float) -> None:
+def test_the_bar_stops_before_the_wall(bar: CollisionWorld, speed: float) -> None:
     *_, last = turned(bar, 0.0, 3.0, speed)
     contact = bar.nearest(last)
     assert contact is not None
     assert contact.parts == ("bar", "wall")
-    assert STOP - SLIGHTLY <= contact.distance < STOP + 10.0 * CREEP / (TICK / SETTLING)
+    assert STOP - SLIGHTLY <= contact.distance < STOP + 10.0 * MIN_TRAVEL / (TICK / MIN_STOP_TIME)
 
 
-def test_it_slows_down_on_the_way(bar: World) -> None:
+def test_it_slows_down_on_the_way(bar: CollisionWorld) -> None:
     way = [0.0, *(float(x[0]) for x in turned(bar, 0.0, 3.0, 2.0))]
     steps = np.diff(way)
     assert steps.max() == pytest.approx(2.0 * TICK)
@@ -72,7 +78,9 @@ def test_it_slows_down_on_the_way(bar: World) -> None:
 
 
 @pytest.mark.parametrize("speed", [2.0, 8.0, 20.0])
-def test_it_does_not_jump_over_a_reed_thinner_than_its_step(bar: World, speed: float) -> None:
+def test_it_does_not_jump_over_a_reed_thinner_than_its_step(
+    bar: CollisionWorld, speed: float
+) -> None:
     *_, last = turned(bar, 0.0, -1.5, speed)
     assert last[0] > -np.pi / 4
     contact = bar.nearest(last)
@@ -81,7 +89,7 @@ def test_it_does_not_jump_over_a_reed_thinner_than_its_step(bar: World, speed: f
     assert contact.distance >= STOP - SLIGHTLY
 
 
-def test_away_it_goes_as_fast_as_it_can(bar: World) -> None:
+def test_away_it_goes_as_fast_as_it_can(bar: CollisionWorld) -> None:
     *_, last = turned(bar, 0.0, 3.0, 2.0)
     step = advance(bar, last, last - 2.0 * TICK, TICK)
     assert step.contact is None
@@ -89,7 +97,7 @@ def test_away_it_goes_as_fast_as_it_can(bar: World) -> None:
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.002, 0.008])
-def test_from_too_near_it_goes_away_and_no_nearer(bar: World, depth: float) -> None:
+def test_from_too_near_it_goes_away_and_no_nearer(bar: CollisionWorld, depth: float) -> None:
     """Where the wall was put onto the bar, or a driver went too far."""
     *_, last = turned(bar, 0.0, 3.0, 2.0)
     x = last + (STOP - 0.004 + depth) / 1.1
@@ -110,7 +118,7 @@ def test_from_too_near_it_goes_away_and_no_nearer(bar: World, depth: float) -> N
     assert away.distance > 2.0 * STOP
 
 
-def test_a_step_with_room_is_done_to_the_bit(bar: World) -> None:
+def test_a_step_with_room_is_done_to_the_bit(bar: CollisionWorld) -> None:
     x, towards = np.array([0.1]), np.array([0.1 + 1e-3])
     step = advance(bar, x, towards, TICK)
     assert step.x is towards
@@ -119,7 +127,7 @@ def test_a_step_with_room_is_done_to_the_bit(bar: World) -> None:
     assert advance(bar, x, np.array([0.1]), TICK).x is x
 
 
-def test_the_same_step_is_the_same_to_the_bit(world: World, postures: FloatArray) -> None:
+def test_the_same_step_is_the_same_to_the_bit(world: CollisionWorld, postures: FloatArray) -> None:
     for x, towards in zip(postures[:50], postures[50:100], strict=True):
         end = x + 0.02 * np.sign(towards - x)
         one, two = advance(world, x, end, TICK), advance(world, x, end, TICK)
@@ -127,7 +135,7 @@ def test_the_same_step_is_the_same_to_the_bit(world: World, postures: FloatArray
 
 
 def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
-    arm: MountedArm, world: World, limits: tuple[FloatArray, FloatArray]
+    arm: MountedArm, world: CollisionWorld, limits: tuple[FloatArray, FloatArray]
 ) -> None:
     """From goal to goal, most of them in the table or in the arm itself; also between the ticks."""
     rng = np.random.default_rng(10)
@@ -151,6 +159,6 @@ def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
     assert stops >= 5
 
 
-def test_a_graze_is_thinner_than_any_part(world: World) -> None:
+def test_a_graze_is_thinner_than_any_part(world: CollisionWorld) -> None:
     thinnest = min(2.0 * float(half.min()) for half in world.box_half)
-    assert thinnest > GRAZE
+    assert thinnest > MAX_UNCHECKED_PATH

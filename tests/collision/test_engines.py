@@ -12,7 +12,7 @@ import pytest
 
 from katana450.maths.collision.engine import Engine, Witness
 from katana450.maths.collision.nearest_points import Support, deepest, nearest_points, overlap
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -93,7 +93,9 @@ def test_fcl_measures_the_distances_of_coal(engine: Engine, kinds: tuple[str, st
         )
 
 
-def test_distances_of_the_arm_are_on_their_bounds(world: World, postures: FloatArray) -> None:
+def test_distances_of_the_arm_are_on_their_bounds(
+    world: CollisionWorld, postures: FloatArray
+) -> None:
     """No body reaches beyond the plane across its nearest point: so no distance is too great."""
     points = hull_points(world)
     for x in postures[:10]:
@@ -114,7 +116,7 @@ def test_distances_of_the_arm_are_on_their_bounds(world: World, postures: FloatA
             assert abs(found.distance - bound) <= SAME
 
 
-def hull_points(world: World) -> dict[int, FloatArray]:
+def hull_points(world: CollisionWorld) -> dict[int, FloatArray]:
     """Return the corners of the hulls of ``world``, in the frames of the pieces."""
     shapes = [shape for part in world.parts for shape in part.shapes]
     found = {}

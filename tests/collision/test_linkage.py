@@ -7,13 +7,13 @@ import yourdfpy
 
 from katana450.arm.robot.robot import Robot
 from katana450.maths.collision.linkage import GROUND
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 
 
 def test_every_part_is_where_the_description_has_it(
-    robot: Robot, bare: World, postures: FloatArray
+    robot: Robot, bare: CollisionWorld, postures: FloatArray
 ) -> None:
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
     for x in postures[:20]:
@@ -24,7 +24,7 @@ def test_every_part_is_where_the_description_has_it(
             np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
 
 
-def test_what_lies_between_two_pieces(bare: World) -> None:
+def test_what_lies_between_two_pieces(bare: CollisionWorld) -> None:
     mover = {part.name: part.mover for part in bare.parts}
 
     def between(a: str, b: str) -> frozenset[int]:

@@ -7,21 +7,21 @@ from itertools import combinations, product
 import numpy as np
 
 from katana450.maths.collision.clearance import STOP
-from katana450.maths.collision.linkage import Linkage, Mover
+from katana450.maths.collision.linkage import Linkage, RigidGroup
 from katana450.maths.collision.pairs import pairs_that_meet
 from katana450.maths.collision.shape import box
-from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def names(world: World) -> set[tuple[str, str]]:
+def names(world: CollisionWorld) -> set[tuple[str, str]]:
     return {(world.parts[a].name, world.parts[b].name) for a, b in world.pairs}
 
 
-def test_neighbours_and_the_two_fingers_are_left_out(bare: World) -> None:
+def test_neighbours_and_the_two_fingers_are_left_out(bare: CollisionWorld) -> None:
     found = names(bare)
     assert not found & {
         ("base_link", "arm_base_link"),
@@ -34,12 +34,14 @@ def test_neighbours_and_the_two_fingers_are_left_out(bare: World) -> None:
     }
 
 
-def test_parts_that_can_meet_are_in(bare: World) -> None:
+def test_parts_that_can_meet_are_in(bare: CollisionWorld) -> None:
     tools = ("roll_link", "gripper_link", "finger_right_link", "finger_left_link")
     assert names(bare) >= set(product(("base_link", "arm_base_link", "upper_arm_link"), tools))
 
 
-def test_pairs_left_out_never_come_near(bare: World, limits: tuple[FloatArray, FloatArray]) -> None:
+def test_pairs_left_out_never_come_near(
+    bare: CollisionWorld, limits: tuple[FloatArray, FloatArray]
+) -> None:
     """Each is driven as near as it goes, from many postures, by the steepest of random steps."""
     lower, upper = limits
     candidates = {
@@ -49,9 +51,9 @@ def test_pairs_left_out_never_come_near(bare: World, limits: tuple[FloatArray, F
     }
     rng = np.random.default_rng(9)
     for pair in sorted(candidates - set(bare.pairs)):
-        alone = World(bare.linkage, bare.parts, [pair])
+        alone = CollisionWorld(bare.linkage, bare.parts, [pair])
 
-        def distance(x: FloatArray, alone: World = alone) -> float:
+        def distance(x: FloatArray, alone: CollisionWorld = alone) -> float:
             contact = alone.nearest(x)
             assert contact is not None
             return contact.distance
@@ -73,7 +75,7 @@ def test_pairs_left_out_never_come_near(bare: World, limits: tuple[FloatArray, F
 def test_parts_in_each_other_by_design_are_left_out() -> None:
     """A sleeve on the second of two joints that turn about one line."""
     moved = se3.from_rotation_translation(np.eye(3), (1.0, 0.0, 0.0))
-    linkage = Linkage([Mover(0, np.eye(4), UP, 0), Mover(1, np.eye(4), UP, 1)])
+    linkage = Linkage([RigidGroup(0, np.eye(4), UP, 0), RigidGroup(1, np.eye(4), UP, 1)])
     cube = box((1.0, 1.0, 1.0))
     parts = [
         obstacle("post", np.eye(4), cube),

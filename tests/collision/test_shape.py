@@ -9,21 +9,21 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.maths.collision.linkage import Linkage, Mover
-from katana450.maths.collision.shape import Shape, box, cylinder, half_space, hull
-from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.collision.linkage import Linkage, RigidGroup
+from katana450.maths.collision.shape import CollisionShape, box, cylinder, half_space, hull
+from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
 CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
-def apart(one: Shape, other: Shape, p: tuple[float, float, float]) -> float:
+def apart(one: CollisionShape, other: CollisionShape, p: tuple[float, float, float]) -> float:
     """The distance between two shapes, the second at ``p`` [m] on a joint that stays at zero."""
     T = se3.from_rotation_translation(np.eye(3), p)
-    linkage = Linkage([Mover(0, T, np.array([0.0, 0.0, 1.0]), 0)])
+    linkage = Linkage([RigidGroup(0, T, np.array([0.0, 0.0, 1.0]), 0)])
     parts = [obstacle("one", np.eye(4), one), Part("other", 1, (np.eye(4),), (other,))]
-    contact = World(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
+    contact = CollisionWorld(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
     assert contact is not None
     assert contact.parts == ("one", "other")
     assert np.linalg.norm(contact.normal) == pytest.approx(1.0)
@@ -47,8 +47,8 @@ def apart(one: Shape, other: Shape, p: tuple[float, float, float]) -> float:
     ],
 )
 def test_distances(
-    cube: Callable[[], Shape],
-    other: Callable[[], Shape],
+    cube: Callable[[], CollisionShape],
+    other: Callable[[], CollisionShape],
     p: tuple[float, float, float],
     distance: float,
 ) -> None:
@@ -67,9 +67,9 @@ def test_a_half_space_is_flat_and_endless(side: float) -> None:
 
 def test_shapes_are_where_they_are_put() -> None:
     T = se3.from_rotation_translation(so3.rotation_z(np.pi / 4), (2.0, 0.0, 0.0))
-    linkage = Linkage([Mover(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
+    linkage = Linkage([RigidGroup(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
     parts = [Part("turning", 1, (np.eye(4),), (hull(CUBE),)), obstacle("turned", T, hull(CUBE))]
-    contact = World(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
+    contact = CollisionWorld(linkage, parts, [(0, 1)]).nearest(np.zeros(1))
     assert contact is not None
     assert contact.distance == pytest.approx(1.5 - np.sqrt(0.5), abs=1e-6)
 

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 from manifold3d import Manifold
 
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from robot_description.cad.build import PARTS
 from robot_description.cad.hulls import whole
@@ -22,7 +22,7 @@ def solid(link: str) -> Manifold:
     return whole(next(make() for make in PARTS if make.__name__ == link))
 
 
-def placed(world: World, number: int, T_base_mover: FloatArray) -> Manifold:
+def placed(world: CollisionWorld, number: int, T_base_mover: FloatArray) -> Manifold:
     part = world.parts[number]
     T = T_base_mover[part.mover] @ part.T_mover_shape[0]
     T[:3, 3] *= 1e3
@@ -30,7 +30,7 @@ def placed(world: World, number: int, T_base_mover: FloatArray) -> Manifold:
 
 
 def test_no_solids_touch_where_the_bodies_are_clear(
-    bare: World, limits: tuple[FloatArray, FloatArray]
+    bare: CollisionWorld, limits: tuple[FloatArray, FloatArray]
 ) -> None:
     rng = np.random.default_rng(11)
     looked_at = 0

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
 
-def test_the_nearest_pair_is_the_nearest_of_all(world: World, postures: FloatArray) -> None:
+def test_the_nearest_pair_is_the_nearest_of_all(
+    world: CollisionWorld, postures: FloatArray
+) -> None:
     for x in postures[:60]:
         placed = world.at(x)
         every = placed.distances(np.arange(len(world.first)))
@@ -22,7 +24,7 @@ def test_the_nearest_pair_is_the_nearest_of_all(world: World, postures: FloatArr
         assert contact.parts == (one, other)
 
 
-def test_points_and_normal_tell_the_distance(world: World, postures: FloatArray) -> None:
+def test_points_and_normal_tell_the_distance(world: CollisionWorld, postures: FloatArray) -> None:
     for x in postures[:60]:
         contact = world.nearest(x)
         assert contact is not None
@@ -30,7 +32,7 @@ def test_points_and_normal_tell_the_distance(world: World, postures: FloatArray)
         np.testing.assert_allclose(way, contact.distance * contact.normal, atol=2e-6)
 
 
-def test_no_pair_is_nearer_than_its_bound(world: World, postures: FloatArray) -> None:
+def test_no_pair_is_nearer_than_its_bound(world: CollisionWorld, postures: FloatArray) -> None:
     for x in postures[:30]:
         placed = world.at(x)
         pairs, bounds = placed.nearer_than(np.inf)
@@ -39,7 +41,7 @@ def test_no_pair_is_nearer_than_its_bound(world: World, postures: FloatArray) ->
         assert (placed.distances(pairs) >= bounds - 2e-6).all()
 
 
-def test_pairs_not_looked_at_are_far(world: World, postures: FloatArray) -> None:
+def test_pairs_not_looked_at_are_far(world: CollisionWorld, postures: FloatArray) -> None:
     limit = np.linspace(0.0, 0.2, len(world.first))
     for x in postures[:30]:
         placed = world.at(x)
@@ -48,7 +50,7 @@ def test_pairs_not_looked_at_are_far(world: World, postures: FloatArray) -> None
 
 
 def test_no_distance_changes_more_than_the_bodies_travel(
-    world: World, postures: FloatArray
+    world: CollisionWorld, postures: FloatArray
 ) -> None:
     rng = np.random.default_rng(8)
     tightest = 0.0
@@ -65,7 +67,7 @@ def test_no_distance_changes_more_than_the_bodies_travel(
     assert tightest > 0.8
 
 
-def test_a_joint_that_carries_both_bodies_brings_none_nearer(world: World) -> None:
+def test_a_joint_that_carries_both_bodies_brings_none_nearer(world: CollisionWorld) -> None:
     x = np.zeros(6)
     placed = world.at(x)
     travel = world.travel(placed, x, np.array([0.02, 0.0, 0.0, 0.0, 0.0, 0.0]))
@@ -75,11 +77,11 @@ def test_a_joint_that_carries_both_bodies_brings_none_nearer(world: World) -> No
     assert (travel[~both] > 0.0).all()
 
 
-def test_a_world_without_pairs_has_no_nearest(bare: World) -> None:
-    assert World(bare.linkage, bare.parts, []).nearest(np.zeros(6)) is None
+def test_a_world_without_pairs_has_no_nearest(bare: CollisionWorld) -> None:
+    assert CollisionWorld(bare.linkage, bare.parts, []).nearest(np.zeros(6)) is None
 
 
-def test_obstacles_meet_all_that_moves(world: World, bare: World) -> None:
+def test_obstacles_meet_all_that_moves(world: CollisionWorld, bare: CollisionWorld) -> None:
     table = len(bare.parts)
     met = {a for a, b in world.pairs if b == table}
     assert met == {number for number, part in enumerate(bare.parts) if part.mover > 0}

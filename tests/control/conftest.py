@@ -9,9 +9,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.maths.collision.shape import cylinder, half_space
-from katana450.maths.collision.world import World, obstacle
+from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry import se3
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -24,7 +24,7 @@ def state(session: Session) -> State:
 
 
 @pytest.fixture(scope="session")
-def world(robot: Robot) -> World:
+def world(robot: Robot) -> CollisionWorld:
     """The arm on its table, a cup before it."""
     found, _ = world_of(robot)
     assert found is not None
@@ -36,4 +36,4 @@ def world(robot: Robot) -> World:
 @pytest.fixture(scope="session")
 def shipped() -> Session:
     """The session that the app begins with: the arm on its table, its objects and the water."""
-    return described(Settings(), URDF_PATH, None).session
+    return describe_robot(Settings(), URDF_PATH, None).session

@@ -16,7 +16,7 @@ from hypothesis.stateful import (
 )
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.joints import Joints
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.modes import (
     Following,
     Idle,
@@ -28,7 +28,7 @@ from katana450.arm.control.modes import (
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.arm.control.transitions import TABLE, Effect, effect_of
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -53,7 +53,7 @@ RESTS = (cmd.Stop, cmd.ClearStop, cmd.Hold, cmd.EndDrag, cmd.SetTool)
 SESSIONS: dict[str, Session] = {}
 """Made once."""
 
-JOINTS = Joints(
+JOINTS = JointSet(
     names=("rail", "turn", "tilt"),
     slides=(True, False, False),
     lower=np.array((0.05, -3.0, -0.4)),
@@ -70,7 +70,7 @@ def session_of(name: str) -> Session:
             SESSIONS[name] = Session(JOINTS, JOINTS.ready)
         else:
             plain = replace(Settings(), bare=name == "bare")
-            SESSIONS[name] = described(plain, Path(URDF_PATH), None).session
+            SESSIONS[name] = describe_robot(plain, Path(URDF_PATH), None).session
     return SESSIONS[name]
 
 

@@ -36,15 +36,13 @@ NAN = math.nan
         (lambda: cmd.SetPose(np.full((4, 4), NAN)), "finite"),
         (lambda: cmd.SetPose(np.eye(3)), "shape"),
         (lambda: cmd.SetGripper(NAN), "finger"),
-        (lambda: cmd.SetReading("pose"), "Reading.POSE"),  # type: ignore[arg-type]
-        (lambda: cmd.SetReading([]), "Reading.POSE"),  # type: ignore[arg-type]
+        (lambda: cmd.SetPriority("pose"), "Priority.POSE"),  # type: ignore[arg-type]
+        (lambda: cmd.SetPriority([]), "Priority.POSE"),  # type: ignore[arg-type]
         (lambda: cmd.TakeBranch("front-up"), "front-up, front-down"),  # type: ignore[arg-type]
         (lambda: cmd.TakeBranch(None), "front-up, front-down"),  # type: ignore[arg-type]
     ],
 )
-def test_what_is_not_a_command_is_refused_with_a_reason(
-    make: Callable[[], object], said: str
-) -> None:
+def test_invalid_command_is_refused_with_the_reason(make: Callable[[], object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         make()
 

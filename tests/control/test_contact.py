@@ -11,7 +11,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import JointTarget, Reason, State, Status
 from katana450.maths.collision.clearance import STOP
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
 TICK = 0.01
@@ -21,11 +21,11 @@ LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 
 
 @pytest.fixture
-def guarded(session: Session, world: World) -> Session:
+def guarded(session: Session, world: CollisionWorld) -> Session:
     return Session(session.require_arm(), session.ready, world)
 
 
-def clearance(world: World, state: State) -> float:
+def clearance(world: CollisionWorld, state: State) -> float:
     contact = world.nearest(np.append(state.setpoint, state.gripper_setpoint))
     assert contact is not None
     return contact.distance
@@ -80,7 +80,9 @@ def test_at_full_speed_it_stops_before(guarded: Session, what: str) -> None:
 
 
 @pytest.mark.parametrize("what", INTO)
-def test_without_a_world_it_would_have_gone_in(session: Session, world: World, what: str) -> None:
+def test_without_a_world_it_would_have_gone_in(
+    session: Session, world: CollisionWorld, what: str
+) -> None:
     start, commands, _ = INTO[what]
     state = session.step(standing(session, start), commands, TICK)
     deepest = clearance(world, state)
@@ -115,12 +117,14 @@ def test_an_arm_that_waits_keeps_still_to_the_bit(guarded: Session) -> None:
         assert state.findings == blocked.findings
 
 
-def test_an_arm_that_waits_goes_on_once_the_way_is_free(guarded: Session, world: World) -> None:
+def test_an_arm_that_waits_goes_on_once_the_way_is_free(
+    guarded: Session, world: CollisionWorld
+) -> None:
     start, commands, _ = INTO["cup"]
     blocked, _ = run(guarded, standing(guarded, start), commands)
     cup = len(world.parts) - 1
     pairs = [pair for pair in world.pairs if cup not in pair]
-    without_cup = World(world.linkage, world.parts[:-1], pairs)
+    without_cup = CollisionWorld(world.linkage, world.parts[:-1], pairs)
     freed = Session(guarded.require_arm(), guarded.ready, without_cup)
     state, _ = run(freed, blocked, [])
     assert (state.setpoint == state.goal).all()
@@ -162,7 +166,7 @@ def test_fingers_do_not_open_into_a_cup_and_the_arm_goes_on(guarded: Session) ->
     assert min(near) >= STOP - SLIGHTLY
 
 
-def test_an_arm_found_in_a_contact_may_leave_it(guarded: Session, world: World) -> None:
+def test_an_arm_found_in_a_contact_may_leave_it(guarded: Session, world: CollisionWorld) -> None:
     """As when a cup is put where the arm already is."""
     inside = np.radians((-13.0, -40.0, 95.0, -20.0, 0.0))
     state = standing(guarded, inside)
@@ -195,10 +199,10 @@ def test_far_from_everything_a_world_changes_nothing(session: Session, guarded: 
     assert kept.findings == ()
 
 
-def test_a_branch_that_ends_in_a_contact_is_told_before_it_is_taken(guarded: Session) -> None:
+def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> None:
     """Close to the base, where the other elbow has no room."""
     state = standing(guarded, np.radians((10.5, -75.6, 94.5, 88.4, 47.8)))
-    told = {choice.badge.branch: choice for choice in guarded.choices(state)}
+    told = {choice.metrics.branch: choice for choice in guarded.choices(state)}
     own = told[state.branch]
     assert own.contact is None
     met = [choice for choice in told.values() if choice.contact is not None]
@@ -206,12 +210,12 @@ def test_a_branch_that_ends_in_a_contact_is_told_before_it_is_taken(guarded: Ses
     for choice in met:
         assert choice.contact is not None
         assert choice.contact.distance < STOP
-        taken, near = run(guarded, state, [cmd.TakeBranch(choice.badge.branch)], 2000)
+        taken, near = run(guarded, state, [cmd.TakeBranch(choice.metrics.branch)], 2000)
         assert taken.status is Status.BLOCKED
         assert min(near) > 0.0
 
 
-def test_told_anew_while_it_brakes_the_arm_still_names_what_it_brakes_for(guarded: Session) -> None:
+def test_braking_arm_with_a_new_target_keeps_its_finding(guarded: Session) -> None:
     """A slider tells a new angle many times on its way; other parts are nearer at first."""
     state = standing(guarded, guarded.ready)
     named = set()

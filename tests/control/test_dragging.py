@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import NO_GRIPPER, Arm
-from katana450.arm.control.choices import wish
+from katana450.arm.control.arm import NO_GRIPPER, ArmModel
+from katana450.arm.control.branch_options import current_target
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status, ToolTarget
 from katana450.arm.robot.loader import load
@@ -24,8 +24,8 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
-from katana450.maths.kinematics.reading import Reading
 from tests.kinematics.family import random_member, random_pose
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"
@@ -35,7 +35,7 @@ A_TRIP = 25
 """Moves of the hand one after the other that go the same way, so that they get somewhere."""
 
 LONG = "KATANA450_LONG" in os.environ
-DRAGS = {Reading.POSE: 10_000 if LONG else 2_500, Reading.PITCH: 1_000, Reading.POSITION: 1_000}
+DRAGS = {Priority.POSE: 10_000 if LONG else 2_500, Priority.PITCH: 1_000, Priority.POSITION: 1_000}
 """All of them with `make test-long`."""
 OTHERS = 500
 """Drags of each other arm, the readings by turns."""
@@ -87,10 +87,10 @@ class Trip:
     way: FloatArray
     grab: int
     turns: float
-    reading: Reading
+    priority: Priority
 
 
-def trips(chain: Chain, readings: tuple[Reading, ...], drags: int) -> Iterator[Trip]:
+def trips(chain: Chain, priorities: tuple[Priority, ...], drags: int) -> Iterator[Trip]:
     """A third goes across axis 1, the others anywhere, most of them out of the workspace."""
     T_C_S = arm_of(chain).T_C_S
     size = arm_of(chain).reach
@@ -109,7 +109,7 @@ def trips(chain: Chain, readings: tuple[Reading, ...], drags: int) -> Iterator[T
             length * way / np.linalg.norm(way),
             GRABS[number % len(GRABS)],
             0.05 if number % 4 == 3 else 0.0,
-            readings[number % len(readings)],
+            priorities[number % len(priorities)],
         )
 
 
@@ -117,15 +117,15 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
     """The states after each move of the hand, every tick of them checked."""
     rng = np.random.default_rng([seed, 1])
     state = session.begin(trip.q, 0.0, 0.0)
-    state = session.step(state, [cmd.SetReading(trip.reading)], state.t + TICK)
+    state = session.step(state, [cmd.SetPriority(trip.priority)], state.t + TICK)
     branch = state.branch
     target = tool(chain, trip.q)
     limit, turning = 3.0 * arm_of(chain).reach, trip.turns > 0.0
     for number in range(A_TRIP):
         if turning and number % 3 == 2:
-            wished = wish(session.require_arm(), state)
+            desired = current_target(session.require_arm(), state)
             turn = rng.normal(scale=trip.turns, size=2)
-            command: cmd.Command = cmd.TurnTool(wished.pitch + turn[0], wished.roll + turn[1])
+            command: cmd.Command = cmd.TurnTool(desired.pitch + turn[0], desired.roll + turn[1])
         else:
             target = np.clip(target + trip.way, -limit, limit)
             command = cmd.MoveTool(target)
@@ -147,18 +147,18 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
             target = tool(chain, state.goal)
 
 
-def misses(chain: Chain, q: FloatArray, target: ToolTarget, reading: Reading) -> list[float]:
+def misses(chain: Chain, q: FloatArray, target: ToolTarget, priority: Priority) -> list[float]:
     """What counts most of what ``q`` misses of the target, in order."""
     pitch, _ = pitch_and_roll(chain, q)
     position = math.dist(tool(chain, q), target.position)
-    if reading is Reading.PITCH:
+    if priority is Priority.PITCH:
         return [abs(math.remainder(pitch - target.pitch, math.tau)), position]
     return [position]
 
 
 def check_goal(chain: Chain, before: State, state: State, target: ToolTarget) -> None:
     """However many hops it took, no move of the hand leads the goal away from its target."""
-    was, now = (misses(chain, s.goal, target, state.reading) for s in (before, state))
+    was, now = (misses(chain, s.goal, target, state.priority) for s in (before, state))
     for a, b in zip(was, now, strict=True):
         assert b <= a + ROUNDING
         if b < a - ROUNDING:
@@ -197,15 +197,15 @@ def check_tick(
     return state
 
 
-@pytest.mark.parametrize("reading", Reading)
-def test_thousands_of_drags(arm: Arm, session: Session, reading: Reading) -> None:
+@pytest.mark.parametrize("priority", Priority)
+def test_thousands_of_drags(arm: ArmModel, session: Session, priority: Priority) -> None:
     seen: Counter[Status] = Counter()
-    for number, trip in enumerate(trips(arm.chain, (reading,), DRAGS[reading])):
+    for number, trip in enumerate(trips(arm.chain, (priority,), DRAGS[priority])):
         seen.update(state.status for state in drag(arm.chain, session, trip, number))
-    assert sum(seen.values()) == DRAGS[reading]
+    assert sum(seen.values()) == DRAGS[priority]
     # It did go through all of it.
     assert all(
-        seen[status] > DRAGS[reading] // 20 for status in (Status.OK, Status.LIMITED, Status.HELD)
+        seen[status] > DRAGS[priority] // 20 for status in (Status.OK, Status.LIMITED, Status.GAP)
     ), seen
 
 
@@ -224,10 +224,10 @@ def others() -> Iterator[tuple[str, Chain]]:
 
 @pytest.mark.parametrize("chain", [pytest.param(chain, id=name) for name, chain in others()])
 def test_hundreds_of_drags_of_other_arms(chain: Chain) -> None:
-    arm = Arm(chain, {"tool": chain.M}, "tool", NO_GRIPPER)
+    arm = ArmModel(chain, {"tool": chain.M}, "tool", NO_GRIPPER)
     session = Session(arm, 0.5 * (chain.lower + chain.upper))
     seen: Counter[Status] = Counter()
-    for number, trip in enumerate(trips(chain, tuple(Reading), OTHERS)):
+    for number, trip in enumerate(trips(chain, tuple(Priority), OTHERS)):
         seen.update(state.status for state in drag(chain, session, trip, number))
     assert sum(seen.values()) == OTHERS
-    assert set(seen) == {Status.OK, Status.LIMITED, Status.HELD}
+    assert set(seen) == {Status.OK, Status.LIMITED, Status.GAP}

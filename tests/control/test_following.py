@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.plans import path_to, plan_along, plan_to
 from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import JointTarget, Reason, State, Status
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
@@ -38,7 +38,7 @@ BEYOND_CUP = LOW - (1.1, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
-def poured(arm: Arm) -> Plan:
+def poured(arm: ArmModel) -> Plan:
     """A cup lifted, taken round an arc and poured out: three paths with a rest between them."""
     chain = arm.chain
     start = np.radians((-20.0, -75.0, 100.0, -25.0, 0.0))
@@ -56,12 +56,12 @@ def poured(arm: Arm) -> Plan:
 
 
 @pytest.fixture(scope="module")
-def guarded(arm: Arm, world: World) -> Session:
+def guarded(arm: ArmModel, world: CollisionWorld) -> Session:
     return Session(arm, np.array(Settings().ready), world)
 
 
 @pytest.fixture(scope="module")
-def round_cup(arm: Arm, world: World, guarded: Session) -> Plan:
+def round_cup(arm: ArmModel, world: CollisionWorld, guarded: Session) -> Plan:
     """From one side of the cup to the other, where the straight way would hit it."""
     return plan_to(arm, world, guarded.begin(LOW, 0.0, 0.0), BEYOND_CUP, seed=1)
 
@@ -129,14 +129,14 @@ def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, sta
     assert last.status is Status.OK
     assert last.branch == branch_of(session.require_arm().chain, goal)
     assert last.following is not None
-    assert last.following.share == 1.0
+    assert last.following.fraction == 1.0
     assert len(states) * TICK == pytest.approx(plan.duration, abs=2 * TICK)
     assert off_path(states, plan) <= 1e-15
     check_limits(session, [state, state, state, *states])
 
 
 def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
-    arm: Arm, session: Session, poured: Plan
+    arm: ArmModel, session: Session, poured: Plan
 ) -> None:
     """Pauses, ways back, stops at any place and changes of speed, at any time."""
     random = np.random.default_rng(11)
@@ -182,10 +182,10 @@ def test_the_way_goes_by_steps_from_rest_to_rest(session: Session, poured: Plan)
     start = session.begin(poured.start, 0.0, 0.0)
     state = session.step(start, [cmd.Follow(poured), cmd.Pause()], TICK)
     for begin in poured.begins[1:]:
-        share = begin / poured.span
-        state = run(session, state, [cmd.GoAlong(share), cmd.Resume()])[-1]
+        fraction = begin / poured.span
+        state = run(session, state, [cmd.GoAlong(fraction), cmd.Resume()])[-1]
         assert state.following is not None
-        assert state.following.share == pytest.approx(share, abs=1e-12)
+        assert state.following.fraction == pytest.approx(fraction, abs=1e-12)
         assert state.motion.at_rest
         assert state.setpoint == pytest.approx(poured.q(begin), abs=1e-9)
     back = run(session, state, [cmd.GoAlong(0.0)])[-1]
@@ -205,15 +205,15 @@ def test_a_plan_that_begins_elsewhere_is_refused(session: Session, poured: Plan)
     assert gone.findings == ()
 
 
-@pytest.mark.parametrize("share", [-0.1, 1.1, math.nan, "end"])
-def test_orders_that_are_none_are_refused(share: object) -> None:
-    with pytest.raises(InputError, match="share"):
-        cmd.GoAlong(share)  # type: ignore[arg-type]
+@pytest.mark.parametrize("fraction", [-0.1, 1.1, math.nan, "end"])
+def test_orders_that_are_none_are_refused(fraction: object) -> None:
+    with pytest.raises(InputError, match="fraction"):
+        cmd.GoAlong(fraction)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="plan"):
-        cmd.Follow(share)  # type: ignore[arg-type]
+        cmd.Follow(fraction)  # type: ignore[arg-type]
 
 
-def test_a_plan_for_another_arm_is_refused(arm: Arm, session: Session, poured: Plan) -> None:
+def test_a_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured: Plan) -> None:
     S = np.array(arm.chain.S)
     S[3:, 1] += 0.01 * S[[2, 0, 1], 1]
     other = Session(replace(arm, chain=replace(arm.chain, S=S)), session.ready)
@@ -284,14 +284,14 @@ def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) 
     assert (free.setpoint == stopped[-1].setpoint).all()
 
 
-def clearance(world: World, state: State) -> float:
+def clearance(world: CollisionWorld, state: State) -> float:
     contact = world.nearest(np.append(state.setpoint, state.gripper_setpoint))
     assert contact is not None
     return contact.distance
 
 
 def test_it_goes_round_the_cup_where_the_straight_way_is_blocked(
-    arm: Arm, world: World, guarded: Session, round_cup: Plan
+    arm: ArmModel, world: CollisionWorld, guarded: Session, round_cup: Plan
 ) -> None:
     state, plan = guarded.begin(LOW, 0.0, 0.0), round_cup
     assert plan.nearest is not None
@@ -311,7 +311,7 @@ def test_it_goes_round_the_cup_where_the_straight_way_is_blocked(
 
 
 def test_a_stop_beside_the_cup_keeps_clear_of_it(
-    world: World, guarded: Session, round_cup: Plan
+    world: CollisionWorld, guarded: Session, round_cup: Plan
 ) -> None:
     """Braked joint by joint the arm would leave its path, and not everywhere is room for that."""
     start = guarded.begin(LOW, 0.0, 0.0)
@@ -330,11 +330,13 @@ def test_a_stop_beside_the_cup_keeps_clear_of_it(
         assert away[-1].following is None
 
 
-def test_what_was_put_in_the_way_since_is_met_at_rest(
-    arm: Arm, world: World, guarded: Session
+def test_obstacle_added_after_planning_is_met_at_rest(
+    arm: ArmModel, world: CollisionWorld, guarded: Session
 ) -> None:
     cup = len(world.parts) - 1
-    cupless = World(world.linkage, world.parts[:-1], [p for p in world.pairs if cup not in p])
+    cupless = CollisionWorld(
+        world.linkage, world.parts[:-1], [p for p in world.pairs if cup not in p]
+    )
     start = Session(arm, guarded.ready, cupless).begin(LOW, 0.0, 0.0)
     plan = plan_to(arm, cupless, start, BEYOND_CUP)
     states = run(guarded, start, [cmd.Follow(plan)])
@@ -350,13 +352,15 @@ def test_what_was_put_in_the_way_since_is_met_at_rest(
     assert (run(freed, states[-1], [])[-1].setpoint == BEYOND_CUP).all()
 
 
-def test_a_goal_in_the_table_is_refused(arm: Arm, world: World, guarded: Session) -> None:
+def test_a_goal_in_the_table_is_refused(
+    arm: ArmModel, world: CollisionWorld, guarded: Session
+) -> None:
     state = guarded.begin(LOW, 0.0, 0.0)
     with pytest.raises(BlockedError, match=r"table.*too near"):
         plan_to(arm, world, state, LOW + np.radians([0.0, 23.0, 0.0, 0.0, 0.0]))
 
 
-def test_a_goal_that_is_none_is_refused(arm: Arm, state: State) -> None:
+def test_a_goal_that_is_none_is_refused(arm: ArmModel, state: State) -> None:
     for goal in (np.full(5, math.nan), np.zeros(4), state.setpoint, np.full(5, 9.0)):
         with pytest.raises(InputError):
             plan_to(arm, None, state, goal)

@@ -11,10 +11,10 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.grip import touching
 from katana450.arm.control.plans import plan_along, plan_to
+from katana450.arm.control.scene_objects import MAX_OBJECTS, SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
-from katana450.arm.control.things import MOST, Form, Thing
-from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -46,7 +46,7 @@ def session(robot: Robot, arm: MountedArm) -> Session:
         arm.ready(Settings().ready),
         world.with_obstacles((table(),)),
         hand=hand_of(robot, world),
-        things=things_of(load_props()),
+        objects=scene_objects_of(load_props()),
     )
 
 
@@ -62,9 +62,9 @@ def run(session: Session, state: State, *commands: cmd.Command, seconds: float =
     raise AssertionError(f"still on its way: {state.findings}")
 
 
-def cup_of(session: Session, state: State) -> tuple[Thing, FloatArray]:
-    (cup,) = (thing for thing in state.things if thing.name == "cup")
-    return cup, session.surroundings.pose(cup, np.append(state.q, state.gripper))
+def cup_of(session: Session, state: State) -> tuple[SceneObject, FloatArray]:
+    (cup,) = (scene_object for scene_object in state.objects if scene_object.name == "cup")
+    return cup, session.environment.pose(cup, np.append(state.q, state.gripper))
 
 
 def before_cup(
@@ -110,12 +110,16 @@ def test_fingers_that_close_on_the_cup_hold_it_where_it_stands(
     cup, T = cup_of(session, holding)
     assert cup.held
     assert holding.grip == holding.gripper_setpoint
-    let_go = session.surroundings.world([replace(cup, held=False, T=T)])
+    let_go = session.environment.world([replace(cup, held=False, T=T)])
     assert let_go is not None
     x = np.append(holding.q, holding.gripper)
     for finger in ("finger_left_link", "finger_right_link"):
         assert 0.0 <= let_go.gap(x, finger, "cup") <= 0.003
-    (stood,) = (thing.T for thing in things_of(load_props()) if thing.name == "cup")
+    (stood,) = (
+        scene_object.T
+        for scene_object in scene_objects_of(load_props())
+        if scene_object.name == "cup"
+    )
     np.testing.assert_allclose(T, stood, rtol=0, atol=1e-12)
     assert holding.status.value == "ok"
 
@@ -133,7 +137,7 @@ def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
     )
 
 
-def test_what_is_held_goes_with_the_hand_and_is_looked_at_for_contacts(
+def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     session: Session, arm: MountedArm, holding: State
 ) -> None:
     up = lifted(session, arm, holding, 0.12)
@@ -160,7 +164,7 @@ def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
 ) -> None:
     tight = run(session, holding, cmd.SetGripper(-0.44))
     assert tight.gripper == holding.grip
-    hand = session.surroundings.hand
+    hand = session.environment.hand
     assert hand is not None
     assert touching(hand, tight) == hand.fingers
     stopped = run(session, session.step(tight, [cmd.SetJoint(0, 0.3)], tight.t + 0.01), cmd.Stop())
@@ -187,7 +191,7 @@ def test_fingers_that_open_let_the_cup_stand_on_the_table(
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
-def test_one_finger_that_touches_holds_nothing_and_says_which_does_not(
+def test_one_touching_finger_does_not_grasp_and_is_reported(
     session: Session, arm: MountedArm
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
@@ -202,7 +206,7 @@ def test_one_finger_that_touches_holds_nothing_and_says_which_does_not(
     assert lopsided.parts is not None
     assert lopsided.parts[1] == "cup"
     assert lopsided.amount > 0.003
-    hand = session.surroundings.hand
+    hand = session.environment.hand
     assert hand is not None
     assert {*touching(hand, closed), lopsided.parts[0]} == set(hand.fingers)
     opened = run(session, closed, cmd.SetGripper(OPEN))
@@ -210,18 +214,20 @@ def test_one_finger_that_touches_holds_nothing_and_says_which_does_not(
     assert touching(hand, opened) == ()
 
 
-def thing(name: str = "box", **changed: Any) -> Thing:
+def scene_object(name: str = "box", **changed: Any) -> SceneObject:
     given: dict[str, Any] = {
-        "name": name, "form": Form.BOX, "size": (0.05, 0.05, 0.05),
+        "name": name, "shape": Shape.BOX, "size": (0.05, 0.05, 0.05),
         "T": se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0)),
     }  # fmt: skip
-    return Thing(**(given | changed))
+    return SceneObject(**(given | changed))
 
 
-def test_a_thing_put_in_the_way_is_met_at_rest_and_gone_once_taken_away(session: Session) -> None:
+def test_a_object_put_in_the_way_is_met_at_rest_and_gone_once_taken_away(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    high = thing(size=(0.05, 0.4, 0.6), T=se3.from_rotation_translation(np.eye(3), (0.2, 0.35, 0)))
-    state = session.step(state, [cmd.Place(high)], 0.01)
+    high = scene_object(
+        size=(0.05, 0.4, 0.6), T=se3.from_rotation_translation(np.eye(3), (0.2, 0.35, 0))
+    )
+    state = session.step(state, [cmd.PlaceObject(high)], 0.01)
     met = run(session, state, cmd.SetJoint(0, 1.2))
     (contact,) = (f for f in met.findings if f.reason is Reason.CONTACT)
     assert contact.parts is not None
@@ -230,24 +236,26 @@ def test_a_thing_put_in_the_way_is_met_at_rest_and_gone_once_taken_away(session:
     assert free.q[0] == pytest.approx(1.2)
 
 
-def test_things_are_put_elsewhere_by_name_and_bounded_in_number(session: Session) -> None:
+def test_objects_are_put_elsewhere_by_name_and_bounded_in_number(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    commands: list[cmd.Command] = [cmd.Place(thing(f"box {n}")) for n in range(2 * MOST)]
+    commands: list[cmd.Command] = [
+        cmd.PlaceObject(scene_object(f"box {n}")) for n in range(2 * MAX_OBJECTS)
+    ]
     state = session.step(state, commands, 0.01)
-    assert len(state.things) == MOST
+    assert len(state.objects) == MAX_OBJECTS
     moved = se3.from_rotation_translation(np.eye(3), (0.1, 0.4, 0.0))
-    state = session.step(state, [cmd.Place(thing("cup", T=moved))], 0.02)
-    assert len(state.things) == MOST
+    state = session.step(state, [cmd.PlaceObject(scene_object("cup", T=moved))], 0.02)
+    assert len(state.objects) == MAX_OBJECTS
     np.testing.assert_array_equal(cup_of(session, state)[1], moved)
 
 
-def test_what_is_held_cannot_be_put_elsewhere_nor_taken_away(
-    session: Session, holding: State
-) -> None:
+def test_held_object_cannot_be_moved_or_removed(session: Session, holding: State) -> None:
     state = session.step(
-        holding, [cmd.Place(thing("cup")), cmd.Remove("cup"), cmd.Remove("basin")], holding.t + 0.01
+        holding,
+        [cmd.PlaceObject(scene_object("cup")), cmd.Remove("cup"), cmd.Remove("basin")],
+        holding.t + 0.01,
     )
-    assert [each.name for each in state.things] == ["cup"]
+    assert [each.name for each in state.objects] == ["cup"]
     assert cup_of(session, state)[0].held
 
 
@@ -266,6 +274,6 @@ def test_what_is_held_cannot_be_put_elsewhere_nor_taken_away(
         {"T": np.full((4, 4), np.nan)},
     ],
 )
-def test_a_thing_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+def test_a_object_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError):
-        thing(**wrong)
+        scene_object(**wrong)

@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.joints import Joints
-from katana450.arm.control.looks import Choice, Trait
-from katana450.arm.control.session import LONGEST_STEP, Session
+from katana450.arm.control.appearance import AppearanceTrait, DisplayMode
+from katana450.arm.control.joints import JointSet
+from katana450.arm.control.session import MAX_STEP_TIME, Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import InputError
 
 DT = 0.01
 
-JOINTS = Joints(
+JOINTS = JointSet(
     names=("rail", "turn", "grip"),
     slides=(True, False, False),
     lower=np.array((0.05, -math.pi, -0.4)),
@@ -70,11 +70,11 @@ joint_vectors = st.tuples(st.floats(-0.5, 0.9), st.floats(-4.0, 4.0), st.floats(
     st.lists(st.tuples(joint_vectors, st.floats(0.02, 0.6)), min_size=1, max_size=4),
     st.sampled_from([1.0, 0.3]),
 )
-def test_no_wish_breaks_a_limit_and_the_last_is_reached(
-    wishes: list[tuple[tuple[float, float, float], float]], share: float
+def test_no_target_breaks_a_limit_and_the_last_is_reached(
+    wishes: list[tuple[tuple[float, float, float], float]], fraction: float
 ) -> None:
     rules = Session(JOINTS, JOINTS.ready)
-    state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.SpeedScale(share))
+    state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.SpeedScale(fraction))
     limits, seen = JOINTS.limits, [state]
     for wish, seconds in wishes:
         seen += ticks(rules, state, seconds, cmd.SetJoints(np.array(wish)))
@@ -85,13 +85,13 @@ def test_no_wish_breaks_a_limit_and_the_last_is_reached(
     for before, now in pairwise(seen):
         motion = now.motion
         assert ((motion.q >= limits.lower) & (motion.q <= limits.upper)).all()
-        assert (np.abs(motion.qd) <= share * limits.speed * (1.0 + 1e-6)).all()
+        assert (np.abs(motion.qd) <= fraction * limits.speed * (1.0 + 1e-6)).all()
         assert (np.abs(motion.qdd) <= limits.acceleration * (1.0 + 1e-6)).all()
         jump = np.abs(motion.qdd - before.motion.qdd) / DT
         assert (jump <= limits.jerk * (1.0 + 1e-3) + 1e-6).all()
 
 
-def test_what_is_cut_is_told_in_its_own_unit(session: Session, state: State) -> None:
+def test_clamped_value_is_reported_in_its_unit(session: Session, state: State) -> None:
     there = after(session, state, DT, cmd.SetAxes(((0, 9.0), (1, 9.0), (2, 0.1))))
     told = [(f.reason, f.axis, f.amount) for f in there.findings]
     assert told == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
@@ -110,9 +110,11 @@ def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
     np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
     far = np.abs(moving.setpoint - rest.q).max()
     assert stopped.stopped.way == pytest.approx(far, abs=1e-9)
-    ignored = after(session, rest, 0.5, cmd.Home(), cmd.Dress("a", Trait.CHOICE, -1))
+    ignored = after(
+        session, rest, 0.5, cmd.Home(), cmd.SetAppearance("a", AppearanceTrait.CHOICE, -1)
+    )
     np.testing.assert_array_equal(ignored.q, rest.q)
-    assert ignored.looks.of("a").choice is Choice.HIDDEN
+    assert ignored.appearance.of("a").choice is DisplayMode.HIDDEN
     free = after(session, ignored, 0.5, cmd.ClearStop())
     assert (free.stopped, free.findings, free.moving) == (None, (), False)
     home = after(session, free, 10.0, cmd.Home())
@@ -125,8 +127,8 @@ def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: Session, state: S
     paused = after(session, moving, 3.0, cmd.Pause())
     assert paused.status is Status.PAUSED
     assert not paused.moving
-    share = (paused.q - state.q) / (goal - state.q)
-    np.testing.assert_allclose(share, share[0], rtol=0, atol=1e-9)
+    fraction = (paused.q - state.q) / (goal - state.q)
+    np.testing.assert_allclose(fraction, fraction[0], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(after(session, paused, 10.0, cmd.Resume()).q, goal)
     held = after(session, moving, 3.0, cmd.Hold())
     assert not held.moving
@@ -154,7 +156,7 @@ def test_a_stream_is_followed_and_its_end_is_a_rest(session: Session, state: Sta
         cmd.Remove("cup"), cmd.Batch((cmd.Home(), cmd.SetGripper(0.0))),
     ],
 )  # fmt: skip
-def test_what_wants_a_tool_is_refused_with_the_reason(
+def test_tool_command_without_an_arm_is_refused_with_the_reason(
     session: Session, state: State, command: cmd.Command
 ) -> None:
     with pytest.raises(InputError, match=r"Only its joints can be driven\. It is a gantry"):
@@ -178,7 +180,7 @@ def test_what_does_not_fit_is_refused(session: Session, command: cmd.Command, sa
 def test_a_late_tick_is_no_leap_and_an_error_of_ours_holds(session: Session, state: State) -> None:
     moving = after(session, state, 0.5, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
     late = session.step(moving, (), moving.t + 5.0)
-    on_time = session.step(moving, (), moving.t + LONGEST_STEP)
+    on_time = session.step(moving, (), moving.t + MAX_STEP_TIME)
     np.testing.assert_array_equal(late.setpoint, on_time.setpoint)
     failed = session.fail(moving)
     assert failed.status is Status.FAULT

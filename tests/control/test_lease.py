@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.arm.control.lease import LOST_AFTER, Lease, Person, Role
+from katana450.arm.control.lease import LEASE_TIMEOUT, Lease, Person, Role
 from katana450.errors import LeaseError
 
 ANNA = Person("a", "Anna", Role.OPERATOR)
@@ -66,7 +66,7 @@ def leases() -> list[Lease]:
 
 
 @pytest.mark.parametrize("event", EVENTS)
-def test_what_is_not_allowed_raises_and_what_is_allowed_does_not(event: str) -> None:
+def test_checks_raise_exactly_for_forbidden_actions(event: str) -> None:
     tried = 0
     for lease, who, to in itertools.product(leases(), PEOPLE, PEOPLE):
         before = replace(lease)
@@ -91,7 +91,7 @@ def test_what_is_not_allowed_raises_and_what_is_allowed_does_not(event: str) -> 
         max_size=40,
     )
 )
-def test_whatever_happens_one_person_at_most_holds_the_arm_and_waits_for_nothing(
+def test_lease_has_at_most_one_holder_who_never_waits_for_it(
     story: list[tuple[str, Person, Person, float]],
 ) -> None:
     lease, t = Lease(), 0.0
@@ -114,7 +114,7 @@ def test_whatever_happens_one_person_at_most_holds_the_arm_and_waits_for_nothing
             assert lease == replace(before, heard=t)
 
 
-def test_a_free_arm_goes_to_who_asks_and_a_held_one_does_not() -> None:
+def test_free_lease_is_granted_and_a_held_one_is_not() -> None:
     lease = Lease().acquire(ANNA, 1.0)
     assert lease.holder == ANNA
     with pytest.raises(LeaseError, match="Anna holds the arm"):
@@ -124,7 +124,7 @@ def test_a_free_arm_goes_to_who_asks_and_a_held_one_does_not() -> None:
     assert lease.take(CARA, 2.0).holder == CARA
 
 
-def test_who_watches_can_do_nothing_to_it() -> None:
+def test_spectator_cannot_affect_a_program() -> None:
     for holder in (Lease(), Lease().acquire(ANNA, 1.0)):
         for event in ("acquire", "take", "request"):
             with pytest.raises(LeaseError, match="Dora may only watch"):
@@ -133,7 +133,7 @@ def test_who_watches_can_do_nothing_to_it() -> None:
         Lease().acquire(ANNA, 1.0).hand_over(ANNA, DORA, 2.0)
 
 
-def test_who_asked_first_is_first_and_who_gets_it_waits_no_more() -> None:
+def test_lease_goes_to_the_first_in_the_queue() -> None:
     lease = Lease().acquire(ANNA, 1.0).request(CARA).request(BERT)
     assert lease.waiting == (CARA, BERT)
     lease = lease.hand_over(ANNA, BERT, 2.0)
@@ -146,11 +146,11 @@ def test_who_asked_first_is_first_and_who_gets_it_waits_no_more() -> None:
 def test_silence_ends_it_and_a_sign_of_life_keeps_it() -> None:
     lease = Lease().acquire(ANNA, 1.0)
     assert lease.silence(1.25) == 0.25
-    assert lease.expire(1.0 + LOST_AFTER - 1e-9) is lease
-    assert lease.expire(1.0 + LOST_AFTER).holder is None
+    assert lease.expire(1.0 + LEASE_TIMEOUT - 1e-9) is lease
+    assert lease.expire(1.0 + LEASE_TIMEOUT).holder is None
     heard = lease.hear(ANNA, 2.0)
-    assert heard.expire(1.0 + LOST_AFTER).holder == ANNA
-    assert heard.expire(2.0 + LOST_AFTER).holder is None
+    assert heard.expire(1.0 + LEASE_TIMEOUT).holder == ANNA
+    assert heard.expire(2.0 + LEASE_TIMEOUT).holder is None
     # Nobody is silent where nobody holds it.
     assert Lease().silence(1e9) == 0.0
 
@@ -161,7 +161,7 @@ def test_a_clock_that_stands_or_goes_back_takes_no_life_away() -> None:
     assert lease.silence(4.0) == 0.0
 
 
-def test_who_leaves_keeps_it_until_the_silence_is_over() -> None:
+def test_lease_of_a_departed_driver_expires_after_the_timeout() -> None:
     lease = Lease().acquire(ANNA, 1.0).request(BERT)
     assert lease.leave(BERT).waiting == ()
     assert lease.leave(ANNA).holder == ANNA

@@ -9,14 +9,14 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.findings import of_projection
-from katana450.arm.control.messages import told
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import project
-from katana450.maths.kinematics.reading import Reading
 
 COUNT = 300
 
@@ -27,7 +27,7 @@ LEVEL = 1e-6
 def typed(session: Session, q: FloatArray, T: FloatArray) -> State:
     """The state just after the pose ``T`` (4, 4) is typed with the arm at ``q`` (5,) [rad]."""
     state = session.begin(q, 0.0, 0.0)
-    return session.step(state, (cmd.SetReading(Reading.PITCH), cmd.SetPose(T)), 0.01)
+    return session.step(state, (cmd.SetPriority(Priority.PITCH), cmd.SetPose(T)), 0.01)
 
 
 def tilt(session: Session, q: FloatArray) -> float:
@@ -78,10 +78,10 @@ def test_lost_pitch_is_reported_also_out_of_reach(session: Session) -> None:
     narrow = np.full(5, math.radians(20.0))
     chain = dataclasses.replace(session.require_arm().chain, lower=-narrow, upper=narrow)
     T = se3.from_rotation_translation(so3.rotation_y(math.pi / 2.0), np.array((1.0, 0.0, 0.0)))
-    p = project(chain, T, reading=Reading.PITCH)
+    p = project(chain, T, priority=Priority.PITCH)
     assert p.pitch_error > 0.1
-    found = of_projection(chain, p, Reading.PITCH, yaw_was_wished=True)
+    found = of_projection(chain, p, Priority.PITCH, yaw_was_given=True)
     amounts = {each.reason: each.amount for each in found}
     assert amounts[Reason.OUT_OF_REACH] == p.position_error
     assert amounts[Reason.PITCH_CHANGED] == p.pitch_error
-    assert all(told(each) for each in found)
+    assert all(finding_text(each) for each in found)

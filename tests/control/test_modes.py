@@ -69,8 +69,8 @@ def test_a_drag_during_a_jog_is_followed_and_leaves_nothing_behind(
     # The next drag takes its goal along its own line.
     settled = run(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
-    for share in np.linspace(0.05, 1.0, 20):
-        settled = run(session, settled, cmd.MoveTool(start + share * way))
+    for fraction in np.linspace(0.05, 1.0, 20):
+        settled = run(session, settled, cmd.MoveTool(start + fraction * way))
         off = point(session, settled.goal) - start
         assert np.linalg.norm(np.cross(off, way)) / np.linalg.norm(way) < 1e-6
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Thing
-from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.water import around_of
+from katana450.arm.robot.water import water_environment
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
@@ -35,8 +35,8 @@ def session(robot: Robot, arm: MountedArm) -> Session:
         arm.ready(Settings().ready),
         world.with_obstacles((table(),)),
         hand=hand_of(robot, world),
-        things=things_of(props),
-        around=around_of(props),
+        objects=scene_objects_of(props),
+        water_environment=water_environment(props),
     )
 
 
@@ -56,12 +56,14 @@ def full(session: Session) -> State:
 def held_level(session: Session, state: State) -> State:
     """With the cup in the hand, upright where the grasp frame is."""
     x = np.append(state.setpoint, state.gripper_setpoint)
-    palm = session.surroundings.pose(replace(state.things[0], T=np.eye(4), held=True), x)
-    (cup,) = (each for each in state.things if each.name == "cup")
+    palm = session.environment.pose(replace(state.objects[0], T=np.eye(4), held=True), x)
+    (cup,) = (each for each in state.objects if each.name == "cup")
     T = se3.from_rotation_translation(np.eye(3), palm[:3, 3] + [0.1, 0.0, 0.0])
-    held = session.surroundings.taken(replace(cup, T=T), x)
-    things: tuple[Thing, ...] = tuple(held if each is cup else each for each in state.things)
-    return tick(session, replace(state, things=things, grip=0.0), cmd.Fill(200.0 * ML))
+    held = session.environment.taken(replace(cup, T=T), x)
+    objects: tuple[SceneObject, ...] = tuple(
+        held if each is cup else each for each in state.objects
+    )
+    return tick(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0 * ML))
 
 
 def test_water_at_rest_is_no_news(session: Session, full: State) -> None:
@@ -71,9 +73,9 @@ def test_water_at_rest_is_no_news(session: Session, full: State) -> None:
 
 
 def test_a_cup_put_elsewhere_takes_its_water_along(session: Session, full: State) -> None:
-    (cup,) = (each for each in full.things if each.name == "cup")
+    (cup,) = (each for each in full.objects if each.name == "cup")
     T: FloatArray = se3.from_rotation_translation(np.eye(3), (0.3, 0.1, 0.0))
-    moved = tick(session, full, cmd.Place(replace(cup, T=T)), times=50)
+    moved = tick(session, full, cmd.PlaceObject(replace(cup, T=T)), times=50)
     assert moved.poured is not None
     assert moved.poured.water.cup == FULL
     np.testing.assert_array_equal(moved.poured.water.T_base_cup, T)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import JOG_TIME
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -185,7 +185,7 @@ def test_it_keeps_up_closely_with_what_the_arm_can_do(session: Session, every: i
     assert max(off[100:]) < 0.012
 
 
-def test_no_limit_is_passed_whatever_is_streamed(session: Session, arm: Arm) -> None:
+def test_streamed_targets_never_pass_a_limit(session: Session, arm: ArmModel) -> None:
     rng = np.random.default_rng(7)
     limits = arm.limits
 

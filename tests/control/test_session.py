@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import Arm
-from katana450.arm.control.session import LONGEST_STEP, Session
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.session import MAX_STEP_TIME, Session
 from katana450.arm.control.state import JointTarget, PoseTarget, Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
@@ -32,7 +32,7 @@ def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: 
     return state
 
 
-def tool_point(arm: Arm, state: State, q: FloatArray | None = None) -> FloatArray:
+def tool_point(arm: ArmModel, state: State, q: FloatArray | None = None) -> FloatArray:
     return forward(arm.chain_to(state.tool), state.goal if q is None else q)[:3, 3]
 
 
@@ -40,7 +40,7 @@ def reasons(state: State) -> set[Reason]:
     return {finding.reason for finding in state.findings}
 
 
-def test_a_far_target_is_approached_as_fast_as_the_arm_may(arm: Arm, state: State) -> None:
+def test_a_far_target_is_approached_as_fast_as_the_arm_may(arm: ArmModel, state: State) -> None:
     session = Session(arm, state.setpoint, tool_speed=9.0)
     state = session.step(state, [cmd.SetJoint(0, 2.0)], TICK)
     ticks = 1
@@ -55,9 +55,9 @@ def test_a_far_target_is_approached_as_fast_as_the_arm_may(arm: Arm, state: Stat
     assert state.setpoint[0] == 2.0
 
 
-def test_a_late_tick_is_no_leap(arm: Arm, session: Session, state: State) -> None:
+def test_a_late_tick_is_no_leap(arm: ArmModel, session: Session, state: State) -> None:
     after = session.step(state, [cmd.SetJoint(0, 2.0)], 60.0)
-    assert after.setpoint[0] <= arm.chain.speed[0] * LONGEST_STEP * (1 + 1e-12)
+    assert after.setpoint[0] <= arm.chain.speed[0] * MAX_STEP_TIME * (1 + 1e-12)
 
 
 def test_time_that_stands_or_runs_back_moves_nothing(session: Session, state: State) -> None:
@@ -82,7 +82,7 @@ def test_step_is_a_fold_that_can_be_replayed_to_the_bit(session: Session, state:
 
 
 def test_moving_the_tool_keeps_pitch_and_roll_and_needs_no_yaw(
-    arm: Arm, session: Session, state: State
+    arm: ArmModel, session: Session, state: State
 ) -> None:
     state = run(session, state, [cmd.TurnTool(0.6, 0.4)], ticks=5)
     wanted = np.array([0.25, 0.25, -0.05])
@@ -94,7 +94,7 @@ def test_moving_the_tool_keeps_pitch_and_roll_and_needs_no_yaw(
     assert state.status is Status.OK
 
 
-def test_turning_the_tool_keeps_its_position(arm: Arm, session: Session, state: State) -> None:
+def test_turning_the_tool_keeps_its_position(arm: ArmModel, session: Session, state: State) -> None:
     before = tool_point(arm, state)
     state = run(session, state, [cmd.TurnTool(0.55, -1.0)], ticks=5)
     assert np.allclose(tool_point(arm, state), before, atol=1e-12)
@@ -104,7 +104,7 @@ def test_turning_the_tool_keeps_its_position(arm: Arm, session: Session, state: 
 
 
 def test_a_pose_with_a_yaw_of_its_own_says_how_much_is_lost(
-    arm: Arm, session: Session, state: State
+    arm: ArmModel, session: Session, state: State
 ) -> None:
     R = so3.rotation_z(math.radians(23.0)) @ so3.rotation_y(0.5)
     T = se3.from_rotation_translation(R, np.array([0.35, 0.0, 0.0]))
@@ -116,8 +116,8 @@ def test_a_pose_with_a_yaw_of_its_own_says_how_much_is_lost(
     assert yaw.amount == pytest.approx(expected, abs=1e-12)
 
 
-def test_out_of_reach_the_goal_is_the_nearest_point_and_the_gap_is_told(
-    arm: Arm, session: Session, state: State
+def test_goal_out_of_reach_is_the_nearest_point_with_a_finding(
+    arm: ArmModel, session: Session, state: State
 ) -> None:
     far = np.array([0.9, 0.0, 0.1])
     state = run(session, state, [cmd.MoveTool(far)], ticks=10)
@@ -132,9 +132,7 @@ def test_out_of_reach_the_goal_is_the_nearest_point_and_the_gap_is_told(
     assert state.status is Status.LIMITED
 
 
-def test_dragging_back_from_out_of_reach_brings_the_wished_pitch_back(
-    session: Session, state: State
-) -> None:
+def test_drag_back_into_reach_restores_the_target_pitch(session: Session, state: State) -> None:
     home = run(session, state, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))], ticks=5)
     pitch, _ = pitch_and_roll(session.require_arm().chain, home.goal)
     away = run(session, home, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=50)
@@ -145,7 +143,7 @@ def test_dragging_back_from_out_of_reach_brings_the_wished_pitch_back(
     )
 
 
-def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
+def test_end_of_a_drag_makes_the_goal_the_target_and_keeps_the_finding(
     session: Session, state: State
 ) -> None:
     away = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=10)
@@ -163,7 +161,7 @@ def test_letting_go_makes_the_goal_the_wish_and_keeps_the_reason(
 
 
 def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
-    arm: Arm, session: Session, state: State
+    arm: ArmModel, session: Session, state: State
 ) -> None:
     """One tick has no time for all the way; what was wished is not lost with the hand."""
     wanted = np.array([-0.2, 0.35, 0.1])
@@ -190,7 +188,7 @@ def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
 
 @pytest.mark.parametrize("axis", range(5))
 def test_a_slider_at_its_end_is_no_complaint(
-    arm: Arm, session: Session, state: State, axis: int
+    arm: ArmModel, session: Session, state: State, axis: int
 ) -> None:
     end = math.radians(math.degrees(arm.chain.upper[axis]))
     state = run(session, state, [cmd.SetJoint(axis, math.nextafter(end, math.inf))])
@@ -201,7 +199,7 @@ def test_a_slider_at_its_end_is_no_complaint(
 @pytest.mark.parametrize("axis", range(5))
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_joint_stops_at_its_limit_and_says_which(
-    arm: Arm, session: Session, state: State, axis: int, side: float
+    arm: ArmModel, session: Session, state: State, axis: int, side: float
 ) -> None:
     state = run(session, state, [cmd.SetJoint(axis, side * 4.0)])
     limit = (arm.chain.upper if side > 0 else arm.chain.lower)[axis]
@@ -211,7 +209,7 @@ def test_a_joint_stops_at_its_limit_and_says_which(
     assert finding.amount == limit
 
 
-def test_dragging_never_changes_the_branch(arm: Arm, session: Session, state: State) -> None:
+def test_dragging_never_changes_the_branch(arm: ArmModel, session: Session, state: State) -> None:
     rng = np.random.default_rng(450)
     branch = state.branch
     position = tool_point(arm, state)
@@ -235,9 +233,7 @@ def test_dragging_never_changes_the_branch(arm: Arm, session: Session, state: St
         assert on.shoulder == branch.shoulder or abs(r) < 1e-6
 
 
-def test_sliders_may_change_the_branch_because_a_person_says_so(
-    session: Session, state: State
-) -> None:
+def test_sliders_may_change_the_branch(session: Session, state: State) -> None:
     assert str(state.branch) == "front-up"
     state = run(session, state, [cmd.SetJoint(2, -0.5)])
     assert str(state.branch) == "front-down"
@@ -255,7 +251,7 @@ def test_home_stretch_and_reset(session: Session, state: State) -> None:
     assert (home.goal == session.ready).all()
 
 
-def test_a_tool_change_moves_nothing(arm: Arm, session: Session, state: State) -> None:
+def test_a_tool_change_moves_nothing(arm: ArmModel, session: Session, state: State) -> None:
     changed = run(session, state, [cmd.SetTool("flange")])
     assert (changed.goal == state.goal).all()
     assert not changed.moving
@@ -264,7 +260,7 @@ def test_a_tool_change_moves_nothing(arm: Arm, session: Session, state: State) -
 
 
 def test_the_gripper_moves_at_its_speed_and_stops_at_its_limit(
-    arm: Arm, session: Session, state: State
+    arm: ArmModel, session: Session, state: State
 ) -> None:
     state = run(session, state, [cmd.SetGripper(1.0)])
     assert state.gripper_goal == arm.gripper.upper
@@ -287,7 +283,7 @@ def test_the_gripper_moves_at_its_speed_and_stops_at_its_limit(
         (cmd.SetTool([]), "no tool"),  # type: ignore[arg-type]
     ],
 )
-def test_what_this_arm_cannot_be_asked_changes_nothing(
+def test_unsupported_request_changes_nothing(
     session: Session, state: State, command: cmd.Command, said: str
 ) -> None:
     with pytest.raises(InputError, match=said):
@@ -306,7 +302,7 @@ def test_a_failure_leaves_an_arm_that_holds(session: Session, state: State) -> N
     assert run(session, after, [cmd.Home()]).status is Status.OK
 
 
-def test_a_ready_posture_outside_the_limits_is_refused(arm: Arm) -> None:
+def test_a_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:
     with pytest.raises(InputError, match="limits"):
         Session(arm, np.full(5, 2.0))
 

@@ -12,7 +12,7 @@ from hypothesis.stateful import (
 )
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.choices import wish
+from katana450.arm.control.branch_options import current_target
 from katana450.arm.control.modes import (
     Following,
     Jogging,
@@ -25,7 +25,7 @@ from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.planning.plan import Plan
 from tests.conftest import LONG
@@ -49,7 +49,7 @@ class ArmRules(JointRules):
 
     @rule(step=fractions(3), ticks=ticks, let_go=st.booleans())
     def drag(self, step: FloatArray, ticks: int, let_go: bool) -> None:
-        start = wish(self.session.require_arm(), self.state).position
+        start = current_target(self.session.require_arm(), self.state).position
         begins = not isinstance(self.state.intent, Tracking)
         for tick in range(1, ticks + 1):
             position = start + 0.02 * tick * step
@@ -117,9 +117,9 @@ class ArmRules(JointRules):
     def take_branch(self, branch: Branch, ticks: int) -> None:
         self.run([cmd.TakeBranch(branch)], ticks)
 
-    @rule(reading=st.sampled_from(Reading), ticks=ticks)
-    def set_reading(self, reading: Reading, ticks: int) -> None:
-        self.run([cmd.SetReading(reading)], ticks)
+    @rule(priority=st.sampled_from(Priority), ticks=ticks)
+    def set_reading(self, priority: Priority, ticks: int) -> None:
+        self.run([cmd.SetPriority(priority)], ticks)
 
     @rule(data=st.data(), ticks=ticks)
     def set_tool(self, data: st.DataObject, ticks: int) -> None:
@@ -157,13 +157,13 @@ class ArmRules(JointRules):
     @precondition(lambda self: self.name == "shipped")
     @rule(at=fractions(2), ticks=ticks)
     def move_cup(self, at: FloatArray, ticks: int) -> None:
-        self.run([cmd.Shift("cup", np.array([0.35 + 0.2 * at[0], 0.4 * at[1], 0.0]))], ticks)
+        self.run([cmd.MoveObject("cup", np.array([0.35 + 0.2 * at[0], 0.4 * at[1], 0.0]))], ticks)
 
     @precondition(lambda self: self.name == "shipped")
     @rule(cup=st.booleans(), ticks=ticks)
     def change_scene(self, cup: bool, ticks: int) -> None:
-        things = tuple(each for each in self.first.things if cup or each.name != "cup")
-        self.run([cmd.Furnish(things, 1e-4 if cup else None)], ticks)
+        objects = tuple(each for each in self.first.objects if cup or each.name != "cup")
+        self.run([cmd.ReplaceScene(objects, 1e-4 if cup else None)], ticks)
 
 
 def bounded(quick: int, many: int) -> settings:

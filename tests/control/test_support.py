@@ -6,29 +6,29 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject, Shape
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
-from katana450.arm.control.things import Environment, Form, Mount, Thing
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.environment import Table
+from katana450.maths.water.environment import TableTop
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
-TABLE = Table((-0.25, 0.75), (-0.7, 0.7), -0.025)
+TABLE = TableTop((-0.25, 0.75), (-0.7, 0.7), -0.025)
 
 
 def at(x: float, y: float, z: float, R: FloatArray | None = None) -> FloatArray:
     return se3.from_rotation_translation(np.eye(3) if R is None else R, (x, y, z))
 
 
-def can(T: FloatArray, name: str = "can") -> Thing:
-    return Thing(name, Form.CYLINDER, (0.03, 0.1), T, can_be_held=True)
+def can(T: FloatArray, name: str = "can") -> SceneObject:
+    return SceneObject(name, Shape.CYLINDER, (0.03, 0.1), T, can_be_held=True)
 
 
-def crate(T: FloatArray) -> Thing:
-    return Thing("crate", Form.BOX, (0.2, 0.1, 0.15), T)
+def crate(T: FloatArray) -> SceneObject:
+    return SceneObject("crate", Shape.BOX, (0.2, 0.1, 0.15), T)
 
 
 @pytest.mark.parametrize(("x", "y"), [(0.3, 0.0), (-0.249, 0.0), (0.749, 0.699), (0.0, -0.699)])
@@ -69,31 +69,31 @@ def test_work_cell_may_hang_in_the_air_and_what_can_be_held_may_not() -> None:
     far = at(1.5, 0.0, 0.4)
     assert not is_loose(crate(far))
     assert is_loose(can(far))
-    assert is_loose(Thing("basin", Form.CYLINDER, (0.1, 0.1), far))
+    assert is_loose(SceneObject("basin", Shape.CYLINDER, (0.1, 0.1), far))
 
 
 def test_scene_with_the_cup_in_the_air_is_refused_as_a_whole() -> None:
-    session = described(Settings(), URDF_PATH, None).session
-    table = session.surroundings.table
+    session = describe_robot(Settings(), URDF_PATH, None).session
+    table = session.environment.table
     assert table is not None
     assert (table.x, table.y) == (TABLE.x, TABLE.y)
-    session.check(cmd.Furnish((can(at(0.3, 0.0, 0.0)), crate(at(1.5, 0.0, 0.4)))))
+    session.check(cmd.ReplaceScene((can(at(0.3, 0.0, 0.0)), crate(at(1.5, 0.0, 0.4)))))
     with pytest.raises(InputError, match="can would be in the air"):
-        session.check(cmd.Furnish((can(at(1.5, 0.0, 0.0)), crate(at(0.5, 0.3, 0.0)))))
-    session.check(cmd.Furnish((can(at(1.5, 0.0, 0.15)), crate(at(1.5, 0.0, 0.0)))))
+        session.check(cmd.ReplaceScene((can(at(1.5, 0.0, 0.0)), crate(at(0.5, 0.3, 0.0)))))
+    session.check(cmd.ReplaceScene((can(at(1.5, 0.0, 0.15)), crate(at(1.5, 0.0, 0.0)))))
 
 
 def test_object_is_not_left_in_the_air_when_it_is_taken_off_the_hand() -> None:
-    rules = described(Settings(), URDF_PATH, None).session
+    rules = describe_robot(Settings(), URDF_PATH, None).session
     x = rules.begin(rules.ready, 0.0, 0.0).x
-    around: Environment = rules.surroundings
-    held = around.mounted(can(at(0.3, 0.0, 0.3)), Mount.HAND, x)
+    around: Environment = rules.environment
+    held = around.mounted(can(at(0.3, 0.0, 0.3)), Attachment.HAND, x)
     assert held.fixed
-    check_mounted(around, (), held, Mount.TABLE, x)
+    check_mounted(around, (), held, Attachment.TABLE, x)
     with pytest.raises(InputError, match=r"300\.0 mm above"):
-        check_mounted(around, (), held, Mount.WORLD, x)
-    camera = around.mounted(crate(at(0.3, 0.0, 0.3)), Mount.HAND, x)
-    check_mounted(around, (), camera, Mount.WORLD, x)
-    beside = around.mounted(crate(at(0.3, 0.9, 0.3)), Mount.HAND, x)
+        check_mounted(around, (), held, Attachment.WORLD, x)
+    camera = around.mounted(crate(at(0.3, 0.0, 0.3)), Attachment.HAND, x)
+    check_mounted(around, (), camera, Attachment.WORLD, x)
+    beside = around.mounted(crate(at(0.3, 0.9, 0.3)), Attachment.HAND, x)
     with pytest.raises(InputError, match="nothing carries it there"):
-        check_mounted(around, (), beside, Mount.TABLE, x)
+        check_mounted(around, (), beside, Attachment.TABLE, x)

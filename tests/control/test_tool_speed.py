@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import State
@@ -18,10 +18,10 @@ from katana450.maths.kinematics.velocity import tool_speed, tool_speed_bound
 
 TICK = 0.01
 
-Order = Callable[[np.random.Generator, Arm], cmd.Command]
+Order = Callable[[np.random.Generator, ArmModel], cmd.Command]
 
 
-def anywhere(rng: np.random.Generator, arm: Arm) -> FloatArray:
+def anywhere(rng: np.random.Generator, arm: ArmModel) -> FloatArray:
     return rng.uniform(arm.chain.lower, arm.chain.upper)
 
 
@@ -88,13 +88,13 @@ def test_fast_jump_drags_keep_below_it(
     assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
 
 
-def test_a_lower_limit_is_kept_as_well(arm: Arm, session: Session) -> None:
+def test_a_lower_limit_is_kept_as_well(arm: ArmModel, session: Session) -> None:
     slow = Session(arm, session.ready, tool_speed=0.1)
     found = speeds(slow, [each for group in ORDERS.values() for each in group], 2000, 1)
     assert 0.05 < max(found) <= 0.1
 
 
-def test_a_plan_is_left_without_passing_it(arm: Arm, session: Session) -> None:
+def test_a_plan_is_left_without_passing_it(arm: ArmModel, session: Session) -> None:
     rng, worst = np.random.default_rng(11), 0.0
     orders: list[cmd.Command] = [cmd.Stop(), cmd.Home(), cmd.MoveTool(np.array([-0.3, 0.3, 0.2]))]
     for number in range(12):
@@ -109,7 +109,7 @@ def test_a_plan_is_left_without_passing_it(arm: Arm, session: Session) -> None:
     assert 0.6 * TOOL_SPEED < worst <= TOOL_SPEED
 
 
-def test_the_bound_of_the_tool_speed_is_one(arm: Arm) -> None:
+def test_the_bound_of_the_tool_speed_is_one(arm: ArmModel) -> None:
     rng, chain = np.random.default_rng(3), arm.chain
     for _ in range(500):
         qd = rng.uniform(-1.0, 1.0, 5)

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.looks import Trait
+from katana450.arm.control.appearance import AppearanceTrait
 from katana450.arm.control.plans import plan_to
+from katana450.arm.control.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Form, Mount, Thing
-from katana450.arm.control.traits import BaseCommand, Traits
+from katana450.arm.control.traits import BaseCommand, CommandTraits
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.maths.kinematics.branch import BRANCHES
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 
 KINDS: tuple[type[BaseCommand], ...] = get_args(cmd.Command)
 ABSTRACT = (cmd.AxisCommand,)
 
-BALL = Thing("ball", Form.SPHERE, (0.02,), np.eye(4))
+BALL = SceneObject("ball", Shape.SPHERE, (0.02,), np.eye(4))
 
 
 def examples(session: Session, state: State) -> list[cmd.Command]:
@@ -36,7 +36,7 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
             cmd.Servo(q),
         ),
         *(cmd.MoveTool(np.array((0.3, 0.0, 0.1))), cmd.TurnTool(0.1, 0.1), cmd.SetPose(np.eye(4))),
-        *(cmd.SetGripper(0.1), cmd.SetTool("flange"), cmd.SetReading(Reading.PITCH)),
+        *(cmd.SetGripper(0.1), cmd.SetTool("flange"), cmd.SetPriority(Priority.PITCH)),
         *(cmd.TakeBranch(BRANCHES[0]), cmd.EndDrag(), cmd.Home(), cmd.GoToZero(), cmd.Hold()),
         *(cmd.Stop(), cmd.ClearStop(), cmd.Pause(), cmd.Resume(), cmd.GoAlong(0.5)),
         *(
@@ -44,8 +44,17 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
             cmd.SpeedScale(0.5),
             cmd.Jog(np.ones(5)),
         ),
-        *(cmd.Place(BALL), cmd.Remove("ball"), cmd.Shift("ball"), cmd.Attach("ball", Mount.WORLD)),
-        *(cmd.Furnish((BALL,)), cmd.Dress("ball", Trait.CHOICE, 0), cmd.Fill(1e-4)),
+        *(
+            cmd.PlaceObject(BALL),
+            cmd.Remove("ball"),
+            cmd.MoveObject("ball"),
+            cmd.Attach("ball", Attachment.WORLD),
+        ),
+        *(
+            cmd.ReplaceScene((BALL,)),
+            cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0),
+            cmd.Fill(1e-4),
+        ),
         cmd.Batch((cmd.Home(),)),
     ]
 
@@ -59,21 +68,23 @@ def test_every_command_class_is_a_command_and_declares_its_traits() -> None:
     found = subclasses(BaseCommand) - {BaseCommand, *ABSTRACT}
     assert found == set(KINDS)
     for kind in KINDS:
-        assert isinstance(vars(kind).get("traits"), Traits), f"{kind.__name__} declares no traits"
+        assert isinstance(vars(kind).get("traits"), CommandTraits), (
+            f"{kind.__name__} declares no traits"
+        )
         assert kind.__name__ in cmd.__all__
         assert kind.__doc__
 
 
 def test_commands_passive_to_planning_supersede_nothing() -> None:
     with pytest.raises(ValueError, match="passive"):
-        Traits(passive=True, supersedes=True)
+        CommandTraits(passive=True, supersedes=True)
 
 
 def test_only_stop_is_for_everybody() -> None:
     assert [kind for kind in KINDS if kind.traits.safety] == [cmd.Stop]
 
 
-def test_a_stopped_arm_heeds_exactly_what_is_declared(session: Session, state: State) -> None:
+def test_stopped_arm_accepts_exactly_the_declared_commands(session: Session, state: State) -> None:
     stopped = session.step(state, [cmd.Stop()], state.t)
     given: list[cmd.Command] = examples(session, state)
     assert {type(each) for each in given} == set(KINDS)

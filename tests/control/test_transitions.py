@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.looks import Trait
+from katana450.arm.control.appearance import AppearanceTrait
 from katana450.arm.control.modes import (
     MODES,
     Following,
@@ -23,14 +23,14 @@ from katana450.arm.control.modes import (
     Tracking,
 )
 from katana450.arm.control.plans import plan_to
+from katana450.arm.control.scene_objects import Attachment, named
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
-from katana450.arm.control.things import Mount, named
 from katana450.arm.control.transitions import TABLE, Effect, effect_of, row_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 
 TICK = 0.01
 
@@ -58,8 +58,8 @@ def followed(session: Session, state: State) -> State:
 
 def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Command:
     """A command of each class that ``session`` can be asked for; a KeyError for an unknown one."""
-    things = state.things
-    cup = named(things, "cup")
+    objects = state.objects
+    cup = named(objects, "cup")
     assert cup is not None
     pose = forward(session.require_arm().chain_to(state.tool), session.ready)
     found: dict[type[cmd.Command], Callable[[], cmd.Command]] = {
@@ -73,7 +73,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.SetPose: lambda: cmd.SetPose(pose),
         cmd.SetGripper: lambda: cmd.SetGripper(0.4),
         cmd.SetTool: lambda: cmd.SetTool("flange"),
-        cmd.SetReading: lambda: cmd.SetReading(Reading.POSITION),
+        cmd.SetPriority: lambda: cmd.SetPriority(Priority.POSITION),
         cmd.TakeBranch: lambda: cmd.TakeBranch(BRANCHES[-1]),
         cmd.EndDrag: cmd.EndDrag,
         cmd.Home: cmd.Home,
@@ -87,13 +87,13 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
             plan_to(session.require_arm(), None, state, session.ready + 0.3)
         ),
         cmd.GoAlong: lambda: cmd.GoAlong(0.3),
-        cmd.Place: lambda: cmd.Place(cup),
+        cmd.PlaceObject: lambda: cmd.PlaceObject(cup),
         cmd.Remove: lambda: cmd.Remove("cup"),
-        cmd.Attach: lambda: cmd.Attach("cup", Mount.TABLE),
-        cmd.Furnish: lambda: cmd.Furnish(things),
+        cmd.Attach: lambda: cmd.Attach("cup", Attachment.TABLE),
+        cmd.ReplaceScene: lambda: cmd.ReplaceScene(objects),
         cmd.Fill: lambda: cmd.Fill(1e-4),
-        cmd.Shift: lambda: cmd.Shift("cup", np.array([0.3, 0.35, 0.0])),
-        cmd.Dress: lambda: cmd.Dress("cup", Trait.CHOICE, -1),
+        cmd.MoveObject: lambda: cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
+        cmd.SetAppearance: lambda: cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1),
         cmd.Batch: lambda: cmd.Batch((cmd.SpeedScale(0.5),)),
         cmd.SpeedScale: lambda: cmd.SpeedScale(0.5),
         cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),
@@ -147,7 +147,7 @@ def trace(state: State) -> tuple[object, ...]:
     motion = (state.setpoint, state.motion.qd, state.motion.qdd, state.goal)
     seen = tuple(each.tobytes() for each in motion)
     numbers = (state.gripper_goal, state.gripper_setpoint, state.speed, state.paused)
-    return (*seen, *numbers, state.findings, state.stopped, state.tool, state.reading)
+    return (*seen, *numbers, state.findings, state.stopped, state.tool, state.priority)
 
 
 @pytest.fixture(scope="module")

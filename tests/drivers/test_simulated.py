@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.errors import InputError
 
@@ -13,7 +13,7 @@ START = np.array([0.0, -1.0, 1.0, 0.5, 0.0])
 
 
 @pytest.fixture
-def driver(arm: Arm) -> SimulatedDriver:
+def driver(arm: ArmModel) -> SimulatedDriver:
     driver = SimulatedDriver(arm, START, 0.0)
     driver.start(0.0)
     return driver
@@ -26,13 +26,13 @@ def test_a_setpoint_within_speed_is_followed_exactly(driver: SimulatedDriver) ->
     assert sent.gripper == 0.005
 
 
-def test_a_leap_is_cut_to_the_joints_speed(arm: Arm, driver: SimulatedDriver) -> None:
+def test_a_leap_is_cut_to_the_joints_speed(arm: ArmModel, driver: SimulatedDriver) -> None:
     sent = driver.send(START + 1.0, 0.3, 0.01)
     assert np.allclose(sent.q - START, arm.chain.speed * 0.01)
     assert sent.gripper == pytest.approx(arm.gripper.speed * 0.01)
 
 
-def test_limits_hold(arm: Arm, driver: SimulatedDriver) -> None:
+def test_limits_hold(arm: ArmModel, driver: SimulatedDriver) -> None:
     for tick in range(1, 500):
         sent = driver.send(np.full(5, 9.0), 9.0, tick * 0.01)
     assert np.allclose(sent.q, arm.chain.upper)
@@ -46,7 +46,7 @@ def test_time_that_runs_back_moves_nothing(driver: SimulatedDriver) -> None:
 
 
 @pytest.mark.parametrize(("q", "gripper"), [(np.full(5, np.nan), 0.0), (START, np.inf)])
-def test_what_is_not_finite_is_refused_and_moves_nothing(
+def test_non_finite_command_is_refused(
     driver: SimulatedDriver, q: np.ndarray, gripper: float
 ) -> None:
     with pytest.raises(InputError, match="not finite"):
@@ -54,7 +54,7 @@ def test_what_is_not_finite_is_refused_and_moves_nothing(
     assert (driver.send(START, 0.0, 0.02).q == START).all()
 
 
-def test_nothing_is_sent_before_start_or_after_stop(arm: Arm) -> None:
+def test_nothing_is_sent_before_start_or_after_stop(arm: ArmModel) -> None:
     driver = SimulatedDriver(arm, START, 0.0)
     with pytest.raises(InputError, match="before it is started"):
         driver.send(START, 0.0, 0.0)

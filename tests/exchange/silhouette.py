@@ -11,7 +11,7 @@ import trimesh
 import yourdfpy
 from PIL import Image, ImageDraw
 
-from katana450.arm.robot.camera import FIELD_OF_VIEW, Camera
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, InitialCamera
 
 SIZE = 800
 """Pixels of a picture's edge."""
@@ -48,7 +48,7 @@ def placed(path: Path, joints: Mapping[str, float]) -> list[tuple[str, trimesh.T
     return found
 
 
-def silhouette(meshes: list[tuple[str, trimesh.Trimesh]], view: Camera) -> Mask:
+def silhouette(meshes: list[tuple[str, trimesh.Trimesh]], view: InitialCamera) -> Mask:
     """(SIZE, SIZE), true where a camera sees any of the meshes."""
     back = view.eye - view.target
     back = back / np.linalg.norm(back)
@@ -76,6 +76,6 @@ def seen(picture: Path) -> Mask:
 
 
 def overlap(a: Mask, b: Mask) -> float:
-    """Share of what either covers that both cover."""
+    """Fraction of what either covers that both cover."""
     assert a.sum() > 2000
     return float((a & b).sum() / (a | b).sum())

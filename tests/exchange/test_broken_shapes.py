@@ -24,10 +24,10 @@ from katana450.errors import InputError
 from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.reading import bind
 from katana450.extensions.importers.shape_file import (
-    LARGEST,
-    MEMORY,
+    MAX_MEMORY_BYTES,
+    MAX_SIZE,
+    MIN_SIZE,
     SECONDS,
-    SMALLEST,
     Format,
     ShapeFile,
     read_shape,
@@ -168,7 +168,7 @@ OBJ = (
 def test_statements_of_obj() -> None:
     shape = read_shape(OBJ, Format.OBJ, "a.obj")
     assert (len(shape.vertices), len(shape.faces)) == (4, 3)
-    assert shape.said.endswith("Left out: materials, which are in another file, lines.")
+    assert shape.text.endswith("Left out: materials, which are in another file, lines.")
     assert shape.colours is not None
     assert shape.colours[0].tolist() == [255, 0, 0, 255]
 
@@ -226,7 +226,7 @@ def test_rows_of_ply_may_differ() -> None:
         assert shape.faces.shape == (3, 3)
         assert shape.colours is not None
         assert shape.colours[0].tolist() == [255, 128, 0, 255]
-        assert shape.said.endswith("Left out: 1 edge.")
+        assert shape.text.endswith("Left out: 1 edge.")
 
 
 def deep(levels: int) -> bytes:
@@ -329,7 +329,7 @@ def test_modes_colours_and_places_of_gltf(mode: int, faces: int) -> None:
     assert (np.cross(b - a, c - a)[:, 1] < 0.0).all()
     assert shape.colours is not None
     assert np.unique(shape.colours, axis=0).tolist() == [[188, 0, 0, 128]]
-    assert shape.said.endswith("Left out: pictures on the surface, motion.")
+    assert shape.text.endswith("Left out: pictures on the surface, motion.")
 
 
 NUMBERS = [b"nan", b"-1", b"1e999", b"2147483648", b"4294967295", b"9" * 30, b"[", b"}", b'"', b"0"]
@@ -384,7 +384,7 @@ def looked_at(data: bytes, format: Format) -> ShapeFile | None:
     assert shape.faces.min() >= 0
     assert shape.faces.max() == len(shape.vertices) - 1
     assert shape.colours is None or shape.colours.shape == (len(shape.faces), 4)
-    assert SMALLEST <= np.ptp(shape.vertices, axis=0).max() <= LARGEST
+    assert MIN_SIZE <= np.ptp(shape.vertices, axis=0).max() <= MAX_SIZE
     return shape
 
 
@@ -399,7 +399,7 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
         read += looked_at(mutated(data, chance), format) is not None
         assert time.process_time() - start < SECONDS
     assert read < MUTATIONS
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MEMORY
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY_BYTES
 
 
 @settings(max_examples=MUTATIONS, deadline=None)

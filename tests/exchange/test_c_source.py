@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.camera import camera
+from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.c_source import c_files
 from katana450.maths.geometry import so3

@@ -17,8 +17,8 @@ import trimesh
 from katana450.errors import InputError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import (
-    MEMORY,
-    MOST_BYTES,
+    MAX_FILE_BYTES,
+    MAX_MEMORY_BYTES,
     SECONDS,
     Format,
     Up,
@@ -134,7 +134,7 @@ def test_concave_polygons_units_and_colours(
 
 def test_components_units_and_transforms_of_3mf() -> None:
     shape = read_shape(threemf(), Format.THREEMF, "l.3mf")
-    assert "the unit is mm, as the file tells" in shape.said
+    assert "the unit is mm, as the file tells" in shape.text
     # Turned by 90 degrees about z.
     assert (sides(shape), is_closed(shape)) == ([40.0, 60.0, 25.0], True)
     assert volume(shape) == pytest.approx(35e-6, rel=1e-6)
@@ -192,7 +192,7 @@ ENTITY = b'<?xml version="1.0"?>\n<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/pa
         (threemf("league"), Format.THREEMF, "'league' is no unit of 3MF"),
         (threemf(more=' transform="nan 0 0 0 1 0 0 0 1 0 0 0"'), Format.THREEMF, "finite|broken"),
         (
-            threemf(files={"big": bytes(MOST_BYTES)}),
+            threemf(files={"big": bytes(MAX_FILE_BYTES)}),
             Format.THREEMF,
             "more than 20 MB when unpacked",
         ),
@@ -233,7 +233,7 @@ def test_no_other_file_is_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     with pytest.raises(InputError, match=r"no triangles\. It has 1 parts that are broken"):
         read_shape(elsewhere, Format.DAE, "l")
     monkeypatch.undo()
-    assert "pictures on the surface" in shape.said
+    assert "pictures on the surface" in shape.text
     assert not opened
 
 
@@ -297,4 +297,4 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
         read += looked_at(mutated(data, chance), format) is not None
         assert time.process_time() - start < SECONDS
     assert read < MUTATIONS
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MEMORY
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY_BYTES

@@ -11,7 +11,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.robot.loader import load
-from katana450.assembly.robot_session import recognised
+from katana450.assembly.robot_session import find_robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
@@ -45,8 +45,8 @@ def test_no_posture_inside_the_limits_takes_any_joint_beyond_its_own(
     path.write_text(tree(seed, 6 + seed))
     robot = load(path)
     joints, random = robot.joint_group, np.random.default_rng(seed)
-    for share in (0.0, 1.0, random.uniform(size=joints.n)):
-        values = robot.joint_values(joints.lower + share * (joints.upper - joints.lower), 0.0)
+    for fraction in (0.0, 1.0, random.uniform(size=joints.n)):
+        values = robot.joint_values(joints.lower + fraction * (joints.upper - joints.lower), 0.0)
         for name, value in values.items():
             joint = robot.joints[name]
             assert joint.lower - 1e-12 <= value <= joint.upper + 1e-12
@@ -72,7 +72,7 @@ LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
         ("<robot", "no robot description|not a robot description"),
     ],
 )
-def test_what_cannot_be_driven_is_told(tmp_path: Path, text: str, said: str) -> None:
+def test_undrivable_robot_is_reported(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "r.urdf"
     path.write_text(text)
     with pytest.raises(RobotDescriptionError, match=said):
@@ -106,7 +106,7 @@ def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_pat
     skewed = f'<axis xyz="{math.sin(tilt)} {math.cos(tilt)} 0"/>'
     path = tmp_path / "skewed.urdf"
     path.write_text(before + re.sub(r'<axis xyz="[^"]*"/>', skewed, after, count=1))
-    found = recognised(Settings(), path, None)
+    found = find_robot(Settings(), path, None)
     assert found.robot.arm is None
     why = found.robot.why
     assert found.robot.joint_group.why == why
@@ -114,7 +114,7 @@ def test_an_arm_with_a_skewed_axis_has_joints_and_the_reason_why_no_more(tmp_pat
     assert f"Joints only. {why}" in found.notes
     with pytest.raises(InputError, match="12 deg off"):
         found.session.check(cmd.SetPose(np.eye(4)))
-    assert recognised(Settings(), ARMS / "pincherx_150.urdf", None).robot.arm is not None
+    assert find_robot(Settings(), ARMS / "pincherx_150.urdf", None).robot.arm is not None
     # Whoever names a tool wants to send it somewhere.
     with pytest.raises(RobotDescriptionError, match="12 deg off"):
-        recognised(Settings(), path, found.robot.links[-1].name)
+        find_robot(Settings(), path, found.robot.links[-1].name)

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 import yourdfpy
 
-from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, RobotDescriptionError
@@ -37,7 +37,7 @@ def test_links_are_where_yourdfpy_has_them(path: Path) -> None:
             np.testing.assert_allclose(frames[link], urdf.get_transform(link), atol=1e-12)
 
 
-def test_a_follower_of_a_follower_follows_who_is_driven(tmp_path: Path) -> None:
+def test_mimic_of_a_mimic_follows_the_driven_joint(tmp_path: Path) -> None:
     direct = '<mimic joint="grip" multiplier="-0.1" offset="-0.04"/>'
     chained = '<mimic joint="grip too" multiplier="0.1" offset="-0.05"/>'
     (tmp_path / "other.urdf").write_text(GANTRY.read_text().replace(direct, chained))
@@ -171,7 +171,7 @@ def test_what_cannot_be_exported_is_refused(
         load(tmp_path / "other.urdf").check_complete()
 
 
-def test_a_mesh_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_missing_mesh_is_reported(tmp_path: Path) -> None:
     text = GANTRY.read_text().replace('<sphere radius="0.05"/>', '<mesh filename="no.stl"/>')
     (tmp_path / "other.urdf").write_text(text)
     assert "no.stl" in load(tmp_path / "other.urdf").notes[0]

@@ -23,8 +23,8 @@ from katana450.extensions.reachability.reachability_file import (
 )
 
 POINTS = np.array([[0.11, -0.2, 0.3], [0.13, -0.2, 0.3], [0.15, 0.2, 0.5]])
-SHARE = np.array([0.25, 1.0, 1 / 3])
-FOUND = ReachabilityMap(POINTS, SHARE, cloud=np.array([[0.3, 0.0, 0.2]]))
+FRACTION = np.array([0.25, 1.0, 1 / 3])
+FOUND = ReachabilityMap(POINTS, FRACTION, cloud=np.array([[0.3, 0.0, 0.2]]))
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +44,9 @@ def npz(survey: Survey, tmp_path: Path) -> Path:
 def test_a_map_comes_back_to_the_bit(npz: Path) -> None:
     stored = load_map(npz)
     assert np.array_equal(stored.points, POINTS)
-    assert np.array_equal(stored.share, SHARE)
+    assert np.array_equal(stored.fraction, FRACTION)
     assert not stored.points.flags.writeable
-    assert not stored.share.flags.writeable
+    assert not stored.fraction.flags.writeable
     assert (stored.voxel, stored.robot, stored.tool) == (0.02, "katana450", "tcp")
 
 
@@ -79,7 +79,7 @@ def test_an_empty_map_is_a_map(survey: Survey, tmp_path: Path) -> None:
         write_npz(file, survey, empty, "katana450", "tcp")
     stored = load_map(path)
     assert stored.points.shape == (0, 3)
-    assert stored.share.shape == (0,)
+    assert stored.fraction.shape == (0,)
     ply = io.BytesIO()
     write_ply(ply, empty)
     assert b"element vertex 0\n" in ply.getvalue()
@@ -91,13 +91,13 @@ def test_another_program_reads_the_point_cloud() -> None:
     ply.seek(0)
     cloud: Any = trimesh.load(ply, file_type="ply")
     assert np.allclose(cloud.vertices, POINTS, atol=1e-7)
-    assert np.array_equal(cloud.colors[:, :3], share_colors(SHARE))
+    assert np.array_equal(cloud.colors[:, :3], share_colors(FRACTION))
 
 
 GOOD = {
     "format": np.array(FORMAT),
     "points": POINTS,
-    "share": SHARE,
+    "fraction": FRACTION,
     "voxel": np.array(0.02),
     "robot": np.array("katana450"),
     "tool": np.array("tcp"),
@@ -109,18 +109,18 @@ GOOD = {
     [
         ({"format": np.array("something else")}, "something else"),
         ({"points": POINTS[:, :2]}, "'points'"),
-        ({"points": POINTS[:2]}, "'share'"),
+        ({"points": POINTS[:2]}, "'fraction'"),
         ({"points": POINTS * np.nan}, "'points'"),
         ({"points": np.array(0.0)}, "'points'"),
         ({"points": np.array([["a", "b", "c"]])}, "'points'"),
         ({"points": np.array([None, {}], dtype=object)}, "broken"),
-        ({"share": SHARE[:, None]}, "'share'"),
-        ({"share": SHARE - 0.25}, "above 0"),
-        ({"share": SHARE + 0.1}, "up to 1"),
+        ({"fraction": FRACTION[:, None]}, "'fraction'"),
+        ({"fraction": FRACTION - 0.25}, "above 0"),
+        ({"fraction": FRACTION + 0.1}, "up to 1"),
         ({"voxel": np.array(0.0)}, "an edge of 0"),
         ({"voxel": np.array(np.nan)}, "an edge of nan"),
         ({"voxel": np.array("wide")}, "'voxel'"),
-        ({"voxel": SHARE}, "broken"),
+        ({"voxel": FRACTION}, "broken"),
         ({"robot": np.array(3)}, "'robot'"),
         ({"tool": np.array(1.5)}, "'tool'"),
     ],
@@ -143,7 +143,7 @@ def test_a_file_without_a_key_is_refused(tmp_path: Path, key: str) -> None:
         load_map(path)
 
 
-def test_what_is_no_npz_is_refused(npz: Path, tmp_path: Path) -> None:
+def test_invalid_npz_is_refused(npz: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         load_map(tmp_path / "nothing.npz")
     with pytest.raises(InputError, match="cannot be read"):

@@ -14,8 +14,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.solid import Look, Solid
-from katana450.arm.control.things import Form, Thing
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.solid import ObjectAppearance, Solid
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError
 from katana450.extensions.importers import scene_file
@@ -59,20 +59,20 @@ def poses(draw: st.DrawFn) -> FloatArray:
 
 
 @st.composite
-def things(draw: st.DrawFn, name: str) -> Thing:
-    form = draw(st.sampled_from(Form))
+def objects(draw: st.DrawFn, name: str) -> SceneObject:
+    form = draw(st.sampled_from(Shape))
     colour = draw(st.none() | st.tuples(*(st.integers(0, 255),) * 3))
-    look = Look(colour, draw(st.floats(0.05, 1.0)), draw(st.booleans()))
+    look = ObjectAppearance(colour, draw(st.floats(0.05, 1.0)), draw(st.booleans()))
     size = draw(st.lists(st.floats(0.01, 1.0), min_size=form.numbers, max_size=form.numbers))
-    return Thing(
+    return SceneObject(
         name,
         form,
         tuple(size),
         draw(poses()),
         draw(st.booleans()),
-        solid=SOLID if form is Form.MESH else None,
+        solid=SOLID if form is Shape.MESH else None,
         scale=draw(st.sampled_from((1.0, 0.5)) | st.floats(0.2, 1.9)),
-        look=look,
+        appearance=look,
         fixed=draw(st.booleans()),
     )
 
@@ -82,7 +82,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     names = draw(st.lists(NAMES, max_size=5, unique=True))
     joints = draw(st.none() | st.lists(st.floats(-3.0, 3.0), min_size=5, max_size=5))
     return Scene(
-        tuple(draw(things(name)) for name in names),
+        tuple(draw(objects(name)) for name in names),
         draw(st.none() | st.floats(0.0, 2e-4)),
         None if joints is None else np.array(joints),
     )
@@ -101,22 +101,27 @@ def test_what_is_written_is_read(scene: Scene) -> None:
     if scene.joints is not None:
         assert back.joints is not None
         np.testing.assert_allclose(back.joints, scene.joints, atol=1e-10)
-    assert len(back.things) == len(scene.things)
-    for one, other in zip(scene.things, back.things, strict=True):
+    assert len(back.objects) == len(scene.objects)
+    for one, other in zip(scene.objects, back.objects, strict=True):
         np.testing.assert_allclose(other.T, one.T, atol=3e-9)
         np.testing.assert_allclose(other.size, one.size, atol=1e-9)
         assert other.scale == pytest.approx(one.scale, rel=1e-11)
-        assert other.look.opacity == pytest.approx(one.look.opacity, rel=1e-11)
-        for name in ("name", "form", "can_be_held", "fixed", "held"):
+        assert other.appearance.opacity == pytest.approx(one.appearance.opacity, rel=1e-11)
+        for name in ("name", "shape", "can_be_held", "fixed", "held"):
             assert getattr(one, name) == getattr(other, name)
-        assert (other.look.colour, other.look.hidden) == (one.look.colour, one.look.hidden)
+        assert (other.appearance.colour, other.appearance.hidden) == (
+            one.appearance.colour,
+            one.appearance.hidden,
+        )
         assert (other.solid is None) == (one.solid is None)
 
 
 def scene_of(mesh: Mesh) -> StoredScene:
     T = se3.from_rotation_translation(so3.rotation_z(0.5), (0.4, 0.1, 0.0))
-    stands = Thing("ring", Form.MESH, (), T, solid=mesh.solid)
-    camera = Thing("camera", Form.MESH, (), np.eye(4), solid=mesh.solid, scale=0.3, fixed=True)
+    stands = SceneObject("ring", Shape.MESH, (), T, solid=mesh.solid)
+    camera = SceneObject(
+        "camera", Shape.MESH, (), np.eye(4), solid=mesh.solid, scale=0.3, fixed=True
+    )
     return StoredScene(Scene((stands, camera), None, np.zeros(5)), (mesh,))
 
 
@@ -134,7 +139,7 @@ def test_a_scene_comes_back_with_its_meshes(mesh: Mesh, kind: str, tmp_path: Pat
     (again,) = back.meshes
     assert again.key == mesh.key
     assert again.file == mesh.file
-    for one, other in zip(stored.scene.things, back.scene.things, strict=True):
+    for one, other in zip(stored.scene.objects, back.scene.objects, strict=True):
         np.testing.assert_allclose(other.T, one.T, atol=1e-9)
         assert other.solid is not None
         np.testing.assert_array_equal(other.solid.corners, mesh.solid.corners)
@@ -150,9 +155,9 @@ def zipped(**files: bytes | str) -> bytes:
 
 MESH = """\
 scene: 1
-things:
+objects:
 - name: it
-  form: mesh
+  shape: mesh
   mesh: {{file: {file}}}
   pose: [0, 0, 0, 0, 0, 0]
 """
@@ -183,11 +188,11 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path: Path) -> None:
         read_scene_folder(inside / "scene.yaml", None)
 
 
-def ball(*, name: str = "it", size: str = "9", besides: str = "") -> str:
-    return f"- {{name: {name}, form: sphere, size: [{size}], pose: [0,0,0,0,0,0]{besides}}}\n"
+def ball(*, name: str = "it", size: str = "9", view_options: str = "") -> str:
+    return f"- {{name: {name}, shape: sphere, size: [{size}], pose: [0,0,0,0,0,0]{view_options}}}\n"
 
 
-THINGS = "scene: 1\nthings:\n"
+THINGS = "scene: 1\nobjects:\n"
 
 
 @pytest.mark.parametrize(
@@ -195,20 +200,20 @@ THINGS = "scene: 1\nthings:\n"
     [
         ("", "line 1, column 1: The scene is empty"),
         ("scene: 2\n", "line 1.*version 1"),
-        ("things: []\n", "needs 'scene'"),
-        (THINGS + "- {name: it}\n", "line 3.*needs 'form'"),
+        ("objects: []\n", "needs 'scene'"),
+        (THINGS + "- {name: it}\n", "line 3.*needs 'shape'"),
         (
-            THINGS + "- name: it\n  form: box\n  size: [1, 2]\n  pose: [0, 0, 0]\n",
+            THINGS + "- name: it\n  shape: box\n  size: [1, 2]\n  pose: [0, 0, 0]\n",
             "line 5, column 9.*of 3(.|\n)*line 6, column 9: A pose is six numbers",
         ),
         (THINGS + ball(size=".nan"), "line 3.*A number"),
-        (THINGS + ball(besides=", colour: red"), "line 3.*A colour is as"),
-        (THINGS + ball(besides=", coluor: 1"), "line 3.*did you mean 'colour'"),
+        (THINGS + ball(view_options=", colour: red"), "line 3.*A colour is as"),
+        (THINGS + ball(view_options=", coluor: 1"), "line 3.*did you mean 'colour'"),
         (THINGS + ball(size="3000"), "line 3, column 3.*from 0.001 to 2 m"),
-        (THINGS + ball() + ball(), "line 4.*two things called 'it'"),
-        (THINGS + ball(besides=", attach: hand"), "line 3.*has no hand"),
+        (THINGS + ball() + ball(), "line 4.*two objects called 'it'"),
+        (THINGS + ball(view_options=", attach: hand"), "line 3.*has no hand"),
         (THINGS + ball() + "# " + "-" * 70_000, "at most 64 KB"),
-        ("scene: 1\nthings: &a []\n", "Anchors"),
+        ("scene: 1\nobjects: &a []\n", "Anchors"),
         ("scene: 1\nwater: -1\n", "line 2.*not between"),
         (MESH.format(file="gone.stl"), "line 3.*gone.stl"),
         (MESH.format(file="it.exe"), "line 3.*it.exe"),
@@ -216,7 +221,7 @@ THINGS = "scene: 1\nthings:\n"
         (MESH.format(file="it.stl, sha256: abc"), "line 5.*64 digits"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(text: str, said: str) -> None:
+def test_error_is_reported_with_its_line(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_scene_zip(zipped(scene_yaml=text), None)
 
@@ -245,7 +250,7 @@ def test_a_broken_or_swollen_zip_is_refused(mesh: Mesh, monkeypatch: pytest.Monk
             read_scene_zip(bytes(bent), T_PALM_TOOL)
         except InputError:
             continue
-    monkeypatch.setattr(scene_file, "LARGEST_ZIP", 100_000)
+    monkeypatch.setattr(scene_file, "MAX_ZIP_BYTES", 100_000)
     bomb = zipped(scene_yaml=MESH.format(file="zeros.stl"), **{"zeros.stl": bytes(1_000_000)})
     assert len(bomb) < 5000
     with pytest.raises(InputError, match="Unpacked"):
@@ -263,8 +268,8 @@ def made(key: str, size: int) -> Mesh:
     return Mesh(bytes(size), "stl", "mm", None, key, none, none.astype(np.int64), None, solid, "")
 
 
-def test_the_store_gives_up_what_is_not_used_and_nothing_else() -> None:
-    store = Meshes(most=3, most_bytes=100)
+def test_mesh_store_drops_only_unused_meshes() -> None:
+    store = Meshes(maximum=3, max_bytes=100)
     for key in ("a", "b", "c"):
         store.put([made(key, 10)], ())
     store.put([made("d", 10)], {"a"})

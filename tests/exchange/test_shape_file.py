@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from trimesh.exchange.gltf import export_gltf
 
-from katana450.arm.control import things
-from katana450.arm.control.things import Form, Thing
+from katana450.arm.control import scene_objects
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.glb import glb_files
@@ -24,17 +24,17 @@ from katana450.extensions.export.vrml_text import world_text
 from katana450.extensions.importers import shape_file
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import (
-    LARGEST,
     LONGEST_NAME,
-    SMALLEST,
+    MAX_SIZE,
+    MIN_SIZE,
     Format,
     Up,
     label,
+    object_name,
     read_shape,
     read_shape_guarded,
-    thing_name,
 )
-from katana450.maths.collision.outer import outer
+from katana450.maths.collision.convex_body import convex_body
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
@@ -91,7 +91,7 @@ def test_a_whole_world_is_flattened() -> None:
         pin = 16.0 * 5e-3**2 * np.sin(np.pi / 16.0) * 40e-3
         assert volume(shape) == pytest.approx(35e-6 + 2.0 * pin, rel=1e-6)
         assert sides(shape) == [110.0, 115.0, 45.0]
-        assert shape.said.endswith("Left out: Text.")
+        assert shape.text.endswith("Left out: Text.")
         assert shape.colours is not None
         assert np.unique(shape.colours, axis=0).tolist() == [[255, 128, 0, 191]]
     castle, ours = (triangles(shape.vertices * 1e3, shape.faces, 3) for shape in shapes)
@@ -112,7 +112,7 @@ def test_another_reader_finds_the_same_triangles(file: str) -> None:
     ("file", "said"),
     [("gmsh.wrl", "VRML 1.0, which is not read"), ("assimp.gltf", "'assimp.bin'")],
 )
-def test_what_other_programs_write_and_is_not_read_is_named(file: str, said: str) -> None:
+def test_ignored_content_of_foreign_files_is_reported(file: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape((FOREIGN / file).read_bytes(), Format.of(file), file)
 
@@ -213,14 +213,14 @@ def tetrahedron(size: float) -> bytes:
         (3.0, 0.1, 0.1, "the unit is 0.1 m, as told"),
     ],
 )
-def test_the_unit_is_told_or_guessed_and_said(
+def test_unit_is_given_or_guessed_and_reported(
     size: float, told: float | None, unit: float, said: str
 ) -> None:
     shape = read_shape(tetrahedron(size), Format.OBJ, "a.obj", told)
     assert shape.unit == unit
     assert volume(shape) == pytest.approx((size * unit) ** 3 / 6.0)
-    assert said in shape.said
-    assert "4 triangles" in shape.said
+    assert said in shape.text
+    assert "4 triangles" in shape.text
 
 
 @pytest.mark.parametrize(
@@ -251,11 +251,11 @@ def test_the_axis_that_is_up_can_be_told() -> None:
     assert (sides(upright), sides(flat)) == (UPRIGHT, FLAT)
     x, y, z = flat.vertices.T
     np.testing.assert_array_equal(upright.vertices, np.column_stack((x, -z, y)))
-    assert "as told" in flat.said
+    assert "as told" in flat.text
 
 
 @pytest.mark.parametrize(
-    ("name", "shown", "thing"),
+    ("name", "shown", "scene_object"),
     [
         ("cup.wrl", "cup.wrl", "cup"),
         ("../../etc/passwd.stl", "passwd.stl", "passwd"),
@@ -266,20 +266,20 @@ def test_the_axis_that_is_up_can_be_told() -> None:
         ("x" * 300 + ".stl", "x" * 31 + "…xxxx.stl", "x" * 31 + "…xxxx"),
     ],
 )
-def test_names_of_files_become_names_of_things(name: str, shown: str, thing: str) -> None:
-    assert (label(name), thing_name(name)) == (shown, thing)
+def test_names_of_files_become_names_of_objects(name: str, shown: str, scene_object: str) -> None:
+    assert (label(name), object_name(name)) == (shown, scene_object)
 
 
 @settings(max_examples=50, deadline=None)
 @given(st.text(max_size=99))
-def test_any_name_makes_a_thing(name: str) -> None:
-    Thing(thing_name(name), Form.SPHERE, (0.1,), np.eye(4))
+def test_any_name_makes_a_object(name: str) -> None:
+    SceneObject(object_name(name), Shape.SPHERE, (0.1,), np.eye(4))
     assert len(label(label(name))) <= LONGEST_NAME
 
 
-def test_bounds_are_those_of_things() -> None:
-    assert (LARGEST, SMALLEST) == (things.LARGEST, things.SMALLEST)
-    assert things.LONGEST_NAME == LONGEST_NAME
+def test_bounds_are_those_of_objects() -> None:
+    assert (MAX_SIZE, MIN_SIZE) == (scene_objects.MAX_SIZE, scene_objects.MIN_SIZE)
+    assert scene_objects.MAX_NAME_LENGTH == LONGEST_NAME
 
 
 def test_gltf_of_2_m_is_read_and_a_longer_one_is_told_from_the_bound() -> None:
@@ -290,7 +290,7 @@ def test_gltf_of_2_m_is_read_and_a_longer_one_is_told_from_the_bound() -> None:
         return bytes(trimesh.creation.box((side, 0.1, 0.1)).export(file_type="glb"))
 
     mesh = read_mesh(cube(side), "long.glb")
-    assert Thing("long", Form.MESH, (), np.eye(4), solid=mesh.solid).size[0] > 2.0
+    assert SceneObject("long", Shape.MESH, (), np.eye(4), solid=mesh.solid).size[0] > 2.0
     with pytest.raises(InputError) as refused:
         read_shape(cube(2.0002), Format.GLB, "long.glb")
     found = re.search(r"would be ([0-9.]+) mm long, .* from 1 to 2000 mm", str(refused.value))
@@ -311,12 +311,12 @@ def test_a_guarded_reading_is_the_same() -> None:
         data = (FOREIGN / file).read_bytes()
         here = read_shape(data, Format.of(file), f"-{file}", unit, up)
         there, body = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
-        assert (there.name, there.unit, there.said) == (here.name, here.unit, here.said)
+        assert (there.name, there.unit, there.text) == (here.name, here.unit, here.text)
         np.testing.assert_array_equal(there.vertices, here.vertices)
         np.testing.assert_array_equal(there.faces, here.faces)
         np.testing.assert_array_equal(there.colours, here.colours)
         assert there.vertices.dtype == np.float64
-        np.testing.assert_array_equal(body.corners, outer(here.vertices).corners)
+        np.testing.assert_array_equal(body.corners, convex_body(here.vertices).corners)
 
 
 def test_a_guarded_reading_ends_in_words(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,7 +79,7 @@ def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Robo
         ("a.txt", "t\n0\n1\n", r"\.csv or \.json"),
     ],
 )
-def test_what_is_no_motion_is_refused(
+def test_invalid_motion_is_refused(
     tmp_path: Path, katana: Robot, name: str, text: str, said: str
 ) -> None:
     (tmp_path / name).write_text(text)

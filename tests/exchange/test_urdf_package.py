@@ -354,7 +354,7 @@ NO_MESH = MESH.format("no.stl")
         (f'<robot name="x"><link name="a">{NO_MESH}</link></robot>', "no mesh at .*no.stl"),
     ],
 )
-def test_what_is_no_robot_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_invalid_robot_is_refused(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "x.urdf").write_text(text)
     with pytest.raises(RobotDescriptionError, match=said):
         package_files(tmp_path / "x.urdf")

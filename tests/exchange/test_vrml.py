@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from katana450.arm.robot.camera import camera
+from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
@@ -200,7 +200,7 @@ MOVER = "DEF a PositionInterpolator { } DEF b Transform { }"
         (f"{HEADER}\n" + "Group { children " * 300, "deep"),
     ],
 )
-def test_what_is_no_vrml_is_refused(text: str, said: str) -> None:
+def test_invalid_vrml_is_refused(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_world(text)
 

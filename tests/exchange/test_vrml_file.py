@@ -175,17 +175,17 @@ def test_a_mirrored_solid_keeps_its_outside() -> None:
 def test_groups_show_what_is_in_them(group: str) -> None:
     shape = world(group % "Shape { appearance NULL geometry Box { } }")
     assert volume(shape) == pytest.approx(8e-3)
-    assert "Left out" not in shape.said
+    assert "Left out" not in shape.text
 
 
-def test_what_is_left_out_is_said() -> None:
+def test_ignored_content_is_reported() -> None:
     shape = world(
         'Inline { url "a.wrl" } Wobbler { speed [ 1 2 { } ] } Shape { geometry Text { } } '
         'Shape { geometry Box { } appearance Appearance { texture ImageTexture { url "a" } } }'
     )
     assert volume(shape) == pytest.approx(8e-3)
     for what in ("other files that it shows", "Wobbler", "Text", "pictures on the surface"):
-        assert what in shape.said
+        assert what in shape.text
 
 
 def test_materials_give_colour_and_opacity() -> None:
@@ -276,6 +276,6 @@ def test_what_cannot_be_shown_is_refused(text: str, said: str) -> None:
         (gzip.compress(b"#VRML V2.0 utf8\n" + bytes(30_000_000)), "more than 20 MB when unpacked"),
     ],
 )
-def test_what_is_no_vrml97_is_refused(data: bytes, said: str) -> None:
+def test_invalid_vrml97_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(InputError, match=said):
         read_shape(data, Format.WRL, "a.wrl")

@@ -12,9 +12,9 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.trajectory_file import Motion, load_motion
+from katana450.extensions.export.trajectory_file import RecordedMotion, load_motion
 from katana450.extensions.export.vrml import vrml_files, world_of
-from katana450.extensions.export.vrml_names import Names
+from katana450.extensions.export.vrml_names import VrmlNames
 from tests.exchange.conftest import GANTRY_POSE
 from tests.exchange.tools import VTK, run, vtk_folder
 
@@ -41,7 +41,7 @@ print(json.dumps([low, high]))
 
 
 @pytest.fixture
-def motion(tmp_path: Path, gantry: Robot) -> Motion:
+def motion(tmp_path: Path, gantry: Robot) -> RecordedMotion:
     names = gantry.driven
     lines = (
         ",".join(("t", *names)),
@@ -64,13 +64,15 @@ def test_every_number_has_a_digit_before_its_point(katana: Robot) -> None:
     assert numbers > 100_000
 
 
-def test_static_pose_is_the_first_sample_of_the_motion(gantry: Robot, motion: Motion) -> None:
+def test_static_pose_is_the_first_sample_of_the_motion(
+    gantry: Robot, motion: RecordedMotion
+) -> None:
     start = gantry.values(GANTRY_POSE)
     assert motion.start == pytest.approx(start)
     rest = gantry.values(())
     moving = world_of(gantry, rest, motion).named()
     standing = world_of(gantry, start).named()
-    for name in Names(gantry).joints.values():
+    for name in VrmlNames(gantry).joints.values():
         assert moving[name] == standing[name]
     (with_motion,), (without,) = (
         glb_files(gantry, rest, motion).values(),

@@ -121,7 +121,7 @@ def test_core_commands_work_without_any_extension(blocking: Path) -> None:
     assert "--workspace" not in katana450("serve", "--help", folder=blocking, blocked=blocked)
 
 
-def test_command_that_needs_a_missing_extension_says_so(blocking: Path) -> None:
+def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
     blocked = "katana450.extensions.media"
     said = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
     assert said.startswith("1 ")
@@ -140,7 +140,7 @@ def test_server_runs_without_the_extensions_it_does_not_need(
     with AppServer() as server:
         assert server.running
         with connect(server.url, "Test") as arm:
-            assert arm.query(answers.Things).things
+            assert arm.query(answers.Objects).objects
             assert arm.query(answers.Links).links
             with pytest.raises(RefusedError, match="not installed"):
                 arm.ask(requests.Get(node="Clock", field="startTime"))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Order, Program, Steer
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT
 from tests.browser.server import ATTENTIVE_APP, AppServer
@@ -131,7 +131,7 @@ def test_arm_stops_when_its_driver_leaves(server: AppServer) -> None:
         watcher.ask(requests.ClearStop())
 
 
-@pytest.mark.parametrize("request_", [Program(text="steps: []"), Steer(order=Order.RUN)])
+@pytest.mark.parametrize("request_", [Program(text="steps: []"), Steer(order=ProgramOrder.RUN)])
 def test_request_of_the_missing_extension_is_refused_by_name(
     arm: Client, request_: requests.Request
 ) -> None:

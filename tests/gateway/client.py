@@ -19,7 +19,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from katana450.arm.control.lease import BEAT
+from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
@@ -91,7 +91,7 @@ def websocket(url: str, path: str, cookie: str = "", **options: Any) -> connect:
 
 
 class Control:
-    """The page's own socket; gives a sign of life every BEAT until told not to."""
+    """The page's own socket; gives a heartbeat every BEAT until told not to."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -146,7 +146,7 @@ class Control:
                     n += 1
                     await self.say("heartbeat", n=n)
                     self.last_beat = time.perf_counter()
-                await asyncio.sleep(BEAT)
+                await asyncio.sleep(HEARTBEAT_INTERVAL)
 
 
 class Peer:

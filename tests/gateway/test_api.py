@@ -14,7 +14,7 @@ import pytest
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.server.api import answers, requests, schema
 from tests.browser.server import APP, AppServer, free_port
 from tests.gateway.client import ask
@@ -30,12 +30,12 @@ def test_everything_there_is_to_ask_for_has_an_answer(program: Client) -> None:
         requests.Home(), requests.Jog(rates=(0.0, 0.0, 0.05, 0.0, 0.0)),
         requests.Servo(q=READY.tolist()), requests.Fill(ml=150.0), requests.Query(at="loop"),
         requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
-        *(requests.Read(reading=each) for each in reversed(Reading)),
+        *(requests.SetPriority(priority=each) for each in reversed(Priority)),
     ]  # fmt: skip
     for request in asked:
         answer = program.ask(request)
         assert not isinstance(answer, answers.Refused), request
-    for kind in (answers.State, answers.Arm, answers.Ledger, answers.Branches, answers.Loop):
+    for kind in (answers.State, answers.Arm, answers.EventLog, answers.Branches, answers.Loop):
         assert isinstance(program.query(kind), kind)
     refusals = (requests.Acquire(), requests.Take(), requests.Ask(), requests.Withdraw())
     for request in refusals:
@@ -51,7 +51,7 @@ def test_a_line_of_json_at_a_time_does_the_same(server: AppServer) -> None:
         lines.say(do="watch", hz=20)
         state: dict[str, Any] = {"ticket": -1}
         while state["ticket"] < done["ticket"] or state["moving"]:
-            # Whatever is asked is a sign of life.
+            # Whatever is asked is a heartbeat.
             lines.say(do="heartbeat")
             while (state := lines.hear())["is"] != "state":
                 pass
@@ -74,9 +74,7 @@ def test_a_line_of_json_at_a_time_does_the_same(server: AppServer) -> None:
         b"x" * 100_000,
     ],
 )
-def test_who_does_not_say_hello_on_the_tcp_port_is_sent_away(
-    server: AppServer, first: bytes
-) -> None:
+def test_tcp_connection_without_hello_is_closed(server: AppServer, first: bytes) -> None:
     lines = Lines(server)
     with lines.socket, lines.reader:
         with suppress(ConnectionError):
@@ -86,7 +84,7 @@ def test_who_does_not_say_hello_on_the_tcp_port_is_sent_away(
         assert program.query(answers.State).stopped is None
 
 
-def test_requests_that_are_none_change_nothing_and_end_the_line_after_a_while(
+def test_repeated_invalid_requests_close_the_connection(
     server: AppServer,
 ) -> None:
     with connect(server.url) as watcher:

@@ -53,7 +53,7 @@ def test_a_pose_may_be_in_either_frame(
     assert there.roll == pytest.approx(0.25, abs=1e-12)
 
 
-def test_what_the_arm_cannot_do_comes_with_its_reason(program: Client) -> None:
+def test_unreachable_request_gives_the_reason(program: Client) -> None:
     there = program.go(requests.Position(p=(0.9, 0.0, 0.0)))
     assert there.status == "limited"
     assert there.findings[0].reason == "out of reach"
@@ -77,7 +77,7 @@ def test_a_state_tells_what_follows_from_the_posture(
     program.joints(q)
     time.sleep(0.3)
     state = program.query(answers.State)
-    assert state.told > state.t + 0.2
+    assert state.sent > state.t + 0.2
     assert (state.setpoint, state.tool_speed) == (state.q, 0.0)
     assert (state.touching, state.held) == ([], None)
     assert state.holding == pytest.approx(holding_torques(arm.chain, q, loads_of(robot)))
@@ -115,8 +115,8 @@ def _rows(T: npt.ArrayLike) -> Matrix4:
     return rows
 
 
-def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> None:
-    known = {each.name: each for each in program.query(answers.Things).things}
+def test_objects_are_put_elsewhere_and_met_and_taken_away(program: Client) -> None:
+    known = {each.name: each for each in program.query(answers.Objects).objects}
     assert set(known) == {"cup", "basin"}
     T = np.array(known["cup"].T)
     T[:2, 3] = (0.1, -0.45)
@@ -124,7 +124,7 @@ def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> Non
     wall = np.eye(4)
     wall[:3, 3] = (0.25, 0.3, 0.0)
     program.ask(
-        requests.Place(name="wall", T=_rows(wall), form=requests.Form.BOX, size=[0.05, 0.3, 0.5])
+        requests.Place(name="wall", T=_rows(wall), shape=requests.Shape.BOX, size=[0.05, 0.3, 0.5])
     )
     met = program.go(requests.Joint(axis=1, value=1.2))
     assert met.status == "blocked"
@@ -132,16 +132,16 @@ def test_things_are_put_elsewhere_and_met_and_taken_away(program: Client) -> Non
     assert "wall" in met.why
     program.ask(requests.Remove(name="wall"))
     assert program.go(requests.Joint(axis=1, value=1.2)).status == "ok"
-    now = {each.name: each for each in program.query(answers.Things).things}
+    now = {each.name: each for each in program.query(answers.Objects).objects}
     assert set(now) == {"cup", "basin"}
     np.testing.assert_array_equal(now["cup"].T, T)
     beyond_the_table = T.copy()
     beyond_the_table[:2, 3] = (1.5, 0.0)
     for wrong in (
         requests.Place(name="ball", T=_rows(wall)),
-        requests.Place(name="ball", T=_rows(wall), form=requests.Form.BOX, size=[0.1]),
+        requests.Place(name="ball", T=_rows(wall), shape=requests.Shape.BOX, size=[0.1]),
         requests.Place(name="table", T=_rows(wall)),
-        requests.Place(name="wrist_link", T=_rows(wall), form=requests.Form.SPHERE, size=[0.1]),
+        requests.Place(name="wrist_link", T=_rows(wall), shape=requests.Shape.SPHERE, size=[0.1]),
         requests.Place(name="cup", T=_rows(np.zeros((4, 4)))),
         requests.Place(name="cup", T=_rows(beyond_the_table)),
     ):

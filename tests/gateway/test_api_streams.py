@@ -61,7 +61,7 @@ def followed(program: Client, rates: bool) -> tuple[float, float, float]:
         seen.append(program.query(answers.State).setpoint[0] - READY[0])
         time.sleep(max(0.0, began + t + 0.02 - time.monotonic()))
     loop = program.query(answers.Loop)
-    bound = reach(sent, loop.late_most, acceleration)
+    bound = reach(sent, loop.late_max, acceleration)
     reached = max(abs(each) for each in seen)
     print(f"reached {reached:.4f} rad, bound {bound:.4f} rad")
     return reached, bound, max(abs(each.q) for each in sent)

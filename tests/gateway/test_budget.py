@@ -5,7 +5,15 @@ from __future__ import annotations
 import pytest
 
 from katana450.errors import InputError
-from katana450.server.service.budget import CROWD, DEBT, EACH, FIXED, Budget, Budgets, BusyError
+from katana450.server.service.budget import (
+    IDENTITY_BUDGET,
+    MAX_DEBT,
+    REQUEST_COST,
+    SHARED_BUDGET,
+    Budget,
+    Budgets,
+    BusyError,
+)
 
 
 class Clocks:
@@ -28,7 +36,7 @@ class Clocks:
 def test_all_windows_of_an_identity_pay_from_one_budget() -> None:
     clocks = Clocks()
     budgets = clocks.budgets()
-    clocks.ask(budgets.of("a"), EACH)
+    clocks.ask(budgets.of("a"), IDENTITY_BUDGET)
     with pytest.raises(BusyError) as refused:
         clocks.ask(budgets.of("a"), 0.0)
     assert refused.value.retry == pytest.approx(0.1)
@@ -42,10 +50,10 @@ def test_all_windows_of_an_identity_pay_from_one_budget() -> None:
 def test_the_retry_time_is_long_enough() -> None:
     clocks = Clocks()
     budget = clocks.budgets().of("a")
-    clocks.ask(budget, 3.0 * EACH)
+    clocks.ask(budget, 3.0 * IDENTITY_BUDGET)
     with pytest.raises(BusyError) as refused:
         clocks.ask(budget, 0.0)
-    clocks.now += refused.value.retry + 2.0 * FIXED / EACH
+    clocks.now += refused.value.retry + 2.0 * REQUEST_COST / IDENTITY_BUDGET
     clocks.ask(budget, 0.0)
 
 
@@ -54,13 +62,13 @@ def test_a_crowd_shares_a_budget_that_the_driver_does_not_need() -> None:
     budgets = clocks.budgets()
     viewers = [budgets.of(name) for name in "abc"]
     for viewer in viewers[:2]:
-        clocks.ask(viewer, CROWD / 2.0)
+        clocks.ask(viewer, SHARED_BUDGET / 2.0)
     with pytest.raises(BusyError) as refused:
         clocks.ask(viewers[2], 0.0)
     assert not refused.value.gone
     # What is no question is kept from nobody by others, such as to ask for the arm.
     clocks.ask(viewers[2], 0.0, question=False)
-    clocks.ask(viewers[2], EACH / 2.0, driver="c/page")
+    clocks.ask(viewers[2], IDENTITY_BUDGET / 2.0, driver="c/page")
     with pytest.raises(BusyError):
         clocks.ask(viewers[0], 0.0, question=False)
 
@@ -68,7 +76,7 @@ def test_a_crowd_shares_a_budget_that_the_driver_does_not_need() -> None:
 def test_another_window_of_the_driver_cannot_empty_the_drivers_budget() -> None:
     clocks = Clocks()
     budget = clocks.budgets().of("a")
-    clocks.ask(budget, 10.0 * EACH)
+    clocks.ask(budget, 10.0 * IDENTITY_BUDGET)
     for _ in range(50):
         clocks.ask(budget, 0.001, driver="a/page")
     with pytest.raises(BusyError):
@@ -78,17 +86,17 @@ def test_another_window_of_the_driver_cannot_empty_the_drivers_budget() -> None:
 def test_an_identity_that_asks_on_regardless_is_sent_away_and_forgiven() -> None:
     clocks = Clocks()
     budget = clocks.budgets().of("a")
-    clocks.ask(budget, EACH)
+    clocks.ask(budget, IDENTITY_BUDGET)
     gone = []
-    for _ in range(int(1.1 * DEBT / FIXED)):
+    for _ in range(int(1.1 * MAX_DEBT / REQUEST_COST)):
         with pytest.raises(BusyError) as refused:
             clocks.ask(budget, 0.0)
         gone.append(refused.value.gone)
-    assert gone.index(True) == pytest.approx(DEBT / FIXED, rel=0.01)
+    assert gone.index(True) == pytest.approx(MAX_DEBT / REQUEST_COST, rel=0.01)
     assert budget.is_exhausted()
-    clocks.now += 0.6 * DEBT / EACH
+    clocks.now += 0.6 * MAX_DEBT / IDENTITY_BUDGET
     assert not budget.is_exhausted()
-    clocks.now += 0.5 * DEBT / EACH
+    clocks.now += 0.5 * MAX_DEBT / IDENTITY_BUDGET
     clocks.ask(budget, 0.0)
 
 

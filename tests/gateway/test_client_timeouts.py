@@ -21,7 +21,7 @@ TIMEOUT = 0.3
 
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(asynchronous, "ASKED_FOR", TIMEOUT)
+    monkeypatch.setattr(asynchronous, "ANSWER_TIMEOUT", TIMEOUT)
 
 
 def _talk(handler: Callable[[ServerConnection], Awaitable[None]], act: str) -> None:
@@ -105,7 +105,7 @@ def test_states_that_never_come_are_given_up() -> None:
     _talk(_silent_watch, "states")
 
 
-def test_a_server_that_reads_nothing_is_given_up() -> None:
+def test_client_gives_up_on_a_server_that_reads_nothing() -> None:
     _talk(_deaf, "tell")
 
 

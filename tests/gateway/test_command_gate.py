@@ -14,7 +14,7 @@ import viser
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
-from katana450.arm.control.event_log import Entry
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
@@ -68,13 +68,13 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
     server = replace(SERVER, grounds=Grounds.SERVER)
     causes = [(None, ""), (granted, "MoveTool"), (stopped, "Stop"), (server, "Stop")]
     entries = [
-        Entry(table.t, finding, True, *cause)
+        LogEntry(table.t, finding, True, *cause)
         for finding, cause in zip(findings, causes, strict=True)
     ]
     for upto in range(len(entries)):
-        table.arm.ledger = tuple(entries[max(upto - 1, 0) : upto + 1])
+        table.arm.event_log = tuple(entries[max(upto - 1, 0) : upto + 1])
         table.wait(TICK)
-    lines = [serialize.line(line) for line in table.hub.journal.lines]
+    lines = [serialize.line(line) for line in table.hub.event_log.lines]
     assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
     assert [line.command for line in lines] == ["", "MoveTool", "Stop", "Stop"]
     assert [line.grounds for line in lines] == [
@@ -90,7 +90,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
     assert told[0].axis == 2
     assert told[1].parts == ("finger_left_link", "table")
     assert told[2].seconds == 0.3
-    assert "press Clear stop" in told[2].said
+    assert "press Clear stop" in told[2].text
 
 
 def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
@@ -99,7 +99,7 @@ def test_server_stops_holds_and_slows_and_moves_nothing(table: Table) -> None:
         gate.submit(cmd.Home(), SERVER)
     gate.submit(cmd.SpeedScale(0.5), SERVER)
     gate.submit(cmd.Hold(), SERVER)
-    assert (table.arm.share, table.arm.holds, table.hub.lease.holder) == (0.5, 1, None)
+    assert (table.arm.fraction, table.arm.holds, table.hub.lease.holder) == (0.5, 1, None)
 
 
 def test_gesture_let_through_before_a_stop_is_refused_after_it_was_cleared(table: Table) -> None:
@@ -234,9 +234,7 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
     asyncio.run(slide())
 
 
-def test_slider_of_another_than_the_driver_changes_nothing_for_anybody(
-    table: Table, viser_server: viser.ViserServer
-) -> None:
+def test_slider_of_a_spectator_has_no_effect(table: Table, viser_server: viser.ViserServer) -> None:
     driver, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     table.hub.acquire(driver)
 

@@ -78,7 +78,7 @@ async def taken_by(control: Control) -> None:
     await control.wait(mine=True)
 
 
-def test_handle_moved_by_another_than_the_driver_moves_nothing_and_springs_back(
+def test_handle_moved_by_a_spectator_springs_back(
     server: AppServer,
 ) -> None:
     async def drag() -> None:
@@ -179,7 +179,7 @@ def test_drag_from_before_a_stop_moves_nothing_after_it_was_cleared(server: AppS
     asyncio.run(drag())
 
 
-def test_control_touched_first_takes_the_free_lease_and_the_event_log_says_so(
+def test_first_control_used_acquires_the_free_lease_and_is_logged(
     server: AppServer,
 ) -> None:
     async def drag() -> None:
@@ -193,7 +193,7 @@ def test_control_touched_first_takes_the_free_lease_and_the_event_log_says_so(
             await control.wait(mine=True)
             name = control.status["name"]
             await at_rest(watcher)
-            log = await watcher.query(answers.Ledger)
+            log = await watcher.query(answers.EventLog)
             line = next(each for each in log.lines[::-1] if each.finding.reason == "out of reach")
             assert (line.who, line.command) == (name, "MoveTool")
             assert line.grounds == "took the free lease"
@@ -202,7 +202,7 @@ def test_control_touched_first_takes_the_free_lease_and_the_event_log_says_so(
             await peer.set("Axis 1", value=12.5)
             await control.say("stop")
             await control.wait(stop="confirmed")
-            log = await watcher.query(answers.Ledger)
+            log = await watcher.query(answers.EventLog)
             line = next(each for each in log.lines[::-1] if each.finding.reason == "stopped")
             assert (line.who, line.command) == (name, "Stop")
             assert line.grounds == "anybody may stop the arm"

@@ -8,7 +8,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from katana450.arm.control.choices import Choice
+from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state import State
 from katana450.arm.runtime.state_publisher import Snapshot
@@ -20,28 +20,28 @@ from katana450.server.service.derived import once
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import Arm
+from katana450.server.service.interfaces import ArmInterface
 
 
 def _snapshot() -> Snapshot:
     return Snapshot(cast(State, None), 0)
 
 
-def test_branches_are_computed_once_per_snapshot_for_all_who_ask() -> None:
+def test_branches_are_computed_once_per_snapshot() -> None:
     hub, arm, computed = Hub(lambda: 0.0), Mock(snapshot=_snapshot()), []
 
-    def choices() -> tuple[Choice, ...]:
+    def choices() -> tuple[BranchOption, ...]:
         computed.append(1)
         return ()
 
     arm.choices = choices
-    hub.gate.arm = cast(Arm, arm)
+    hub.gate.arm = cast(ArmInterface, arm)
     budgets = Budgets(hub.clock)
     for number in range(3):
-        visitor = Identity(f"session-{number}", "Viewer", Role.VIEWER)
-        window = hub.join(visitor, "a-page", lambda _notice: None)
+        identity = Identity(f"session-{number}", "Viewer", Role.VIEWER)
+        window = hub.join(identity, "a-page", lambda _notice: None)
         request = requests.Query(at="branches", id=number)
-        answer = Dispatcher(hub).do(window, request, budgets.of(visitor.session))
+        answer = Dispatcher(hub).handle(window, request, budgets.of(identity.session))
         assert answer == answers.Branches(choices=[], id=number)
     assert len(computed) == 1
     arm.snapshot = _snapshot()

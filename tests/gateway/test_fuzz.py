@@ -222,7 +222,7 @@ class TcpLine:
 
 async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[str, int]:
     """All of it at once."""
-    url, share = server.url, MESSAGES // 4
+    url, fraction = server.url, MESSAGES // 4
     rngs = [random.Random(seed) for seed in range(4)]
     kinds: dict[str, tuple[Callable[[], bytes], Callable[[], Any]]] = {
         "viser": (
@@ -236,7 +236,7 @@ async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[st
         ),
         "lines": (lambda: json_mutant(rngs[3]), lambda: TcpLine(lines_port)),
     }
-    taken = await asyncio.gather(*(pour_in(share, *kind) for kind in kinds.values()))
+    taken = await asyncio.gather(*(pour_in(fraction, *kind) for kind in kinds.values()))
     return dict(zip(kinds, taken, strict=True))
 
 
@@ -269,12 +269,12 @@ def test_nothing_falls_and_nothing_moves(server: AppServer) -> None:
     with connect_program(server.url, "Driver") as arm:
         arm.ask(requests.Acquire())
         before = arm.query(answers.State)
-        things = arm.query(answers.Things).things
+        objects = arm.query(answers.Objects).objects
         uuids = asyncio.run(learned(server.url))
         taken = asyncio.run(storm(server, lines_port, uuids))
         print(f"{MESSAGES} messages; lines it took: {taken}")
         assert kept(arm.query(answers.State)) == kept(before)
-        assert arm.query(answers.Things).things == things
+        assert arm.query(answers.Objects).objects == objects
         # Whoever drives, drives on.
         q = np.add(before.q, (0.2, 0.0, 0.0, 0.0, 0.0))
         assert np.allclose(arm.joints(q).q, q, atol=1e-9)

@@ -38,7 +38,7 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
     async def act(server: AppServer) -> None:
         async with websocket(server.url, "/api/v1/socket?name=Driver") as driver:
 
-            async def beat(seconds: float) -> None:
+            async def heartbeat(seconds: float) -> None:
                 end = time.monotonic() + seconds
                 while time.monotonic() < end:
                     await driver.send('{"do": "heartbeat"}')
@@ -46,21 +46,21 @@ def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
 
             await driver.send('{"do": "speed", "value": 0.1}')
             await driver.send(json.dumps({"do": "joints", "q": FAR.tolist()}))
-            await beat(0.5)
+            await heartbeat(0.5)
             last = time.time()
             holding_up = asyncio.create_task(asyncio.to_thread(hold_up, server.front, awake))
             if alive:
-                await beat(LOADED)
+                await heartbeat(LOADED)
             await holding_up
             if alive:
-                await beat(0.3)
+                await heartbeat(0.3)
                 assert look(server, "state")["stopped"] is None
                 return
         state = look(server, "state")
         assert state["stopped"] == "Driver fell silent while the arm moved."
         stopped = [
             line["when"]
-            for line in look(server, "ledger")["lines"]
+            for line in look(server, "event_log")["lines"]
             if line["began"] and line["finding"]["reason"] == "stopped"
         ]
         took = datetime.fromisoformat(stopped[-1]).timestamp() - last

@@ -20,7 +20,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from katana450.server.viser_bridge.message_filter import LARGEST
+from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
 from katana450.server.viser_bridge.proxy import BROWSERS, BROWSERS_EACH
 from katana450.settings import Settings
 from tests.browser.server import ATTENTIVE_APP, BARE_APP, AppServer
@@ -153,7 +153,7 @@ def test_what_is_no_message_is_not_answered(server: AppServer) -> None:
     asyncio.run(attack())
 
 
-def test_who_goes_on_sending_what_no_page_sends_is_closed(server: AppServer) -> None:
+def test_sender_of_repeated_bad_messages_is_disconnected(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (bad, good):
             with suppress(ConnectionClosed):
@@ -166,7 +166,7 @@ def test_who_goes_on_sending_what_no_page_sends_is_closed(server: AppServer) -> 
     asyncio.run(attack())
 
 
-def test_who_is_closed_while_pictures_come_hears_no_more(server: AppServer) -> None:
+def test_closed_browser_receives_no_more_frames(server: AppServer) -> None:
     """The scene is on its way to each of them when it is closed."""
 
     async def knock(cookie: str) -> None:
@@ -312,7 +312,7 @@ def viser_port(server: AppServer) -> int:
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="ports are read from /proc")
-def test_behind_the_gateway_viser_speaks_to_nobody_else(server: AppServer) -> None:
+def test_viser_accepts_only_the_gateway(server: AppServer) -> None:
     port = viser_port(server)
 
     async def knock(**headers: str) -> tuple[list[Any], int | None]:
@@ -379,7 +379,7 @@ def test_a_large_message_is_not_taken(server: AppServer) -> None:
     async def attack() -> None:
         async with peers(server.url) as (bad, good):
             with suppress(ConnectionClosed):
-                await bad.set("Axis 1", value="x" * 10 * LARGEST)
+                await bad.set("Axis 1", value="x" * 10 * MAX_MESSAGE_BYTES)
                 await bad.listen(5.0)
             assert bad.socket.close_code == 1009
             assert await good.listen(BRIEF) == []
@@ -412,7 +412,7 @@ def test_a_large_message_is_not_taken(server: AppServer) -> None:
         b"\x00\x01",
     ],
 )
-def test_a_word_that_is_no_request_changes_nothing(server: AppServer, text: str | bytes) -> None:
+def test_invalid_request_changes_nothing(server: AppServer, text: str | bytes) -> None:
     async def attack() -> None:
         async with controlling(server.url) as watching, controlling(server.url) as control:
             await watching.wait(windows=2, mood="ok", holder=None)
@@ -428,7 +428,7 @@ def test_a_word_that_is_no_request_changes_nothing(server: AppServer, text: str 
     asyncio.run(attack())
 
 
-def test_who_lies_about_what_it_has_seen_is_closed(server: AppServer) -> None:
+def test_browser_with_false_acknowledgements_is_closed(server: AppServer) -> None:
     async def lie(count: Any) -> int | None:
         async with opened(server.url) as (bad, _):
             await bad.say(type="Seen", count=count)
@@ -442,7 +442,7 @@ def test_who_lies_about_what_it_has_seen_is_closed(server: AppServer) -> None:
     assert asyncio.run(lie("all")) is None
 
 
-def test_who_never_reads_keeps_nobody_waiting(server: AppServer) -> None:
+def test_client_that_never_reads_delays_nobody(server: AppServer) -> None:
     async def attack() -> None:
         async with opened(server.url) as (good, control), AsyncExitStack() as stack:
             await control.say("take")
@@ -541,7 +541,7 @@ def test_visers_page_is_not_sent_elsewhere(server: AppServer, query: str) -> Non
     assert ask(f"{server.url}/viser/?websocket=ws://{host}/viser", Cookie=cookie)[0] == 200
 
 
-def test_every_answer_tells_the_browser_what_it_may_do(server: AppServer) -> None:
+def test_every_response_has_security_headers(server: AppServer) -> None:
     cookie = enter(server.url)
     for path in ("/", "/viser/", "/static/page.js", "/nowhere", "/api/v1/state"):
         _, headers, _ = ask(server.url + path, Cookie=cookie)

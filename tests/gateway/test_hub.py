@@ -11,14 +11,14 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.choices import Choice
-from katana450.arm.control.event_log import Entry
-from katana450.arm.control.lease import LOST_AFTER, Lease, Role
+from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.event_log import LogEntry
+from katana450.arm.control.lease import LEASE_TIMEOUT, Lease, Role
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State, StoppingDistance
-from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -27,7 +27,7 @@ from katana450.errors import LeaseError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.service.heartbeats import LastHeartbeat
-from katana450.server.service.hub import TICK, Hub, Window, key_of, visiting
+from katana450.server.service.hub import TICK, Hub, Window, actor_of, key_of
 from katana450.server.service.identity import Identity
 from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import Runner
@@ -44,8 +44,8 @@ class FakeArm:
     arm: MountedArm
     nodes: Nodes
     ready: FloatArray
-    lateness: LoopTiming
-    surroundings: Environment
+    loop_timing: LoopTiming
+    environment: Environment
     pouring: Pouring | None
     session: Session
     outcome: Any
@@ -62,10 +62,10 @@ class FakeArm:
         self.age = 0.0
         self.taken: int | None = None
         self.jogs: list[tuple[tuple[float, ...], JogFrame]] = []
-        self.share = 1.0
+        self.fraction = 1.0
         self.commands: list[cmd.Command] = []
         self.actors: list[Actor] = []
-        self.ledger: tuple[Entry, ...] = ()
+        self.event_log: tuple[LogEntry, ...] = ()
 
     @property
     def state(self) -> State:
@@ -87,10 +87,10 @@ class FakeArm:
     def busy(self) -> bool:
         return False
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         self.beats += 1
 
-    def choices(self) -> tuple[Choice, ...]:
+    def choices(self) -> tuple[BranchOption, ...]:
         return ()
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int:
@@ -111,7 +111,7 @@ class FakeArm:
                 self.jogs.append((tuple(rates.tolist()), frame))
             case _:
                 if isinstance(command, cmd.SpeedScale):
-                    self.share = command.value
+                    self.fraction = command.value
                 if actor.channel is not CommandChannel.SERVER:
                     self.commands.append(command)
         return len(self.commands)
@@ -143,15 +143,15 @@ class Table:
 
     def stop(self, name: str, press: str | None = None) -> None:
         """A participant of that name presses STOP."""
-        self.hub.stop(visiting(Identity("anybody", name, Role.VIEWER), CommandChannel.PAGE), press)
+        self.hub.stop(actor_of(Identity("anybody", name, Role.VIEWER), CommandChannel.PAGE), press)
 
     def wait(self, seconds: float, *alive: Window) -> None:
-        """Let time pass, with signs of life of those who are ``alive``."""
+        """Let time pass, with heartbeats of those who are ``alive``."""
         end = self.t + seconds
         while self.t < end - 1e-9:
             self.t += min(TICK, end - self.t)
             for window in alive:
-                self.hub.beat(window)
+                self.hub.heartbeat(window)
             self.hub.tick()
 
 
@@ -168,7 +168,7 @@ def table(session: Session) -> Table:
     return Table(session.begin(session.ready, 0.0, 0.0))
 
 
-def test_who_touches_a_control_first_has_the_arm(table: Table) -> None:
+def test_first_window_to_use_a_control_gets_the_lease(table: Table) -> None:
     first, second = (table.join(page) for page in PAGES)
     assert [first.person.name, second.person.name] == ["Window 1", "Window 2"]
     table.touch(second.person.key)
@@ -178,7 +178,7 @@ def test_who_touches_a_control_first_has_the_arm(table: Table) -> None:
     assert table.arm.holds == 0
 
 
-def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:
+def test_window_without_control_socket_cannot_drive(table: Table) -> None:
     window = table.join(PAGES[0])
     table.touch(window.person.key)
     table.hub.leave(window)
@@ -186,7 +186,7 @@ def test_without_a_control_socket_nothing_is_driven(table: Table) -> None:
         table.touch(window.person.key)
 
 
-def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
+def test_viewer_role_can_only_stop(table: Table) -> None:
     watcher = table.join(PAGES[0], Role.VIEWER, "Vera")
     acts: list[Callable[[], object]] = [
         lambda: table.touch(watcher.person.key),
@@ -201,7 +201,7 @@ def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
     for act in acts:
         with pytest.raises(LeaseError):
             act()
-    assert (table.arm.holds, table.arm.stops, table.arm.share) == (0, 0, 1.0)
+    assert (table.arm.holds, table.arm.stops, table.arm.fraction) == (0, 0, 1.0)
     table.stop("Vera")
     assert table.arm.stops == 1
     with pytest.raises(LeaseError):
@@ -209,7 +209,7 @@ def test_a_viewer_stops_the_arm_and_does_nothing_else(table: Table) -> None:
     assert table.hub.stopped is not None
 
 
-def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
+def test_stopped_arm_moves_only_after_clear_stop(table: Table) -> None:
     driver, other = (table.join(page) for page in PAGES)
     drag = table.touch(driver.person.key)
     table.arm.moves = True
@@ -233,7 +233,7 @@ def test_after_a_stop_nothing_moves_until_a_reset(table: Table) -> None:
     table.touch(driver.person.key)
 
 
-def test_a_press_of_stop_counts_once_however_late_it_is_told_again(table: Table) -> None:
+def test_repeated_stop_press_counts_once(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.stop("Window 1", "a press")
     table.stop("Window 1", "a press")
@@ -264,7 +264,7 @@ class FakePicture:
         return t - 100.0
 
 
-def test_a_driver_who_falls_silent_while_the_arm_moves_stops_it_in_time(table: Table) -> None:
+def test_silent_driver_of_a_moving_arm_causes_a_stop(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.touch(driver.person.key)
     table.wait(1.0, driver)
@@ -276,15 +276,15 @@ def test_a_driver_who_falls_silent_while_the_arm_moves_stops_it_in_time(table: T
     assert table.hub.stopped is not None
     assert table.hub.stopped.why == "Window 1 fell silent while the arm moved."
     # A word that comes late starts nothing anew.
-    table.hub.beat(driver)
+    table.hub.heartbeat(driver)
     with pytest.raises(LeaseError, match="clear the stop"):
         table.touch(driver.person.key)
 
 
-def test_a_driver_who_falls_silent_at_rest_loses_the_arm_and_stops_nothing(table: Table) -> None:
+def test_silent_driver_at_rest_loses_the_lease_without_a_stop(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.touch(driver.person.key)
-    table.wait(LOST_AFTER - 2 * TICK)
+    table.wait(LEASE_TIMEOUT - 2 * TICK)
     assert table.hub.lease.holder == driver.person
     table.wait(3 * TICK)
     assert (table.hub.lease, table.hub.stopped) == (Lease(), None)
@@ -310,7 +310,7 @@ def test_another_driver_finds_an_arm_that_wants_nothing(
     assert not table.hub.gate.is_current(drag)
 
 
-def test_a_page_that_comes_back_is_who_it_was(table: Table) -> None:
+def test_reloaded_page_keeps_its_identity(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.join(PAGES[1])
     table.touch(driver.person.key)
@@ -331,7 +331,7 @@ def test_two_browsers_with_one_link_are_two_people(table: Table) -> None:
     assert anna.person != second.person
 
 
-def test_a_guessed_page_of_another_session_is_somebody_else(table: Table) -> None:
+def test_page_name_of_another_session_is_another_window(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.touch(driver.person.key)
     stranger = Identity("another session", None, Role.ADMIN)
@@ -339,7 +339,7 @@ def test_a_guessed_page_of_another_session_is_somebody_else(table: Table) -> Non
         table.touch(key_of(stranger, PAGES[0]))
 
 
-def test_a_jog_goes_on_while_it_is_held_and_is_over_by_itself(table: Table) -> None:
+def test_jog_continues_while_renewed_and_then_ends(table: Table) -> None:
     driver = table.join(PAGES[0])
     forward = (0.2, 0.0, 0.0, 0.0, 0.5)
     for _ in range(5):
@@ -347,10 +347,10 @@ def test_a_jog_goes_on_while_it_is_held_and_is_over_by_itself(table: Table) -> N
         table.wait(0.04, driver)
     assert table.arm.jogs == [(forward, JogFrame.TOOL)] * 5
     table.hub.move(driver, cmd.SpeedScale(0.25))
-    assert table.arm.share == 0.25
+    assert table.arm.fraction == 0.25
 
 
-def test_a_jog_that_is_let_go_says_so_to_the_arm(table: Table) -> None:
+def test_released_jog_is_ended_explicitly(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.hub.move(driver, cmd.Jog(np.array((0.2, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE))
     table.hub.move(driver, cmd.Jog(np.array((0.0,) * 5), JogFrame.BASE))
@@ -371,7 +371,7 @@ def test_the_age_of_a_picture_is_that_of_the_windows_own(table: Table) -> None:
     assert table.hub.age(first) == 0.0
 
 
-def test_before_the_arm_is_there_nobody_drives_it() -> None:
+def test_no_lease_before_the_arm_is_ready() -> None:
     hub = Hub(lambda: 0.0)
     window = hub.join(Identity("session", None, Role.ADMIN), PAGES[0], lambda _: None)
     with pytest.raises(LeaseError, match="not there yet"):

@@ -13,7 +13,7 @@ from katana450.arm.control.session import Session
 from katana450.server.service import status
 from katana450.server.service.heartbeats import Arrival, LastHeartbeat
 from katana450.server.service.hub import TICK
-from katana450.server.service.stop_state import Stopped
+from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
 from tests.gateway.test_hub import PAGES, Table, moves
 
@@ -74,7 +74,7 @@ def test_message_that_waits_for_a_late_server_is_no_silence(table: Table) -> Non
     assert moves(table)
     # Messages that are handled late count from when they were received.
     table.t += 0.2
-    table.hub.beat(driver)
+    table.hub.heartbeat(driver)
     table.hub.tick()
     assert not moves(table)
 
@@ -128,7 +128,7 @@ def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> 
     assert told["stopped"] is None
     table.arm.age = 0.6
     table.wait(TICK, driver)
-    assert table.hub.stopped == Stopped(
+    assert table.hub.stopped == StopRecord(
         None, "The arm's process did not answer for 0.6 s.", ticket=1, confirmed=False
     )
     assert stage(table) == ("stopped", "requested")

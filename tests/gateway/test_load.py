@@ -17,8 +17,8 @@ import pytest
 from websockets.exceptions import ConnectionClosedError
 
 from katana450.extensions.importers.uploads import WAITING, WAITING_EACH
-from katana450.server.web.acceptor import SILENCE
-from katana450.server.web.admission import SOCKETS_EACH, TOO_MUCH
+from katana450.server.web.acceptor import WAITING_TIMEOUT
+from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS_EACH
 from katana450.server.web.bodies import BODY_SECONDS
 from tests.browser.server import APP, ROOT, AppServer
 from tests.gateway.attack import FEW_DESCRIPTORS, answered, asking, closed, silent, stop_seconds
@@ -116,10 +116,10 @@ def test_half_requests_are_closed_and_slow_bodies_refused(server: AppServer) -> 
         silent(server.port, 3, body) as slow,
     ):
         everybody = [*nothing, *half, *handshakes, *idle, *slow]
-        assert closed(everybody, 3.0 * SILENCE) == len(everybody)
+        assert closed(everybody, 3.0 * WAITING_TIMEOUT) == len(everybody)
 
 
-def test_a_slow_body_is_told_so(server: AppServer) -> None:
+def test_slow_body_is_refused(server: AppServer) -> None:
     head = f"POST /enter HTTP/1.1\r\nHost: x\r\nOrigin: {server.url}\r\nContent-Length: 20\r\n\r\n"
     said = head.replace("Host: x", f"Host: 127.0.0.1:{server.port}").encode()
     with silent(server.port, 1, said) as (slow,):
@@ -146,7 +146,7 @@ def test_a_flood_of_questions_is_refused_and_does_not_delay_stop(
     assert heard["refused"] > 0
 
 
-def test_what_is_refused_says_when_to_ask_again(server: AppServer) -> None:
+def test_refusal_states_when_to_retry(server: AppServer) -> None:
     async def act() -> dict[str, Any]:
         async with AsyncExitStack() as stack:
             path = "/api/v1/socket?name=Flood"
@@ -194,7 +194,7 @@ def test_one_identity_cannot_take_all_sockets(guarded: AppServer, tokens: dict[s
                     line = websocket(guarded.url, "/api/v1/socket?name=Many", headers=headers)
                     await (await stack.enter_async_context(line)).recv()
                     opened += 1
-            assert line.connection.close_code == TOO_MUCH
+            assert line.connection.close_code == LIMIT_CLOSE_CODE
             cookie = enter(guarded.url, tokens["operator"])
             async with controlling(guarded.url, cookie) as control:
                 await control.wait()

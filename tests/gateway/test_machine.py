@@ -75,7 +75,7 @@ def test_every_link_is_where_another_program_has_it(
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
 
 
-def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
+def test_arm_answer_gives_the_reason_for_joints_only(
     server: AppServer, program: Client, robot: Robot
 ) -> None:
     told = program.query(answers.Arm)
@@ -96,7 +96,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
         requests.Jog(rates=(0.1, 0, 0, 0, 0)), requests.Branch(shoulder="front", elbow="up"),
         requests.Gripper(angle=0.1), requests.Tool(name="tcp"), requests.Fill(ml=1.0),
         Program(text="steps: []"), requests.Remove(name="cup"),
-        requests.Place(name="a", T=eye, form=requests.Form.SPHERE, size=[0.1]),
+        requests.Place(name="a", T=eye, shape=requests.Shape.SPHERE, size=[0.1]),
     ]  # fmt: skip
     for request in cartesian:
         with pytest.raises(RefusedError, match=r"Only its joints can be driven\. .*five turning"):
@@ -111,7 +111,7 @@ def test_it_says_what_it_is_and_why_no_tool_can_be_sent(
     assert "Joints only." in server.output
 
 
-def test_what_is_beyond_a_limit_is_cut_and_told_in_its_own_unit(
+def test_value_beyond_a_limit_is_clamped_and_reported_in_its_unit(
     program: Client, robot: Robot
 ) -> None:
     slide = robot.joint_group.slides.index(True)
@@ -185,7 +185,7 @@ def test_a_slider_moves_it_in_its_own_unit(server: AppServer, robot: Robot) -> N
     asyncio.run(act())
 
 
-def test_what_cannot_be_driven_is_refused_when_it_is_served(
+def test_undrivable_robot_is_refused_at_start(
     tmp_path: Path, path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     locked = tmp_path / "locked.urdf"

@@ -15,15 +15,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.looks import Trait
+from katana450.arm.control.appearance import AppearanceTrait
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Form, Thing
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
 from katana450.extensions.export.vrml import world_of
@@ -51,18 +51,18 @@ def rules(arm: MountedArm) -> Session:
 
 @pytest.fixture(scope="module")
 def nodes(robot: Robot, rules: Session) -> VrmlNodes:
-    return VrmlNodes(robot, rules.surroundings)
+    return VrmlNodes(robot, rules.environment)
 
 
 @pytest.fixture(scope="module")
 def state(rules: Session) -> State:
-    cube = Thing("left/cube", Form.BOX, (0.1, 0.1, 0.1), np.eye(4))
+    cube = SceneObject("left/cube", Shape.BOX, (0.1, 0.1, 0.1), np.eye(4))
     begun = rules.begin(rules.ready, 0.2, 0.0)
-    return replace(begun, things=(cube, replace(cube, name="pan link look")))
+    return replace(begun, objects=(cube, replace(cube, name="pan link look")))
 
 
-def setting(node: str, field: str, value: Any) -> requests.Setting:
-    return requests.Setting(node=node, field=field, value=value)
+def setting(node: str, field: str, value: Any) -> requests.FieldSetting:
+    return requests.FieldSetting(node=node, field=field, value=value)
 
 
 def rotation(joint: str, angle: float) -> list[float]:
@@ -70,7 +70,7 @@ def rotation(joint: str, angle: float) -> list[float]:
 
 
 def get(nodes: VrmlNodes, state: State, node: str, field: str) -> Any:
-    (value,) = nodes.read(state, [requests.Named(node=node, field=field)])
+    (value,) = nodes.read(state, [requests.FieldName(node=node, field=field)])
     return value.value
 
 
@@ -80,10 +80,10 @@ def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
     angles = robot.joint_values(state.q, state.gripper)
     file = world_of(robot, angles).named()
     told = {node.node: node for node in nodes.world(state).nodes}
-    things = {name for name, node in told.items() if node.of.startswith("thing")}
-    assert told.keys() - things <= file.keys()
-    assert not things & file.keys()
-    for name in told.keys() - things:
+    objects = {name for name, node in told.items() if node.of.startswith("object")}
+    assert told.keys() - objects <= file.keys()
+    assert not objects & file.keys()
+    for name in told.keys() - objects:
         assert told[name].kind == file[name].kind
         for field in told[name].fields:
             assert FIELDS[file[name].kind][field.field].value == field.type
@@ -93,15 +93,15 @@ def test_the_names_are_those_of_the_file_with_its_types_and_what_it_shows(
     dressed = ("Switch", "Material")
     assert {name for name, node in file.items() if node.kind in dressed} == {
         name for name, node in told.items() if node.kind in dressed
-    } - things
+    } - objects
     assert set(robot.joints) <= told.keys()
     # Names that are no identifiers, or taken, are made so.
-    assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= things
+    assert {"left_cube", "left_cube_look", "pan_link_look_2", "pan_link_look_paint"} <= objects
 
 
 @settings(max_examples=50, deadline=None)
 @given(st.dictionaries(st.sampled_from(sorted(THERE)), st.floats(-2.0, 2.0), min_size=1))
-def test_joints_are_told_to_go_and_never_put(
+def test_setting_a_joint_is_a_motion_command(
     nodes: VrmlNodes, state: State, wanted: dict[str, float]
 ) -> None:
     said = nodes.command(
@@ -137,14 +137,17 @@ def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None
     assert isinstance(said, cmd.Batch)
     turned, moved, spun, painted, gripped = said.commands
     assert turned == cmd.SetAxes(((0, 0.1), (1, -1.0)))
-    assert isinstance(moved, cmd.Shift)
+    assert isinstance(moved, cmd.MoveObject)
     assert moved.R is None
-    assert isinstance(spun, cmd.Shift)
+    assert isinstance(spun, cmd.MoveObject)
     assert spun.R is not None
     np.testing.assert_allclose(spun.R, so3.rotation_z(0.5), rtol=0, atol=1e-15)
-    assert painted == cmd.Dress("pan_link", Trait.COLOUR, (1.0, 0.0, 0.0))
+    assert painted == cmd.SetAppearance("pan_link", AppearanceTrait.COLOUR, (1.0, 0.0, 0.0))
     assert gripped == cmd.SetGripper(0.3)
-    shown = replace(state, looks=state.looks.having("pan_link", Trait.COLOUR, (1.0, 0.0, 0.0)))
+    shown = replace(
+        state,
+        appearance=state.appearance.having("pan_link", AppearanceTrait.COLOUR, (1.0, 0.0, 0.0)),
+    )
     assert get(nodes, shown, "pan_link_paint", "diffuseColor") == [1.0, 0.0, 0.0]
     assert get(nodes, shown, "pan_link_look", "whichChoice") == 1.0
 
@@ -177,7 +180,7 @@ def test_all_of_a_message_is_one_command(nodes: VrmlNodes, state: State) -> None
         ("pan_link_paint", "transparency", [0.5], "a number"),
     ],
 )
-def test_what_cannot_be_set_is_refused_with_all_that_came_with_it(
+def test_one_invalid_field_refuses_the_whole_set_request(
     nodes: VrmlNodes, state: State, node: str, field: str, value: Any, said: str
 ) -> None:
     fine = setting("axis_1", "rotation", [0, 0, 1, 0.1])
@@ -198,7 +201,7 @@ anything = st.none() | numbers | st.lists(numbers, min_size=1, max_size=5)
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(names, fields, anything), min_size=1, max_size=3))
-def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
+def test_setting_any_field_gives_a_valid_command_or_a_refusal(
     nodes: VrmlNodes, rules: Session, state: State, said: list[tuple[str, str, Any]]
 ) -> None:
     try:
@@ -212,15 +215,15 @@ def test_whatever_is_set_is_a_command_that_can_be_done_or_refused(
             assert np.isfinite(np.array(each.value)).all()
 
 
-def test_what_is_held_is_not_moved_by_name(nodes: VrmlNodes, state: State) -> None:
-    held = replace(state, things=(replace(state.things[0], held=True),))
+def test_held_object_is_not_moved_by_name(nodes: VrmlNodes, state: State) -> None:
+    held = replace(state, objects=(replace(state.objects[0], held=True),))
     with pytest.raises(InputError, match="open the gripper first"):
         nodes.command(held, [setting("left_cube", "translation", [0, 0, 0])])
 
 
 def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(robot: Robot) -> None:
-    session = described(Settings(), URDF_PATH, None).session
-    nodes = VrmlNodes(robot, session.surroundings)
+    session = describe_robot(Settings(), URDF_PATH, None).session
+    nodes = VrmlNodes(robot, session.environment)
     begun = session.begin(session.ready, 0.0, 0.0)
     nodes.command(begun, [setting("cup", "translation", [0.5, -0.5, 0.0])])
     with pytest.raises(InputError, match="nothing carries it there"):
@@ -231,16 +234,16 @@ def test_a_bare_arm_has_no_names_for_the_gripper(robot: Robot) -> None:
     stripped = bare(robot)
     arm = stripped.require_arm()
     session = Session(arm, arm.ready((0.0, -1.2, 1.5, 0.1, 0.0)))
-    nodes = VrmlNodes(stripped, session.surroundings)
+    nodes = VrmlNodes(stripped, session.environment)
     told = {node.node for node in nodes.world(session.begin(session.ready, 0.0, 0.0)).nodes}
     assert "axis_5" in told
     assert not {name for name in told if "finger" in name or "gripper" in name}
 
 
-def test_what_slides_has_a_translation_along_its_axis() -> None:
+def test_sliding_joint_has_a_translation_along_its_axis() -> None:
     gantry = load(GANTRY)
     session = Session(gantry.joint_group, np.zeros(3), travel=gantry.distance)
-    nodes = VrmlNodes(gantry, session.surroundings)
+    nodes = VrmlNodes(gantry, session.environment)
     state = session.begin(np.array((0.2, 0.0, 0.0)), 0.0, 0.0)
     along = np.array((math.cos(0.3), math.sin(0.3), 0.0))
     np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)
@@ -256,7 +259,7 @@ def test_joint_that_rests_has_its_value_and_cannot_be_set(tmp_path: Path) -> Non
     robot = load(written(tmp_path, "arm", [*PX150, pan]))
     arm = robot.require_arm()
     session = Session(arm, arm.ready(Settings().ready))
-    nodes = VrmlNodes(robot, session.surroundings)
+    nodes = VrmlNodes(robot, session.environment)
     state = session.begin(session.ready, 0.0, 0.0)
     assert get(nodes, state, "pan", "rotation") == [0.0, 1.0, 0.0, 0.3]
     with pytest.raises(InputError, match="pan stays where it is"):

@@ -12,8 +12,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import PlanContext
-from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
@@ -65,15 +65,15 @@ def test_program_nudges_a_joint_of_a_real_server(program: Client) -> None:
 
 
 def test_script_step_nudges(session: Session) -> None:
-    rig = PlanContext(session, np.eye(4))
+    plan_context = PlanContext(session, np.eye(4))
     state = session.begin(session.ready, 0.0, 0.0)
     script = "steps:\n  - nudge: {axis: 1, by: 20}\n  - nudge: {axis: 1, by: -5}\n"
-    tasks = compiled(parse(script), rig, state).tasks
-    plans = [task.order.plan for task in tasks if isinstance(task.order, Go)]
+    tasks = compiled(parse(script), plan_context, state).tasks
+    plans = [task.order.plan for task in tasks if isinstance(task.order, FollowPlan)]
     assert len(plans) == 2
     end = session.ready + np.deg2rad((15.0, 0.0, 0.0, 0.0, 0.0))
     np.testing.assert_allclose(plans[-1].end, end, rtol=0, atol=1e-12)
     with pytest.raises(ScriptError, match="line 2"):
-        compiled(parse("steps:\n  - nudge: {axis: 2, by: 300}\n"), rig, state)
+        compiled(parse("steps:\n  - nudge: {axis: 2, by: 300}\n"), plan_context, state)
     with pytest.raises(ScriptError, match="axis"):
         parse("steps:\n  - nudge: {by: 3}\n")

@@ -15,8 +15,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError, aconnect
-from katana450.extensions.programs.requests import Order, Program, Steer
-from katana450.maths.kinematics.reading import Reading
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
+from katana450.maths.kinematics.priority import Priority
 from katana450.server.api import answers, requests, schema
 from katana450.server.service import dispatcher, serialize
 from katana450.server.service.dispatcher import Dispatcher
@@ -60,7 +60,7 @@ def test_a_command_beyond_a_limit_is_limited_with_the_finding(program: Client) -
 
 
 def test_a_command_that_the_session_drops_is_refused_with_the_reason(program: Client) -> None:
-    program.ask(requests.Place(name="ball", form=requests.Form.SPHERE, size=[0.02]))
+    program.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.02]))
     assert done(program.ask(requests.Remove(name="ball"))).outcome == "accepted"
     with pytest.raises(RefusedError, match="no 'ball'"):
         program.ask(requests.Remove(name="ball"))
@@ -96,7 +96,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Turn: [requests.Turn(pitch=0.3, roll=0.0)],
         requests.Gripper: [requests.Gripper(angle=0.1)],
         requests.Tool: [requests.Tool(name="flange"), requests.Tool(name="tcp")],
-        requests.Read: [requests.Read(reading=each) for each in reversed(Reading)],
+        requests.SetPriority: [requests.SetPriority(priority=each) for each in reversed(Priority)],
         requests.GoToZero: [requests.GoToZero()],
         requests.Home: [requests.Home()],
         requests.Pause: [requests.Pause()],
@@ -104,9 +104,9 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Branch: [requests.Branch(shoulder="front", elbow="down")],
         requests.Hold: [requests.Hold()],
         requests.Place: [
-            requests.Place(name="ball", T=place, form=requests.Form.SPHERE, size=[0.02])
+            requests.Place(name="ball", T=place, shape=requests.Shape.SPHERE, size=[0.02])
         ],
-        requests.Attach: [requests.Attach(name="ball", to=requests.Mount.WORLD)],
+        requests.Attach: [requests.Attach(name="ball", to=requests.Attachment.WORLD)],
         requests.Set: [requests.Set(node="cup_look", field="whichChoice", value=0)],
         requests.Remove: [requests.Remove(name="ball")],
         requests.Fill: [requests.Fill(ml=150.0)],
@@ -114,7 +114,13 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         Program: [Program(text="steps:\n  - wait: 20\n")],
         Steer: [
             Steer(order=order)
-            for order in (Order.RUN, Order.PAUSE, Order.RESUME, Order.STEP, Order.END)
+            for order in (
+                ProgramOrder.RUN,
+                ProgramOrder.PAUSE,
+                ProgramOrder.RESUME,
+                ProgramOrder.STEP,
+                ProgramOrder.END,
+            )
         ],
     }
     no_commands = {
@@ -157,13 +163,13 @@ def test_a_second_stop_does_not_refuse_the_first(session: Session) -> None:
 
 def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    gone, turned = cmd.Shift("ball", position=np.zeros(3)), cmd.SetJoint(4, 30.0)
+    gone, turned = cmd.MoveObject("ball", position=np.zeros(3)), cmd.SetJoint(4, 30.0)
     state = session.step(state, [cmd.Batch((turned, gone))], 0.01)
     answer = done(serialize.concluded(answers.Done(ticket=1), *state.outcomes))
     assert (answer.outcome, reasons(answer)) == ("limited", ["axis limit"])
     (part,) = answer.refused
     assert (part.part, part.command, part.why) == (2, "shift", "There is no 'ball'.")
-    other = cmd.Shift("cube", position=np.zeros(3))
+    other = cmd.MoveObject("cube", position=np.zeros(3))
     state = session.step(state, [cmd.Batch((gone, other))], 0.02)
     refused = serialize.concluded(answers.Done(ticket=2), *state.outcomes)
     assert isinstance(refused, answers.Refused)
@@ -181,7 +187,7 @@ def test_a_server_names_the_refused_parts_of_a_request(server: AppServer) -> Non
         while True:
             # The ball has to go in the same tick; a slow server sees that it is gone already.
             assert time.monotonic() < deadline
-            place = {"form": "sphere", "size": [0.02], "can_be_held": False}
+            place = {"shape": "sphere", "size": [0.02], "can_be_held": False}
             assert lines.answer(do="place", name="ball", **place)["is"] == "done"
             lines.say(do="remove", name="ball")
             answer = lines.answer(do="set", **first)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Order, Program, Steer
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.gateway.client import opened
@@ -66,7 +66,7 @@ def send(arm: Client, text: str = LONG) -> None:
 def planning(arm: Client) -> None:
     """Have it planned, and run once it is; never a plan that is kept."""
     send(arm, f"{LONG}# {next(NUMBERS)}\n")
-    arm.ask(Steer(order=Order.RUN))
+    arm.ask(Steer(order=ProgramOrder.RUN))
     assert status(arm.query(answers.State)) == "planning"
 
 
@@ -82,7 +82,7 @@ def stays(arm: Client, seconds: float = 1.0) -> None:
 @pytest.mark.parametrize("by", ["pause", "steer"])
 def test_pause_during_planning_lasts_until_resume(arm: Client, by: str) -> None:
     planning(arm)
-    request = requests.Pause() if by == "pause" else Steer(order=Order.PAUSE)
+    request = requests.Pause() if by == "pause" else Steer(order=ProgramOrder.PAUSE)
     arm.ask(request)
     start = wait(arm, lambda state: status(state) != "planning")
     stays(arm)
@@ -144,7 +144,7 @@ def test_planning_is_cancelled_at_once_and_the_planner_is_free(
         with pytest.raises(RefusedError, match="being planned"):
             send(other, "steps: [home]\n")
         begun = time.monotonic()
-        arm.ask(Steer(order=Order.END))
+        arm.ask(Steer(order=ProgramOrder.END))
         assert status(arm.query(answers.State)) == "cancelled"
         send(other, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
         assert time.monotonic() - begun < PROMPT
@@ -162,7 +162,7 @@ def test_a_kept_plan_begins_at_once(arm: Client) -> None:
     took = time.monotonic() - begun
     begun = time.monotonic()
     send(arm, text)
-    arm.ask(Steer(order=Order.RUN))
+    arm.ask(Steer(order=ProgramOrder.RUN))
     wait(arm, lambda state: state.moving)
     assert time.monotonic() - begun < 0.5 * took
 
@@ -171,7 +171,7 @@ def test_a_moved_arm_is_planned_for_anew(arm: Client) -> None:
     send(arm, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
     wait(arm, lambda state: status(state) == "ready")
     arm.joints([0.1, -1.1, 1.4, 0.3, 0.0])
-    arm.ask(Steer(order=Order.RUN))
+    arm.ask(Steer(order=ProgramOrder.RUN))
     program = arm.query(answers.State).program
     assert program is not None
     assert (program.status, program.why) == ("planning", "Planned anew: the arm has moved.")

@@ -13,19 +13,19 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.lease import Role
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
-from katana450.arm.control.things import Form, Thing
 from katana450.errors import LeaseError
-from katana450.extensions.programs.layout import TIMING, PlanningStage
+from katana450.extensions.programs.compiler import TIMING, PlanningStage
 from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server import program_planning
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.server.service import status
 from katana450.server.service.hub import Window
 from tests.gateway.test_hub import PAGES
-from tests.gateway.test_performer import SCRIPT, Staged
+from tests.gateway.test_program_runner import SCRIPT, Staged
 
 PROMPT = 0.5
 """[s] Within which a cancelled planning has ended."""
@@ -60,7 +60,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[Slow]:
     slow.released.set()
 
 
-def ask(table: Staged, window: Window, then: Order | None = Order.RUN) -> None:
+def ask(table: Staged, window: Window, then: ProgramOrder | None = ProgramOrder.RUN) -> None:
     """Run ``SCRIPT`` as the panel of the page asks for it."""
     table.panel.plan(SCRIPT, then, window.actor)
     table.wait(0.1, window)
@@ -85,7 +85,7 @@ def bar(table: Staged, window: Window) -> dict[str, Any]:
 def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: Slow) -> None:
     window = table.join(PAGES[0])
     ask(table, window)
-    table.programs.steer(window, Order.PAUSE)
+    table.programs.steer(window, ProgramOrder.PAUSE)
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     table.arm.rest = replace(table.arm.rest, paused=True)
     shown = bar(table, window)
@@ -97,7 +97,7 @@ def test_a_pause_during_planning_starts_the_program_paused(table: Staged, slow: 
     assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
     table.wait(60.0, window)
     assert not followed(table)
-    table.programs.steer(window, Order.RESUME)
+    table.programs.steer(window, ProgramOrder.RESUME)
     assert isinstance(table.arm.commands[-1], cmd.Resume)
     table.arm.rest = replace(table.arm.rest, paused=False)
     table.wait(0.1, window)
@@ -108,7 +108,7 @@ def test_run_of_a_finished_plan_does_not_end_a_pause(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window)
     table.arm.rest = replace(table.arm.rest, paused=True)
-    table.programs.steer(window, Order.RUN)
+    table.programs.steer(window, ProgramOrder.RUN)
     table.wait(60.0, window)
     assert table.status == "paused"
     assert not followed(table)
@@ -133,32 +133,32 @@ def test_a_run_asked_for_during_a_stop_is_refused(table: Staged, slow: Slow) -> 
     window = table.join(PAGES[0])
     ask(table, window, None)
     table.stop("Anybody")
-    performer = table.programs
+    program_runner = table.programs
     with pytest.raises(LeaseError, match="clear the stop first"):
-        performer.steer(window, Order.RUN)
+        program_runner.steer(window, ProgramOrder.RUN)
     with pytest.raises(LeaseError, match="clear the stop first"):
-        table.panel.plan(SCRIPT, Order.RUN, window.actor)
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
     finish(table, window, slow)
     q = table.arm.rest.setpoint + 0.01
     motion = replace(table.arm.rest.motion, q=q)
     table.arm.rest = replace(table.arm.rest, q=q, goal=q, motion=motion)
     with pytest.raises(LeaseError, match="clear the stop first"):
-        performer.steer(window, Order.RUN)
+        program_runner.steer(window, ProgramOrder.RUN)
     table.hub.move(window, cmd.ClearStop())
     table.wait(1.0, window)
     assert table.status == "ready"
-    assert not performer.running
+    assert not program_runner.running
 
 
-def test_a_run_asked_for_while_planning_is_done_after_it(table: Staged, slow: Slow) -> None:
+def test_run_request_during_planning_takes_effect_afterwards(table: Staged, slow: Slow) -> None:
     window, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     ask(table, window, None)
     assert bar(table, window)["orders"] == ["end"]
     assert bar(table, other)["orders"] == []
-    for order in Order:
+    for order in ProgramOrder:
         with pytest.raises(LeaseError, match="is Window 1's"):
             table.programs.steer(other, order)
-    table.programs.steer(window, Order.RUN)
+    table.programs.steer(window, ProgramOrder.RUN)
     finish(table, window, slow)
     assert table.status == "running"
 
@@ -170,7 +170,7 @@ def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, s
     assert job is not None
     with pytest.raises(LeaseError, match="being planned"):
         table.programs.script(other, SCRIPT, more=False, speed=1.0)
-    table.programs.steer(window, Order.END)
+    table.programs.steer(window, ProgramOrder.END)
     assert table.status == "cancelled"
     table.programs.script(other, SCRIPT, more=False, speed=1.0)
     assert table.status == "planning"
@@ -181,7 +181,7 @@ def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, s
     assert not table.programs.running
 
 
-def test_planning_of_an_owner_who_is_gone_makes_way(table: Staged, slow: Slow) -> None:
+def test_planning_of_a_departed_owner_is_cancelled(table: Staged, slow: Slow) -> None:
     window, other = (table.join(page) for page in PAGES)
     ask(table, window)
     table.hub.leave(window)
@@ -204,7 +204,7 @@ def test_a_kept_plan_is_run_without_planning_again(table: Staged, slow: Slow) ->
     assert table.status == "running"
     assert table.programs.program is before
     assert slow.begun == 1
-    table.programs.steer(window, Order.END)
+    table.programs.steer(window, ProgramOrder.END)
     table.programs.script(window, SCRIPT, more=False, speed=0.5)
     finish(table, window, slow)
     assert slow.begun == 2
@@ -225,10 +225,10 @@ def test_a_change_plans_anew_and_says_so(table: Staged, slow: Slow, moved: str) 
             table.arm.rest = replace(rest, gripper=0.1, gripper_setpoint=0.1, gripper_goal=0.1)
         case "scene":
             T = se3.from_rotation_translation(np.eye(3), np.array((0.0, -0.8, 0.0)))
-            box = Thing("box", Form.BOX, (0.05, 0.05, 0.05), T)
-            table.arm.rest = replace(rest, things=(box,))
+            box = SceneObject("box", Shape.BOX, (0.05, 0.05, 0.05), T)
+            table.arm.rest = replace(rest, objects=(box,))
     slow.released.clear()
-    table.programs.steer(window, Order.RUN)
+    table.programs.steer(window, ProgramOrder.RUN)
     told = table.programs.progress()
     assert told is not None
     assert told.status == "planning"
@@ -263,12 +263,12 @@ def test_the_bar_tells_the_progress_of_planning(table: Staged, slow: Slow) -> No
 def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES)
     table.plan(owner)
-    performer, hub = table.programs, table.hub
-    performer.steer(owner, Order.RUN)
+    program_runner, hub = table.programs, table.hub
+    program_runner.steer(owner, ProgramOrder.RUN)
     hub.move(owner, cmd.Pause())
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     hub.move(owner, cmd.SpeedScale(0.5))
-    assert table.arm.share == 0.5
+    assert table.arm.fraction == 0.5
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
@@ -284,11 +284,11 @@ def test_the_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
 def test_a_persons_speed_holds_to_the_end_of_the_program(table: Staged) -> None:
     window = table.join(PAGES[0])
     table.plan(window, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
-    table.programs.steer(window, Order.RUN)
+    table.programs.steer(window, ProgramOrder.RUN)
     table.wait(0.5, window)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
     table.wait(3.0, window)
     told = [each.value for each in table.arm.commands if isinstance(each, cmd.SpeedScale)]
     assert told == [1.0, 0.3]
     assert table.status == "done"
-    assert table.arm.share == 0.3
+    assert table.arm.fraction == 0.3

@@ -12,7 +12,7 @@ from katana450.client import Client, RefusedError
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Form
+from katana450.server.api.fields import Shape
 
 THERE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
 
@@ -32,12 +32,12 @@ def test_a_printed_pose_is_taken_and_its_rounding_reported(
     np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=10.0 * rounding)
 
 
-def test_a_thing_is_put_at_a_printed_pose(program: Client) -> None:
+def test_a_object_is_put_at_a_printed_pose(program: Client) -> None:
     T = np.eye(4)
     T[:3, :3] = so3.from_rpy(0.0, 0.0, 0.7)
     T[:3, 3] = 0.3, -0.3, 0.0
     printed: Any = T.round(4).tolist()
-    placed = program.ask(requests.Place(name="block", form=Form.BOX, size=[0.02] * 3, T=printed))
+    placed = program.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.02] * 3, T=printed))
     assert isinstance(placed, answers.Done)
     assert placed.rotation_misfit is not None
     assert placed.rotation_misfit > 1e-6

@@ -13,7 +13,7 @@ from tests.gateway.lines import post
 from tests.gateway.test_isolation import FAR
 
 
-def test_nobody_is_shown_the_key_and_no_other_speaks_for_the_program() -> None:
+def test_program_key_is_secret_and_required() -> None:
     with AppServer(ATTENTIVE_APP) as server:
         key = secrets.token_hex(16)
 
@@ -27,7 +27,7 @@ def test_nobody_is_shown_the_key_and_no_other_speaks_for_the_program() -> None:
             return status, json.loads(body)
 
         assert do(do="acquire")[0] == 200
-        pages = [json.loads(ask(f"{server.url}/api/v1/{at}")[2]) for at in ("state", "ledger")]
+        pages = [json.loads(ask(f"{server.url}/api/v1/{at}")[2]) for at in ("state", "event_log")]
         assert pages[0]["holder"] == "Sorter"
         assert key not in json.dumps(pages)
         # Its name is no key, whoever sends it.

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Order, Program, Steer
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 
@@ -44,7 +44,7 @@ def arm(server: AppServer) -> Iterator[Client]:
         yield arm
         state = arm.query(answers.State)
         if state.program is not None and state.program.status in ("running", "paused"):
-            arm.ask(Steer(order=Order.END))
+            arm.ask(Steer(order=ProgramOrder.END))
         arm.ask(requests.ClearStop())
         arm.go(requests.Resume())
         arm.go(requests.Home())
@@ -72,7 +72,7 @@ def wait(
     raise AssertionError(f"still {program}")
 
 
-def run(arm: Client, order: Order = Order.RUN) -> None:
+def run(arm: Client, order: ProgramOrder = ProgramOrder.RUN) -> None:
     assert planned(arm, THERE_AND_BACK).status == "ready"
     arm.ask(Steer(order=order))
 
@@ -96,7 +96,7 @@ def test_a_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
 
 def test_stop_ends_it_in_the_middle(arm: Client) -> None:
     run(arm)
-    wait(arm, lambda program: program.line == 3 and program.share > 0.3)
+    wait(arm, lambda program: program.line == 3 and program.fraction > 0.3)
     arm.ask(requests.Stop())
     program = wait(arm, lambda program: program.status != "running", 1.0)
     assert program.status == "stopped"
@@ -106,17 +106,17 @@ def test_stop_ends_it_in_the_middle(arm: Client) -> None:
     assert not state.moving
     assert np.abs(state.qd).max() == 0.0
     with pytest.raises(RefusedError, match="clear the stop first"):
-        arm.ask(Steer(order=Order.RUN))
+        arm.ask(Steer(order=ProgramOrder.RUN))
 
 
 def test_it_pauses_steps_and_is_ended(arm: Client) -> None:
-    run(arm, Order.STEP)
+    run(arm, ProgramOrder.STEP)
     assert wait(arm, lambda program: program.status == "paused").line == 4
-    arm.ask(Steer(order=Order.RESUME))
-    wait(arm, lambda program: program.line == 5 and program.share > 0.1)
-    arm.ask(Steer(order=Order.PAUSE))
+    arm.ask(Steer(order=ProgramOrder.RESUME))
+    wait(arm, lambda program: program.line == 5 and program.fraction > 0.1)
+    arm.ask(Steer(order=ProgramOrder.PAUSE))
     assert wait(arm, lambda program: program.status == "paused").line == 5
-    arm.ask(Steer(order=Order.END))
+    arm.ask(Steer(order=ProgramOrder.END))
     state = arm.query(answers.State)
     assert state.program is not None
     assert state.program.status == "stopped"
@@ -133,7 +133,7 @@ def test_the_arm_can_be_taken_from_it(server: AppServer, arm: Client) -> None:
         boss.ask(requests.ReleaseLease())
 
 
-def test_it_ends_when_whoever_started_it_leaves(server: AppServer) -> None:
+def test_program_ends_when_its_owner_leaves(server: AppServer) -> None:
     with connect(server.url, "Guest") as guest:
         run(guest)
     with connect(server.url, "Watcher") as watcher:
@@ -144,7 +144,7 @@ def test_it_ends_when_whoever_started_it_leaves(server: AppServer) -> None:
         watcher.ask(requests.ReleaseLease())
 
 
-def test_what_is_wrong_is_told_with_its_lines(arm: Client) -> None:
+def test_errors_are_reported_with_their_lines(arm: Client) -> None:
     program = planned(arm, "steps:\n  - hme\n  - wait: x\n")
     assert program.status == "refused"
     assert "line 2, column 5" in program.why
@@ -155,7 +155,7 @@ def test_what_is_wrong_is_told_with_its_lines(arm: Client) -> None:
     program = planned(arm, "gripper: none\nsteps: [home]\n")
     assert "--bare" in program.why
     with pytest.raises(RefusedError, match="no program"):
-        arm.ask(Steer(order=Order.RUN))
+        arm.ask(Steer(order=ProgramOrder.RUN))
 
 
 def test_a_script_that_is_too_long_is_refused(arm: Client) -> None:

@@ -16,13 +16,13 @@ import trimesh
 
 from katana450.arm.control.lease import Role
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.client import Client, RefusedError, connect
 from katana450.errors import InputError
-from katana450.extensions.importers.initial_scene import furnished
+from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.extensions.importers.scene_file import SCENE
-from katana450.extensions.importers.shape_file import MOST_BYTES
-from katana450.extensions.importers.uploads import AT_ONCE
+from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
+from katana450.extensions.importers.uploads import UPLOAD_BURST
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
@@ -52,10 +52,10 @@ def scene(ring: Path) -> Path:
 scene: 1
 joints: [10, -68, 85, 8, 0]
 water: 80
-things:
-- {name: cup, form: cylinder, size: [32, 90], pose: [340, -260, 0, 0, 0, 0], can_be_held: true}
+objects:
+- {name: cup, shape: cylinder, size: [32, 90], pose: [340, -260, 0, 0, 0, 0], can_be_held: true}
 - name: gate
-  form: mesh
+  shape: mesh
   mesh: {file: ring.stl, unit: mm}
   pose: [420, 150, 0, 90, 0, 30]
   colour: "#2477d4"
@@ -88,8 +88,8 @@ def arm(server: AppServer, tokens: dict[str, str]) -> Iterator[Client]:
         arm.ask(requests.ReleaseLease())
 
 
-def things(arm: Client) -> dict[str, answers.Thing]:
-    return {each.name: each for each in arm.query(answers.Things).things}
+def objects(arm: Client) -> dict[str, answers.SceneObject]:
+    return {each.name: each for each in arm.query(answers.Objects).objects}
 
 
 def until(true: Callable[[], bool]) -> None:
@@ -100,7 +100,7 @@ def until(true: Callable[[], bool]) -> None:
 
 
 def test_the_server_begins_with_its_scene_and_objects(server: AppServer, arm: Client) -> None:
-    now = things(arm)
+    now = objects(arm)
     assert list(now) == ["cup", "gate", "ring"]
     assert now["gate"].colour == "#2477d4"
     np.testing.assert_allclose(np.array(now["ring"].T)[:3, 3], (0.3, -0.4, 0.05), atol=1e-12)
@@ -118,40 +118,40 @@ def test_a_mesh_is_placed_fixed_to_the_hand_and_met(arm: Client, ring: Path, rob
     np.testing.assert_allclose(told.size, (0.104, 0.104, 0.024), atol=1e-6)
     other = arm.upload(ring, "cm").key
     assert other != told.key
-    form = requests.Form.MESH
-    arm.ask(requests.Place(name="it", form=form, mesh=told.key, scale=0.5, opacity=0.4))
-    until(lambda: "it" in things(arm))
-    at = np.array(things(arm)["it"].T)[:3, 3]
+    form = requests.Shape.MESH
+    arm.ask(requests.Place(name="it", shape=form, mesh=told.key, scale=0.5, opacity=0.4))
+    until(lambda: "it" in objects(arm))
+    at = np.array(objects(arm)["it"].T)[:3, 3]
     assert 0.3 < np.hypot(*at[:2]) < 0.7
     assert at[2] == 0.0
     on_tool = np.eye(4)
     on_tool[:3, 3] = (-0.05, 0.0, 0.06)
-    arm.ask(requests.Attach(name="it", to=requests.Mount.HAND, T=_rows(on_tool)))
-    until(lambda: things(arm)["it"].fixed)
+    arm.ask(requests.Attach(name="it", to=requests.Attachment.HAND, T=_rows(on_tool)))
+    until(lambda: objects(arm)["it"].fixed)
     mounted = robot.require_arm()
     T = mounted.T_base_shoulder @ forward(mounted.chain, np.array(arm.query(answers.State).q))
-    np.testing.assert_allclose(things(arm)["it"].T, T @ on_tool, atol=1e-9)
+    np.testing.assert_allclose(objects(arm)["it"].T, T @ on_tool, atol=1e-9)
     arm.ask(requests.Place(name="it", colour="#ff0000", hidden=True))
-    until(lambda: things(arm)["it"].hidden)
-    np.testing.assert_allclose(things(arm)["it"].T, T @ on_tool, atol=1e-9)
-    arm.ask(requests.Attach(name="it", to=requests.Mount.TABLE))
-    until(lambda: not things(arm)["it"].fixed)
-    assert things(arm)["it"].T[2][3] == 0.0
+    until(lambda: objects(arm)["it"].hidden)
+    np.testing.assert_allclose(objects(arm)["it"].T, T @ on_tool, atol=1e-9)
+    arm.ask(requests.Attach(name="it", to=requests.Attachment.TABLE))
+    until(lambda: not objects(arm)["it"].fixed)
+    assert objects(arm)["it"].T[2][3] == 0.0
     arm.ask(requests.Remove(name="it"))
-    until(lambda: "it" not in things(arm))
+    until(lambda: "it" not in objects(arm))
     for wrong in (
-        requests.Place(name="it", form=form),
-        requests.Place(name="it", form=form, mesh="0" * 32),
-        requests.Place(name="it", form=requests.Form.BOX, size=[0.1] * 3, mesh=told.key),
-        requests.Place(name="it", form=form, mesh=told.key, scale=900.0),
+        requests.Place(name="it", shape=form),
+        requests.Place(name="it", shape=form, mesh="0" * 32),
+        requests.Place(name="it", shape=requests.Shape.BOX, size=[0.1] * 3, mesh=told.key),
+        requests.Place(name="it", shape=form, mesh=told.key, scale=900.0),
         requests.Place(name="cup", scale=2.0),
-        requests.Attach(name="nobody", to=requests.Mount.HAND),
-        requests.Attach(name="ring", to=requests.Mount.TABLE, T=_rows(np.eye(4))),
+        requests.Attach(name="nobody", to=requests.Attachment.HAND),
+        requests.Attach(name="ring", to=requests.Attachment.TABLE, T=_rows(np.eye(4))),
         requests.Load(scene="0" * 32),
     ):
         with pytest.raises(RefusedError):
             arm.ask(wrong)
-    assert list(things(arm)) == ["cup", "gate", "ring"]
+    assert list(objects(arm)) == ["cup", "gate", "ring"]
 
 
 @pytest.mark.parametrize("kind", ["dae", "3mf", "off"])
@@ -166,20 +166,20 @@ def test_file_read_by_a_library_is_uploaded(arm: Client, tmp_path: Path, kind: s
 
 def test_a_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
     data = arm.save_scene()
-    before = things(arm)
+    before = objects(arm)
     arm.ask(requests.Remove(name="gate"))
     arm.ask(requests.Fill(ml=10.0))
-    until(lambda: "gate" not in things(arm))
+    until(lambda: "gate" not in objects(arm))
     told = arm.load_scene(data)
-    assert told.things == list(before)
-    until(lambda: things(arm) == before)
+    assert told.objects == list(before)
+    until(lambda: objects(arm) == before)
     assert arm.save_scene() == data
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     assert sorted(files) == ["meshes/ring.stl", SCENE]
     text = files[SCENE].decode()
     for wrong, said in (
-        (text.replace("name: ring", "name: gate"), "two things called 'gate'"),
+        (text.replace("name: ring", "name: gate"), "two objects called 'gate'"),
         (text.replace("water: 80", "water: 5000"), "cannot hold 5000 ml"),
         (text.replace("meshes/ring.stl", "../ring.stl"), "no relative path"),
         (text[: len(text) // 2], "line"),
@@ -190,7 +190,7 @@ def test_a_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
                 archive.writestr(name, content)
         with pytest.raises(RefusedError, match=said):
             arm.load_scene(out.getvalue())
-        assert things(arm) == before
+        assert objects(arm) == before
 
 
 def test_what_is_too_much_is_refused(
@@ -201,14 +201,14 @@ def test_what_is_too_much_is_refused(
     def ask(url: str, **options: Any) -> tuple[int, dict[str, str], bytes]:
         return client.ask(url, Authorization=f"Bearer {tokens['operator']}", **options)
 
-    status, _, said = ask(f"{url}/mesh?name=a.stl", data=bytes(MOST_BYTES + 1))
+    status, _, said = ask(f"{url}/mesh?name=a.stl", data=bytes(MAX_FILE_BYTES + 1))
     assert (status, said) == (413, b"That is too long.")
     for query in ("", "?name=a.exe", "?name=a.stl&unit=ft", f"?name={'a' * 200}.stl"):
         status, _, said = ask(f"{url}/mesh{query}", data=b"x")
         assert status in (422, 429), said
         assert json.loads(said)["is"] == "refused"
     seen = set()
-    for _ in range(int(AT_ONCE) + 2):
+    for _ in range(int(UPLOAD_BURST) + 2):
         seen.add(ask(f"{url}/mesh?name=a.exe", data=b"")[0])
     assert 429 in seen
     # From another site's page nothing comes in.
@@ -216,9 +216,7 @@ def test_what_is_too_much_is_refused(
     assert arm.query(answers.State).status == "ok"
 
 
-def test_who_only_watches_brings_nothing(
-    server: AppServer, ring: Path, tokens: dict[str, str]
-) -> None:
+def test_spectator_cannot_upload(server: AppServer, ring: Path, tokens: dict[str, str]) -> None:
     with connect(server.url, "Eve", tokens["viewer"]) as watcher:
         with pytest.raises(RefusedError, match="may watch"):
             watcher.upload(ring)
@@ -228,22 +226,22 @@ def test_who_only_watches_brings_nothing(
 
 
 def test_a_scene_that_cannot_be_is_refused_before_the_server_starts(scene: Path) -> None:
-    robot = described(Settings(), URDF_PATH, None)
+    robot = describe_robot(Settings(), URDF_PATH, None)
     broken = scene.with_name("broken.yaml")
     whole = scene.read_text()
     for text, said in (
-        (whole.replace("form: mesh", "form: mush"), "broken.yaml:\nline 7, .*mush'.$"),
-        (whole.replace("10, -68", "10, 168").replace("form: mesh", "form: sphere"), "line 6"),
+        (whole.replace("shape: mesh", "form: mush"), "broken.yaml:\nline 7, .*mush'.$"),
+        (whole.replace("10, -68", "10, 168").replace("shape: mesh", "shape: sphere"), "line 6"),
         ("scene: 1\njoints: [0, 168, 85, 8, 0]\n", "limits"),
         ("scene: 1\njoints: [0, 1]\n", "joint"),
         ("scene: 1\nwater: 80\n", "no cup"),
     ):
         broken.write_text(text)
         with pytest.raises(InputError, match=said):
-            furnished(robot.session, broken, [])
+            load_initial_scene(robot.session, broken, [])
     for told in ("/nowhere/it.stl", f"{scene}@1,2,x"):
         with pytest.raises(InputError, match=r"it\.stl cannot be read|no format"):
-            furnished(robot.session, None, [told])
+            load_initial_scene(robot.session, None, [told])
 
 
 def _rows(T: Any) -> Matrix4:

@@ -105,6 +105,6 @@ def _with(row: int, column: int, value: float) -> FloatArray:
         ("pose", "shape|values"),
     ],
 )
-def test_what_is_no_pose_is_refused(value: npt.ArrayLike, words: str) -> None:
+def test_invalid_pose_is_refused(value: npt.ArrayLike, words: str) -> None:
     with pytest.raises(InputError, match=words):
         se3.validated(value)

@@ -136,13 +136,13 @@ def test_validated_returns_the_nearest_rotation() -> None:
         (None, "object"),
     ],
 )
-def test_what_is_no_rotation_is_refused(value: npt.ArrayLike, word: str) -> None:
+def test_invalid_rotation_is_refused(value: npt.ArrayLike, word: str) -> None:
     with pytest.raises(InputError, match=word):
         so3.validated(value)
 
 
 @pytest.mark.parametrize("value", [[0.0] * 4, [1.0, 0.0, 0.0], [np.inf, 0.0, 0.0, 0.0]])
-def test_what_is_no_quaternion_is_refused(value: list[float]) -> None:
+def test_invalid_quaternion_is_refused(value: list[float]) -> None:
     with pytest.raises(InputError, match="quaternion"):
         so3.from_quaternion(value)
 

@@ -16,8 +16,8 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
-from katana450.maths.kinematics.reading import Reading
 from tests.kinematics.conftest import katana
 from tests.kinematics.family import Offsets, member, random_member
 
@@ -64,11 +64,11 @@ def random_target(chain: Chain, rng: np.random.Generator) -> FloatArray:
     return se3.inverse(arm.T_C_S) @ T_C
 
 
-def misses(p: Projection, reading: Reading) -> tuple[float, ...]:
+def misses(p: Projection, priority: Priority) -> tuple[float, ...]:
     """What counts most first; of a pitch that no posture has, as POSITION."""
-    if reading is Reading.POSE:
+    if priority is Priority.POSE:
         return p.position_error, p.rotation_error
-    if reading is Reading.PITCH and p.pitch_error <= SAME:
+    if priority is Priority.PITCH and p.pitch_error <= SAME:
         return p.pitch_error, p.position_error
     return p.position_error, p.pitch_error
 
@@ -87,34 +87,34 @@ def gained(before: tuple[float, ...], after: tuple[float, ...], least: float) ->
     return 0
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("priority", Priority)
 @pytest.mark.parametrize("name", CHAINS)
-def test_what_is_named_binds_and_nothing_else(name: str, reading: Reading) -> None:
+def test_reported_limits_are_exactly_the_binding_ones(name: str, priority: Priority) -> None:
     chain, rng = CHAINS[name], np.random.default_rng(7)
     limited = idle = 0
     for _ in range(CASES):
         T = random_target(chain, rng)
-        p = project(chain, T, reading=reading)
-        missed = misses(p, reading)
+        p = project(chain, T, priority=priority)
+        missed = misses(p, priority)
         named = np.zeros(5)
         named[list(p.limits)] = 1.0
 
-        other = project(widened(chain, 1.0 - named, 1e-4), T, reading=reading, branch=p.branch)
-        assert gained(missed, misses(other, reading), SAME) <= 0
-        if max(missed) > SAME and (reading is not Reading.POSE or p.yaw_error <= SAME):
+        other = project(widened(chain, 1.0 - named, 1e-4), T, priority=priority, branch=p.branch)
+        assert gained(missed, misses(other, priority), SAME) <= 0
+        if max(missed) > SAME and (priority is not Priority.POSE or p.yaw_error <= SAME):
             assert p.limits or p.axis1 or p.reach
-        pitched = reading is not Reading.PITCH or p.pitch_error <= SAME
+        pitched = priority is not Priority.PITCH or p.pitch_error <= SAME
         if p.position_error > SAME and pitched and not p.limits:
-            free = project(chain, T, reading=reading, branch=p.branch, within_limits=False)
+            free = project(chain, T, priority=priority, branch=p.branch, within_limits=False)
             # With the pitch kept, a limit may be why the tool does not face the other way.
-            if reading is not Reading.PITCH or same_way(chain, p, free):
-                assert gained(missed, misses(free, reading), SAME) <= 0
+            if priority is not Priority.PITCH or same_way(chain, p, free):
+                assert gained(missed, misses(free, priority), SAME) <= 0
 
         # The roll counts least, and depends on its own limit alone.
-        named[4] *= reading is Reading.POSE
+        named[4] *= priority is Priority.POSE
         if named.any() and not p.axis1:
-            wide = project(widened(chain, named, 1e-3), T, reading=reading, branch=p.branch)
-            gain = gained(missed, misses(wide, reading), 1e-10)
+            wide = project(widened(chain, named, 1e-3), T, priority=priority, branch=p.branch)
+            gain = gained(missed, misses(wide, priority), 1e-10)
             assert gain >= 0
             limited += 1
             idle += gain == 0
@@ -123,20 +123,20 @@ def test_what_is_named_binds_and_nothing_else(name: str, reading: Reading) -> No
     assert idle <= 0.01 * limited
 
 
-@pytest.mark.parametrize("reading", Reading)
-def test_the_limit_of_the_roll_is_named_where_it_binds(reading: Reading) -> None:
+@pytest.mark.parametrize("priority", Priority)
+def test_the_limit_of_the_roll_is_named_where_it_binds(priority: Priority) -> None:
     chain, rng = CHAINS["katana"], np.random.default_rng(8)
     named = 0
     roll = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
     for _ in range(CASES):
         T = random_target(chain, rng)
-        p = project(chain, T, reading=reading)
-        wide = project(widened(chain, roll, 1e-3), T, reading=reading, branch=p.branch)
+        p = project(chain, T, priority=priority)
+        wide = project(widened(chain, roll, 1e-3), T, priority=priority, branch=p.branch)
         beyond = not chain.lower[4] - 1e-9 <= wide.q[4] <= chain.upper[4] + 1e-9
         assert (4 in p.limits) == beyond
         named += beyond
     # With the pitch kept the tool rather faces the other way.
-    assert named > 0 or reading is Reading.PITCH
+    assert named > 0 or priority is Priority.PITCH
 
 
 def test_axis_1_is_named_where_the_branch_ends_on_it() -> None:
@@ -158,8 +158,8 @@ def test_axis_1_is_named_where_the_plane_passes_beside_it() -> None:
     chain = member(offsets, np.eye(4), np.eye(4))
     for rho, inside in ((0.02, True), (0.06, False)):
         T = se3.from_rotation_translation(np.eye(3), [rho, 0.0, 0.25])
-        for reading in Reading:
-            p = project(chain, T, reading=reading)
+        for priority in Priority:
+            p = project(chain, T, priority=priority)
             assert p.axis1 == inside
             assert not p.reach
             assert (p.position_error > 1e-3) == inside

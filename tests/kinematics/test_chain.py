@@ -50,7 +50,7 @@ def _broken(chain: Chain) -> list[tuple[dict[str, Any], str]]:
     ]
 
 
-def test_what_is_no_chain_is_refused_with_its_reason(chain: Chain) -> None:
+def test_invalid_chain_is_refused_with_the_reason(chain: Chain) -> None:
     for change, words in _broken(chain):
         with pytest.raises(RobotDescriptionError, match=words):
             dataclasses.replace(chain, **change)
@@ -91,7 +91,7 @@ def test_clamp_sets_each_axis_on_its_nearest_limit(chain: Chain) -> None:
         (np.zeros(5, dtype=complex), "complex"),
     ],
 )
-def test_what_is_no_joint_vector_is_refused(chain: Chain, q: npt.ArrayLike, words: str) -> None:
+def test_invalid_joint_vector_is_refused(chain: Chain, q: npt.ArrayLike, words: str) -> None:
     with pytest.raises(InputError, match=words):
         chain.check_q(q)
 

@@ -176,8 +176,8 @@ def test_tool_vertical_on_axis_1_leaves_theta1_to_the_hint(
     solutions = inverse(chain, T, q_hint=q_hint)
     assert_all_exact(chain, T, solutions)
     for s, half in zip(solutions, (0.0, 0.0, math.pi, math.pi), strict=True):
-        wished = math.remainder((hint or 0.0) + half, math.tau)
-        assert math.remainder(s.q[0] - wished, math.tau) == pytest.approx(0.0, abs=1e-9)
+        desired = math.remainder((hint or 0.0) + half, math.tau)
+        assert math.remainder(s.q[0] - desired, math.tau) == pytest.approx(0.0, abs=1e-9)
         assert abs(s.q[0]) <= math.pi
 
 
@@ -312,7 +312,7 @@ def test_the_circle_of_the_paper(flange_chain: Chain) -> None:
         (np.diag([1.0, 1.0, 2.0, 1.0]), "not a rotation"),
     ],
 )
-def test_what_is_no_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> None:
+def test_invalid_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> None:
     with pytest.raises(InputError, match=words):
         inverse(chain, T)
 

@@ -79,7 +79,7 @@ def test_completeness_as_many_as_the_offsets_leave(solved: list[Case]) -> None:
     assert set(counts[False]) == {2, 4}
 
 
-def test_strictness_limits_are_told_right(solved: list[Case]) -> None:
+def test_strict_limits_are_reported_correctly(solved: list[Case]) -> None:
     for chain, _, _, _, solutions in solved:
         for s in solutions:
             inside = bool((np.abs(s.q) <= math.pi + 1e-9).all())

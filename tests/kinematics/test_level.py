@@ -79,12 +79,12 @@ def test_a_point_that_can_be_reached_is(rng: np.random.Generator) -> None:
     arm, reached = planar("up", 1), 0
     for _ in range(200):
         q = rng.uniform((LOWER[0], 0.0, LOWER[2]), UPPER)
-        wished = Posture(*q.tolist())
-        u, v = arm.tool(wished)
+        desired = Posture(*q.tolist())
+        u, v = arm.tool(desired)
         if u < 0.0:
             continue
         reached += 1
-        posture = nearest_at_pitch(arm, u, v, wished.phi)
+        posture = nearest_at_pitch(arm, u, v, desired.phi)
         assert posture is not None
         assert np.allclose(posture[:3], q, atol=1e-6)
         assert np.allclose(arm.tool(posture), (u, v), atol=1e-12)

@@ -14,8 +14,8 @@ from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
-from katana450.maths.kinematics.reading import Reading
 from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member
 
@@ -42,7 +42,7 @@ def tilt(T: FloatArray) -> float:
 
 def level(chain: Chain, point: FloatArray, yaw: float = 0.0) -> Projection:
     T = se3.from_rotation_translation(so3.rotation_z(yaw), point)
-    return project(chain, T, reading=Reading.PITCH)
+    return project(chain, T, priority=Priority.PITCH)
 
 
 @pytest.mark.parametrize("branch", [None, *FRONT], ids=str)
@@ -52,7 +52,7 @@ def test_level_cup_stays_level_all_round_the_arm(
     gave_way = 0
     for point in ring(rng, COUNT, 0.7):
         T = se3.from_rotation_translation(np.eye(3), point)
-        p = project(chain, T, reading=Reading.PITCH, branch=branch)
+        p = project(chain, T, priority=Priority.PITCH, branch=branch)
         assert tilt(p.T) <= LEVEL, point
         assert p.pitch_error <= LEVEL
         gave_way += p.position_error > 1e-6
@@ -91,7 +91,7 @@ def test_pitch_and_roll_are_kept_wherever_a_member_has_them(seed: int) -> None:
         T_C = se3.from_rotation_translation(np.eye(3), point)
         T = se3.inverse(arm.T_C_S) @ T_C @ arm.T_K_tool
         for branch in BRANCHES:
-            p = project(chain, T, reading=Reading.PITCH, branch=branch)
+            p = project(chain, T, priority=Priority.PITCH, branch=branch)
             pitch, _ = pitch_and_roll(chain, p.q)
             slope = abs(math.sin(pitch))
             if any(possible[branch]):

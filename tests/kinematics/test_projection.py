@@ -394,7 +394,7 @@ def test_the_same_question_has_the_same_answer(chain: Chain, rng: np.random.Gene
         (np.diag([1.0, 1.0, 1.0, 0.0]), "last row"),
     ],
 )
-def test_what_is_no_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> None:
+def test_invalid_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> None:
     with pytest.raises(InputError, match=words):
         project(chain, T)
 

@@ -16,10 +16,10 @@ from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
-from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.tracker import EFFORT, HOP, Tracked, TrackingStatus, leap, track
+from katana450.maths.kinematics.tracker import HOP, MAX_POSES, Tracked, TrackingStatus, leap, track
 from tests.kinematics.family import random_member, random_pose
 
 READY = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
@@ -71,16 +71,16 @@ def dragged(
 
 
 def arrived(
-    chain: Chain, q: FloatArray, target: ToolTarget, since: ToolTarget, reading: Reading
+    chain: Chain, q: FloatArray, target: ToolTarget, since: ToolTarget, priority: Priority
 ) -> Tracked:
     """Where the calls of so many ticks lead in the end."""
-    tracked = track(chain, q, target, branch=FRONT_UP, reading=reading, since=since)
+    tracked = track(chain, q, target, branch=FRONT_UP, priority=priority, since=since)
     for _ in range(40):
         if tracked.since is None:
             break
-        assert tracked.ahead is None
+        assert tracked.beyond_gap is None
         tracked = track(
-            chain, tracked.best.q, target, branch=FRONT_UP, reading=reading, since=tracked.since
+            chain, tracked.best.q, target, branch=FRONT_UP, priority=priority, since=tracked.since
         )
     assert tracked.since is None
     return tracked
@@ -91,7 +91,7 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
     branch = Branch.parse(split.branch)
     stops = np.arange(-0.02, 0.02, STEP)
     plain = [
-        leap(chain, READY, split.target(float(along)), branch, Reading.POSE) for along in stops
+        leap(chain, READY, split.target(float(along)), branch, Priority.POSE) for along in stops
     ]
     start = plain[0].q
     leaps = np.abs(np.diff([best.q for best in plain], axis=0)).max(axis=1)
@@ -105,9 +105,9 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
     assert all(np.allclose(goals[i][1].best.q, plain[i].q, atol=1e-9) for i in range(at))
     assert steps.max() < HOP
     end = goals[-1][1]
-    assert end.status is TrackingStatus.HELD
-    assert end.ahead is not None
-    assert np.allclose(end.ahead.q, plain[-1].q, atol=1e-9)
+    assert end.status is TrackingStatus.GAP
+    assert end.beyond_gap is not None
+    assert np.allclose(end.beyond_gap.q, plain[-1].q, atol=1e-9)
     axis, far = end.leap_ahead()
     assert far == pytest.approx(np.abs(plain[-1].q - end.best.q)[axis])
     assert far > 1.0
@@ -115,7 +115,7 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
     back = list(dragged(chain, split, end.best.q, stops[::-1]))
     assert np.abs(np.diff([b.best.q for _, b in back], axis=0)).max() < HOP
     assert np.allclose(back[-1][1].best.q, start, atol=1e-9)
-    assert back[-1][1].status is not TrackingStatus.HELD
+    assert back[-1][1].status is not TrackingStatus.GAP
 
 
 def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> None:
@@ -132,12 +132,12 @@ def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> Non
             assert tracked.status is TrackingStatus.OK
         else:
             assert tracked.best.q[0] == pytest.approx(chain.upper[0], abs=1e-12)
-            held += tracked.status is TrackingStatus.HELD
+            held += tracked.status is TrackingStatus.GAP
         q, since = tracked.best.q, target
     # Beyond the gap the place is reachable, but only the long way round.
     assert held > 20
-    assert tracked.ahead is not None
-    assert tracked.ahead.position_error < 1e-9
+    assert tracked.beyond_gap is not None
+    assert tracked.beyond_gap.position_error < 1e-9
     axis, far = tracked.leap_ahead()
     assert axis == 0
     assert far == pytest.approx(chain.upper[0] + math.radians(122.0), abs=0.01)
@@ -153,7 +153,7 @@ def test_over_axis_1_the_arm_does_not_turn_round_by_itself(chain: Chain) -> None
         assert np.abs(tracked.best.q - q).max() < 2 * HOP
         assert abs(tracked.best.q[0]) < 1e-9
         q, since = tracked.best.q, target
-    assert tracked.status is TrackingStatus.HELD
+    assert tracked.status is TrackingStatus.GAP
     assert forward(chain, q)[0, 3] == pytest.approx(0.0, abs=1e-9)
     axis, far = tracked.leap_ahead()
     assert axis == 0
@@ -173,9 +173,9 @@ def test_beside_axis_1_the_arm_turns_with_the_hand(chain: Chain) -> None:
     assert q[0] > math.radians(155.0)
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("priority", Priority)
 def test_a_fast_drag_ends_where_the_slow_one_does(
-    chain: Chain, reading: Reading, rng: np.random.Generator
+    chain: Chain, priority: Priority, rng: np.random.Generator
 ) -> None:
     """A leap of the target of up to 0.3 m inside the workspace."""
     agreed = 0
@@ -185,11 +185,11 @@ def test_a_fast_drag_ends_where_the_slow_one_does(
         way = rng.normal(size=3)
         way *= rng.uniform(0.05, 0.3) / np.linalg.norm(way)
         target = ToolTarget(since.position + way, since.pitch, since.roll)
-        fast = arrived(chain, q, target, since, reading)
+        fast = arrived(chain, q, target, since, priority)
         slow, last = q, since
-        for share in np.linspace(0.025, 1.0, 40):
-            stop = since.towards(target, float(share))
-            slow = track(chain, slow, stop, branch=FRONT_UP, reading=reading, since=last).best.q
+        for fraction in np.linspace(0.025, 1.0, 40):
+            stop = since.towards(target, float(fraction))
+            slow = track(chain, slow, stop, branch=FRONT_UP, priority=priority, since=last).best.q
             last = stop
         agreed += np.allclose(fast.best.q, slow, atol=1e-6)
     assert agreed >= 11
@@ -198,12 +198,12 @@ def test_a_fast_drag_ends_where_the_slow_one_does(
 def test_what_is_reached_is_reached_exactly(chain: Chain, rng: np.random.Generator) -> None:
     for _ in range(50):
         q = rng.uniform(chain.lower + 0.1, chain.upper - 0.1)
-        wished = ToolTarget.at(chain, q + rng.normal(scale=0.02, size=5))
-        tracked = track(chain, q, wished, branch=branch_of(chain, q))
+        desired = ToolTarget.at(chain, q + rng.normal(scale=0.02, size=5))
+        tracked = track(chain, q, desired, branch=branch_of(chain, q))
         if tracked.status is TrackingStatus.OK:
-            assert np.allclose(forward(chain, tracked.best.q)[:3, 3], wished.position, atol=1e-12)
+            assert np.allclose(forward(chain, tracked.best.q)[:3, 3], desired.position, atol=1e-12)
             assert pitch_and_roll(chain, tracked.best.q) == pytest.approx(
-                (wished.pitch, wished.roll), abs=1e-9
+                (desired.pitch, desired.roll), abs=1e-9
             )
 
 
@@ -224,11 +224,11 @@ def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
     assert len(seen) == 4
 
 
-@pytest.mark.parametrize("reading", Reading)
-def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, reading: Reading) -> None:
+@pytest.mark.parametrize("priority", Priority)
+def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, priority: Priority) -> None:
     for position in ([9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [-3.0, 0.0, -3.0]):
         target = ToolTarget(np.array(position), 40.0, -40.0)
-        tracked = track(chain, READY, target, branch=FRONT_UP, reading=reading)
+        tracked = track(chain, READY, target, branch=FRONT_UP, priority=priority)
         assert np.isfinite(tracked.best.q).all()
         assert chain.within_limits(tracked.best.q)
 
@@ -240,14 +240,14 @@ def test_a_drag_too_long_for_one_call_goes_on_with_the_next(chain: Chain) -> Non
     first = track(chain, READY, target, branch=FRONT_UP, since=since)
     assert first.since is not None
     assert math.dist(first.since.position, target.position) > 0.1
-    for reading in (Reading.POSE, Reading.POSITION):
-        best = arrived(chain, READY, target, since, reading).best
+    for priority in (Priority.POSE, Priority.POSITION):
+        best = arrived(chain, READY, target, since, priority).best
         assert np.allclose(forward(chain, best.q)[:3, 3], target.position, atol=1e-12)
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("priority", Priority)
 def test_a_call_looks_for_a_bounded_number_of_poses(
-    chain: Chain, reading: Reading, monkeypatch: pytest.MonkeyPatch
+    chain: Chain, priority: Priority, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However far and however blocked the way is."""
     sought = 0
@@ -255,26 +255,26 @@ def test_a_call_looks_for_a_bounded_number_of_poses(
     def counted(*args: Any) -> NearestPosture:
         nonlocal sought
         sought += 1
-        return nearest_stance(*args)
+        return nearest_posture(*args)
 
-    monkeypatch.setattr(tracker, "nearest_stance", counted)
+    monkeypatch.setattr(tracker, "nearest_posture", counted)
     rng = np.random.default_rng(3)
     most = 0
     for q in rng.uniform(chain.lower, chain.upper, size=(40, 5)):
         since = ToolTarget.at(chain, q)
         target = ToolTarget(rng.normal(size=3), since.pitch + 3.0 * rng.normal(), 0.0)
         before = sought
-        track(chain, q, target, branch=branch_of(chain, q), reading=reading, since=since)
+        track(chain, q, target, branch=branch_of(chain, q), priority=priority, since=since)
         most = max(most, sought - before)
-    assert EFFORT // 2 < most <= EFFORT + 1
+    assert MAX_POSES // 2 < most <= MAX_POSES + 1
 
 
-@pytest.mark.parametrize("reading", Reading)
+@pytest.mark.parametrize("priority", Priority)
 @pytest.mark.parametrize("far", [1e3, 1e9, 1e300])
-def test_a_drag_without_measure_has_an_end(chain: Chain, reading: Reading, far: float) -> None:
+def test_a_drag_without_measure_has_an_end(chain: Chain, priority: Priority, far: float) -> None:
     since = ToolTarget.at(chain, READY)
     target = ToolTarget(far * np.array([0.4, 0.8, 0.4]), since.pitch, since.roll)
-    best = arrived(chain, READY, target, since, reading).best
+    best = arrived(chain, READY, target, since, priority).best
     assert np.isfinite(best.position_error)
     assert math.atan2(best.T[1, 3], best.T[0, 3]) == pytest.approx(math.atan2(0.8, 0.4), abs=1e-3)
 
@@ -316,8 +316,8 @@ def test_a_pitch_that_no_hop_leads_to_turns_nothing_away(chain: Chain) -> None:
         position = since.position + rng.normal(scale=0.05, size=3)
         pitch = since.pitch + (1.0 if side else -1.0) * rng.uniform(0.0, 1.5)
         target = ToolTarget(position, pitch, since.roll)
-        tracked = track(chain, q, target, branch=branch_of(chain, q), reading=Reading.PITCH)
+        tracked = track(chain, q, target, branch=branch_of(chain, q), priority=Priority.PITCH)
         pitch, _ = pitch_and_roll(chain, tracked.best.q)
         was, now = (math.remainder(p - target.pitch, math.tau) for p in (since.pitch, pitch))
-        if np.abs(tracked.best.q - q).max() > HOP or tracked.status is TrackingStatus.HELD:
+        if np.abs(tracked.best.q - q).max() > HOP or tracked.status is TrackingStatus.GAP:
             assert abs(now) <= abs(was) + 1e-9

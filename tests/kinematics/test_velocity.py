@@ -106,7 +106,7 @@ def test_limit_distances(chain: Chain) -> None:
 
 
 @pytest.mark.parametrize("frame", JogFrame)
-def test_a_jog_goes_where_it_is_told_and_keeps_pitch_and_roll(
+def test_jog_follows_its_direction_and_keeps_pitch_and_roll(
     chain: Chain, frame: JogFrame, rng: np.random.Generator
 ) -> None:
     """Well inside, slowly: the tool point exactly, and the two rotations the arm is free to do."""
@@ -175,7 +175,7 @@ def test_in_a_singularity_a_jog_is_bounded(chain: Chain, V: FloatArray) -> None:
     assert np.allclose(jog(chain, np.zeros(5), np.eye(6)[3], JogFrame.BASE, DT), 0.0, atol=1e-9)
 
 
-def test_damping_bounds_the_rates_of_a_small_wish(chain: Chain) -> None:
+def test_damping_bounds_the_rates_of_a_small_target(chain: Chain) -> None:
     """Towards the stretched arm, without limits of speed in the way."""
     V = np.array([0.0, 0.0, 0.0, 1e-4, 0.0, 0.0])
     bound = 1.21 / WELL_CONDITIONED * 1e-4 / characteristic_length(chain)
@@ -201,33 +201,33 @@ def test_a_joint_beyond_its_limit_may_only_come_back(chain: Chain) -> None:
         (READY, np.zeros(6), math.inf, "above 0"),
     ],
 )
-def test_what_is_no_jog_is_refused(
+def test_invalid_jog_is_refused(
     chain: Chain, q: FloatArray, V: FloatArray, dt: float, said: str
 ) -> None:
     with pytest.raises(InputError, match=said):
         jog(chain, q, V, JogFrame.BASE, dt)
 
 
-def test_badges_say_what_a_branch_costs(chain: Chain) -> None:
+def test_branch_metrics_give_the_cost_of_a_branch(chain: Chain) -> None:
     T = forward(chain, READY)
-    badges = branches(chain, T, READY)
-    assert tuple(badge.branch for badge in badges) == BRANCHES
-    here = badges[0]
+    all_metrics = branches(chain, T, READY)
+    assert tuple(metrics.branch for metrics in all_metrics) == BRANCHES
+    here = all_metrics[0]
     assert here.distance == pytest.approx(0.0, abs=1e-9)
     assert here.within_limits
-    for badge in badges:
-        assert isinstance(badge, BranchMetrics)
-        assert np.allclose(forward(chain, badge.q), T, atol=1e-9)
-        assert badge.position_error < 1e-9
-        assert badge.within_limits == chain.within_limits(badge.q)
-        way = np.abs(badge.q - READY)
-        assert badge.distance == way.max()
-        assert badge.time == pytest.approx((way / chain.speed).max())
-        assert badge.time >= badge.distance / chain.speed.max()
-        assert badge.smallest_singular_value == singular_values(chain, badge.q)[-1]
+    for metrics in all_metrics:
+        assert isinstance(metrics, BranchMetrics)
+        assert np.allclose(forward(chain, metrics.q), T, atol=1e-9)
+        assert metrics.position_error < 1e-9
+        assert metrics.within_limits == chain.within_limits(metrics.q)
+        way = np.abs(metrics.q - READY)
+        assert metrics.distance == way.max()
+        assert metrics.time == pytest.approx((way / chain.speed).max())
+        assert metrics.time >= metrics.distance / chain.speed.max()
+        assert metrics.smallest_singular_value == singular_values(chain, metrics.q)[-1]
     # The other elbow takes a way of its own, the other shoulder half a turn of axis 1.
-    assert badges[2].distance >= math.pi - 1e-9
-    assert 0.1 < badges[1].distance < math.pi
+    assert all_metrics[2].distance >= math.pi - 1e-9
+    assert 0.1 < all_metrics[1].distance < math.pi
 
 
 def test_twists_are_of_the_tool_point(chain: Chain) -> None:

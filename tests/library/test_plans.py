@@ -96,7 +96,7 @@ def test_goal_may_be_a_pose(base_arm: katana450.Arm) -> None:
 def test_plan_keeps_clear_of_a_scene(tmp_path: Any) -> None:
     file = tmp_path / "scene.yaml"
     file.write_text(
-        "scene: 1\nthings:\n- {name: wall, form: box, size: [20, 400, 600], "
+        "scene: 1\nobjects:\n- {name: wall, shape: box, size: [20, 400, 600], "
         "pose: [560, 0, 300, 0, 0, 0]}\n"
     )
     arm = katana450.load(scene=file)

@@ -11,8 +11,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
-from katana450.extensions.media.stage import Stage
+from katana450.assembly.robot_session import describe_robot
+from katana450.extensions.media.stage import RenderStage
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
@@ -22,7 +22,7 @@ class Workshop(NamedTuple):
 
     robot: Robot
     session: Session
-    stage: Stage
+    stage: RenderStage
 
     @property
     def ready(self) -> State:
@@ -37,5 +37,5 @@ class Workshop(NamedTuple):
 
 @pytest.fixture(scope="session")
 def workshop() -> Workshop:
-    robot, session, _ = described(Settings(), URDF_PATH, None)
-    return Workshop(robot, session, Stage(robot, session, load_props()))
+    robot, session, _ = describe_robot(Settings(), URDF_PATH, None)
+    return Workshop(robot, session, RenderStage(robot, session, load_props()))

@@ -46,7 +46,7 @@ def test_a_ray_meets_what_is_projected_to_its_pixel(
         ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.7, (10, 0)),
     ],
 )
-def test_what_is_no_camera_is_refused(
+def test_invalid_camera_is_refused(
     position: tuple[float, float, float],
     target: tuple[float, float, float],
     fov: float,

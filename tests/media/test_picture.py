@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.control.things import Form, Thing
-from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
-from katana450.arm.robot.camera import Camera as Viewpoint
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.initial_camera import InitialCamera as Viewpoint
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.hits import FLOOR, NOWHERE, first_hits
 from katana450.extensions.media.line import tube
 from katana450.extensions.media.picture import Picture, picture
-from katana450.extensions.media.scene import Item, Scene
-from katana450.extensions.media.sight import FLOOR, NOWHERE, look
+from katana450.extensions.media.scene import Item, RenderScene
 from katana450.extensions.media.tracer import Tracer
 from katana450.extensions.media.water import CUP
 from katana450.maths.geometry import se3
@@ -46,10 +46,12 @@ def filled(workshop: Workshop) -> Picture:
     return picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT, 1)
 
 
-def ball(radius: float) -> Shape:
+def ball(radius: float) -> VisualMesh:
     mesh = trimesh.creation.icosphere(subdivisions=4, radius=radius)
     normals = np.asarray(mesh.vertices) / radius
-    return Shape(Material("red", (0.8, 0.1, 0.1)), mesh.vertices, normals, np.asarray(mesh.faces))
+    return VisualMesh(
+        Material("red", (0.8, 0.1, 0.1)), mesh.vertices, normals, np.asarray(mesh.faces)
+    )
 
 
 def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture) -> None:
@@ -65,13 +67,15 @@ def test_the_arm_covers_what_pillow_says(
     """Another program's projection of another reader's meshes, posed by that reader."""
     view: Viewpoint = camera(katana)
     at = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))
-    scene = Scene.of(workshop.stage.arm(workshop.session.begin(np.array(pose[:5]), pose[5], 0.0)))
+    scene = RenderScene.of(
+        workshop.stage.arm(workshop.session.begin(np.array(pose[:5]), pose[5], 0.0))
+    )
     # Through the middle of each pixel, as in a picture, but without its light.
     y, x = np.mgrid[0.5:SIZE, 0.5:SIZE].reshape(2, -1).astype(np.float32)
     eye = np.array(at.position, dtype=np.float32)
-    sight = look(scene, Tracer(scene), eye, at.directions(x, y), -10.0)
+    hits = first_hits(scene, Tracer(scene), eye, at.directions(x, y), -10.0)
     theirs = silhouette(placed(URDF_PATH, katana.values(pose)), view)
-    assert overlap(sight.solid.reshape(SIZE, SIZE), theirs) >= 0.98
+    assert overlap(hits.solid.reshape(SIZE, SIZE), theirs) >= 0.98
 
 
 def test_the_arm_stands_before_its_room_whatever_the_theme(workshop: Workshop) -> None:
@@ -104,11 +108,11 @@ def test_cup_and_water_are_seen(workshop: Workshop, filled: Picture) -> None:
     ).mean() > 0.99
 
 
-def test_a_thing_of_ones_own_is_seen_where_it_stands(workshop: Workshop) -> None:
+def test_a_object_of_ones_own_is_seen_where_it_stands(workshop: Workshop) -> None:
     T = se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0))
-    box = Thing("crate", Form.BOX, (0.1, 0.1, 0.1), T)
-    state = replace(workshop.ready, things=(box,))
-    shown = picture(workshop.stage.around(state), (), NEAR, LIGHT, 1)
+    box = SceneObject("crate", Shape.BOX, (0.1, 0.1, 0.1), T)
+    state = replace(workshop.ready, objects=(box,))
+    shown = picture(workshop.stage.surrounding_items(state), (), NEAR, LIGHT, 1)
     where = np.argwhere(shown.shows("crate")).mean(axis=0)
     away = np.array((0.4, 0.0, 0.05)) - NEAR.position
     right, up, ahead = NEAR.frame @ away / NEAR.pixel

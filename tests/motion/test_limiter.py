@@ -7,7 +7,7 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 
 DT = 0.01
 LIMITS = Limits(
@@ -28,7 +28,7 @@ def inside(rng: np.random.Generator) -> FloatArray:
     return rng.uniform(LIMITS.lower, LIMITS.upper)
 
 
-def check(before: Motion, after: Motion, dt: float = DT) -> None:
+def check(before: JointMotion, after: JointMotion, dt: float = DT) -> None:
     """One step keeps to every limit, and is a step of a motion and not a leap."""
     assert (after.q >= LIMITS.lower - 1e-9).all()
     assert (after.q <= LIMITS.upper + 1e-9).all()
@@ -43,14 +43,14 @@ def test_a_move_ends_at_rest_exactly_at_its_goal(limiter: Limiter) -> None:
     rng = np.random.default_rng(1)
     for _ in range(40):
         start, goal = inside(rng), inside(rng)
-        motion = Motion.rest(start)
+        motion = JointMotion.rest(start)
         for _ in range(2000):
             after = limiter.towards(motion, goal, DT)
             check(motion, after)
             # On the straight line between the two, from rest.
             way = goal - start
-            share = (after.q - start) @ way / (way @ way)
-            assert np.abs(after.q - start - share * way).max() < 1e-6
+            fraction = (after.q - start) @ way / (way @ way)
+            assert np.abs(after.q - start - fraction * way).max() < 1e-6
             motion = after
             if motion.at_rest:
                 break
@@ -59,7 +59,7 @@ def test_a_move_ends_at_rest_exactly_at_its_goal(limiter: Limiter) -> None:
 
 def test_goals_that_change_at_any_tick_break_no_limit(limiter: Limiter) -> None:
     rng = np.random.default_rng(2)
-    motion, goal, share = Motion.rest(inside(rng)), inside(rng), 1.0
+    motion, goal, fraction = JointMotion.rest(inside(rng)), inside(rng), 1.0
     for tick in range(8000):
         if rng.random() < 0.15:
             # Limits are goals more often than chance would have it.
@@ -67,9 +67,11 @@ def test_goals_that_change_at_any_tick_break_no_limit(limiter: Limiter) -> None:
             ends = rng.random(5) < 0.3
             goal[ends] = np.where(rng.random(5) < 0.5, LIMITS.lower, LIMITS.upper)[ends]
         if rng.random() < 0.02:
-            share = float(rng.uniform(0.05, 1.0))
+            fraction = float(rng.uniform(0.05, 1.0))
         stopping = tick % 400 > 380
-        after = limiter.stop(motion, DT) if stopping else limiter.towards(motion, goal, DT, share)
+        after = (
+            limiter.stop(motion, DT) if stopping else limiter.towards(motion, goal, DT, fraction)
+        )
         check(motion, after)
         motion = after
 
@@ -77,10 +79,10 @@ def test_goals_that_change_at_any_tick_break_no_limit(limiter: Limiter) -> None:
 def test_a_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
     rng = np.random.default_rng(3)
     for _ in range(30):
-        motion, goal = Motion.rest(inside(rng)), inside(rng)
+        motion, goal = JointMotion.rest(inside(rng)), inside(rng)
         for _ in range(int(rng.integers(5, 120))):
             motion = limiter.towards(motion, goal, DT)
-        halt, time = limiter.halt(motion), limiter.time_to_halt(motion)
+        stopping_point, time = limiter.stopping_point(motion), limiter.stopping_time(motion)
         # No jerk-limited stop is faster than at full braking, nor slower than that after the
         # jerk it takes to get there and away from there.
         bang = (np.abs(motion.qd) / LIMITS.acceleration).max()
@@ -92,11 +94,11 @@ def test_a_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
             check(motion, after)
             motion, ticks = after, ticks + 1
         assert ticks <= np.ceil(time / DT) + 1
-        assert np.abs(motion.q - halt).max() < 1e-6
+        assert np.abs(motion.q - stopping_point).max() < 1e-6
 
 
 def test_a_share_of_the_speed_is_kept(limiter: Limiter) -> None:
-    motion, goal = Motion.rest(np.zeros(5)), LIMITS.lower
+    motion, goal = JointMotion.rest(np.zeros(5)), LIMITS.lower
     fastest = np.zeros(5)
     for _ in range(3000):
         motion = limiter.towards(motion, goal, DT, 0.25)
@@ -108,38 +110,38 @@ def test_a_share_of_the_speed_is_kept(limiter: Limiter) -> None:
 
 def test_rates_are_reached_and_brake_before_a_limit(limiter: Limiter) -> None:
     rng = np.random.default_rng(4)
-    motion = Motion.rest(inside(rng))
+    motion = JointMotion.rest(inside(rng))
     for _ in range(60):
         qd = rng.uniform(-1.5, 1.5, 5) * LIMITS.speed
         for _ in range(int(rng.integers(1, 150))):
             after = limiter.at_rate(motion, qd, DT)
             check(motion, after)
             motion = after
-    motion = Motion.rest(np.zeros(5))
+    motion = JointMotion.rest(np.zeros(5))
     slow = 0.1 * LIMITS.speed * (1, -1, 1, 1, -1)
     for _ in range(100):
         motion = limiter.at_rate(motion, slow, DT)
     assert np.allclose(motion.qd, slow)
 
 
-def test_what_can_be_stopped_in_time_stops_close_before_the_limit(limiter: Limiter) -> None:
+def test_jog_stops_close_before_the_limit(limiter: Limiter) -> None:
     rng = np.random.default_rng(8)
     for room in np.geomspace(1e-4, 3.0, 60):
         ends = np.where(rng.random(5) < 0.5, LIMITS.lower, LIMITS.upper)
         q = ends + np.where(ends == LIMITS.lower, room, -room)
         q = np.clip(q, LIMITS.lower + 1e-4, LIMITS.upper - 1e-4)
         for rates, end in zip(limiter.stoppable(q), (LIMITS.lower, LIMITS.upper), strict=True):
-            way = (limiter.halt(Motion(q, rates, np.zeros(5))) - q) / (end - q)
+            way = (limiter.stopping_point(JointMotion(q, rates, np.zeros(5))) - q) / (end - q)
             assert (way > 0.5).all()
             assert (way < 1.0).all()
 
 
 def test_nothing_moves_without_time_or_reason(limiter: Limiter) -> None:
-    motion = Motion.rest(np.zeros(5))
+    motion = JointMotion.rest(np.zeros(5))
     assert limiter.towards(motion, LIMITS.upper, 0.0) is motion
     assert limiter.towards(motion, np.zeros(5), DT) is motion
     assert limiter.stop(motion, DT) is motion
-    assert limiter.time_to_halt(motion) == 0.0
+    assert limiter.stopping_time(motion) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.maths.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 from katana450.maths.motion.pursuit import braked, pursued
 from katana450.maths.motion.stream import Stream
 
@@ -29,33 +29,35 @@ def test_where_joints_come_to_rest_is_what_the_limiter_says() -> None:
             rng.uniform(-each, each) for each in (LIMITS.upper, LIMITS.speed, LIMITS.acceleration)
         )
         found = braked(q, qd, qdd, LIMITS.acceleration, LIMITS.jerk)
-        np.testing.assert_allclose(found, limiter.halt(Motion(q, qd, qdd)), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            found, limiter.stopping_point(JointMotion(q, qd, qdd)), rtol=0, atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_limits_and_bounds_hold_whatever_is_followed(seed: int) -> None:
+def test_limits_hold_for_any_stream(seed: int) -> None:
     """Also with ticks of uneven length."""
     rng, limiter = np.random.default_rng(seed), Limiter(LIMITS)
-    now, bounds = Motion.rest(np.zeros(3)), (np.full(3, -0.4), np.full(3, 0.3))
+    now, bounds = JointMotion.rest(np.zeros(3)), (np.full(3, -0.4), np.full(3, 0.3))
     for number in range(3000):
         if number % 20 == 0:
-            wanted = Motion(*(rng.normal(scale=scale, size=3) for scale in (0.6, 2.0, 5.0)))
+            wanted = JointMotion(*(rng.normal(scale=scale, size=3) for scale in (0.6, 2.0, 5.0)))
         dt = TICK if number % 7 else float(rng.uniform(0.002, 0.05))
         after = pursued(limiter, now, wanted, bounds, dt)
         assert (np.abs(after.qd) <= LIMITS.speed + 1e-9).all()
         assert (np.abs(after.qdd) <= LIMITS.acceleration + 1e-9).all()
         assert (np.abs(after.qdd - now.qdd) <= LIMITS.jerk * dt + 1e-9).all()
-        rest = limiter.halt(after)
+        rest = limiter.stopping_point(after)
         assert (rest >= bounds[0] - 1e-9).all()
         assert (rest <= bounds[1] + 1e-9).all()
         now = after
 
 
 def test_a_speed_scale_that_falls_slows_down() -> None:
-    limiter, now = Limiter(LIMITS), Motion.rest(np.zeros(3))
+    limiter, now = Limiter(LIMITS), JointMotion.rest(np.zeros(3))
     wide = np.full(3, -3.0), np.full(3, 3.0)
     for number in range(200):
-        wanted = Motion(np.full(3, 0.004 * number), np.full(3, 0.4), np.zeros(3))
+        wanted = JointMotion(np.full(3, 0.004 * number), np.full(3, 0.4), np.zeros(3))
         now = pursued(limiter, now, wanted, wide, TICK, 1.0 if number < 100 else 0.1)
     assert (np.abs(now.qd) <= 0.1 * LIMITS.speed + 1e-9).all()
 
@@ -69,7 +71,7 @@ def test_uneven_arrival_is_no_noise_of_the_rates() -> None:
         arrived = max(arrived + 1e-4, t + float(rng.exponential(0.003)))
         q = np.array([0.4 * math.sin(math.tau * t / 3.0)])
         if stream is None:
-            stream = Stream.begun(arrived, q, None)
+            stream = Stream.begin(arrived, q, None)
             continue
         stream = stream.followed_by(arrived, q, None, np.array([2.5]))
         seen = stream.at(arrived + 0.005)

@@ -12,47 +12,6 @@ PACKAGE = ROOT / "app" / "katana450"
 GLOSSARY = ROOT / "docs" / "glossary.md"
 SECTION = "## One name, several classes"
 
-# Names that stand for different things by accident. This list only shrinks: rename one of the
-# classes and take the name out, or add the reason for both to the glossary.
-TO_BE_RENAMED = {
-    "Arm",
-    "Camera",
-    "Choice",
-    "Draft",
-    "Ellipsoid",
-    "Entry",
-    "Flow",
-    "Follower",
-    "Gripper",
-    "Joints",
-    "Line",
-    "Lines",
-    "Links",
-    "Load",
-    "Look",
-    "Motion",
-    "Names",
-    "Order",
-    "Pace",
-    "Pause",
-    "Place",
-    "Placed",
-    "Program",
-    "Reading",
-    "Scene",
-    "Setting",
-    "Shape",
-    "Stage",
-    "Surface",
-    "Table",
-    "Tool",
-    "Turn",
-    "Use",
-    "Value",
-    "View",
-    "World",
-}
-
 
 def defined_twice(package: Path) -> set[str]:
     """Return the names of public classes with several definitions at the top of modules."""
@@ -78,13 +37,8 @@ def listed() -> set[str]:
 
 
 def test_class_defined_twice_has_a_reason_in_the_glossary() -> None:
-    unexplained = defined_twice(PACKAGE) - listed() - TO_BE_RENAMED
+    unexplained = defined_twice(PACKAGE) - listed()
     assert not unexplained, "choose another name, or give the reason in docs/glossary.md"
-
-
-def test_list_of_names_to_be_changed_shrinks() -> None:
-    assert not TO_BE_RENAMED - defined_twice(PACKAGE), "take these names out of TO_BE_RENAMED"
-    assert not TO_BE_RENAMED & listed(), "these names have a reason in docs/glossary.md already"
 
 
 def test_glossary_lists_no_name_with_one_class() -> None:

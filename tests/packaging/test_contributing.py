@@ -6,7 +6,7 @@ import dataclasses
 import re
 from pathlib import Path
 
-from katana450.arm.control.traits import Traits
+from katana450.arm.control.traits import CommandTraits
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -26,5 +26,5 @@ def test_files_that_the_recipes_name_exist() -> None:
 
 
 def test_every_trait_of_a_command_is_explained() -> None:
-    for field in dataclasses.fields(Traits):
+    for field in dataclasses.fields(CommandTraits):
         assert f"| `{field.name}" in TEXT, field.name

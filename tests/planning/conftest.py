@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.tool import ToolTarget
@@ -43,7 +43,7 @@ def lines(at: ToolTarget) -> ToolLines:
 
 
 @pytest.fixture(scope="session")
-def paths(arm: Arm, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
+def paths(arm: ArmModel, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
     """One of each kind, by name."""
     chain = arm.chain
     at = ToolTarget.at(chain, ready)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
@@ -18,7 +18,7 @@ from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import joint_derivatives, point_derivatives
 
 
-def random_vias(arm: Arm, seed: int) -> tuple[FloatArray, FloatArray]:
+def random_vias(arm: ArmModel, seed: int) -> tuple[FloatArray, FloatArray]:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(2, 6))
     vias = rng.uniform(arm.chain.lower, arm.chain.upper, (count, 5))
@@ -27,7 +27,7 @@ def random_vias(arm: Arm, seed: int) -> tuple[FloatArray, FloatArray]:
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_corners_join_their_legs_smoothly_and_stay_inside(arm: Arm, seed: int) -> None:
+def test_corners_join_their_legs_smoothly_and_stay_inside(arm: ArmModel, seed: int) -> None:
     vias, blend = random_vias(arm, seed)
     path = JointPath(arm.chain, vias, blend)
     assert (path.start == vias[0]).all()
@@ -46,7 +46,7 @@ def test_corners_join_their_legs_smoothly_and_stay_inside(arm: Arm, seed: int) -
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_the_tool_point_is_that_of_forward_kinematics(arm: Arm, seed: int) -> None:
+def test_the_tool_point_is_that_of_forward_kinematics(arm: ArmModel, seed: int) -> None:
     path = JointPath(arm.chain, *random_vias(arm, seed))
     sigma = np.linspace(0.0, 1.0, 9)
     q, p = joint_derivatives(path, sigma)[0], point_derivatives(path, sigma)[0]
@@ -54,7 +54,7 @@ def test_the_tool_point_is_that_of_forward_kinematics(arm: Arm, seed: int) -> No
         assert point == pytest.approx(forward(arm.chain, angles)[:3, 3], abs=1e-14)
 
 
-def test_a_leg_alone_is_straight(arm: Arm) -> None:
+def test_a_leg_alone_is_straight(arm: ArmModel) -> None:
     vias = np.array([[0.0, -1.0, 1.0, 0.0, 0.0], [1.0, -0.5, 0.5, 0.3, 0.0]])
     path = JointPath(arm.chain, vias)
     for sigma in (0.0, 0.3, 1.0):
@@ -62,7 +62,7 @@ def test_a_leg_alone_is_straight(arm: Arm) -> None:
         assert q == pytest.approx(vias[0] + sigma * (vias[1] - vias[0]), abs=1e-15)
 
 
-def test_a_smaller_blend_passes_its_via_nearer(arm: Arm) -> None:
+def test_a_smaller_blend_passes_its_via_nearer(arm: ArmModel) -> None:
     vias, _ = random_vias(arm, 3)
     sigma = np.linspace(0.0, 1.0, 2000)
     away = []
@@ -74,7 +74,7 @@ def test_a_smaller_blend_passes_its_via_nearer(arm: Arm) -> None:
         assert less < more
 
 
-def test_vias_that_make_no_path_are_refused(arm: Arm, ready: FloatArray) -> None:
+def test_vias_that_make_no_path_are_refused(arm: ArmModel, ready: FloatArray) -> None:
     there = ready + 0.1
     none = np.empty(0)
     for vias, blend in (

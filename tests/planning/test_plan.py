@@ -7,32 +7,32 @@ import re
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.shape import box, half_space
-from katana450.maths.collision.world import World, obstacle
+from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.clearance import Room
+from katana450.maths.planning.clearance import SweptClearance
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, check_clear, plan
-from katana450.maths.planning.sampling import way_round
+from katana450.maths.planning.sampling import collision_free_path
 from katana450.maths.planning.scaling import Bounds
 from katana450.maths.planning.sweep import Sweep
 
 
 @pytest.fixture(scope="module")
-def bounds(arm: Arm) -> Bounds:
+def bounds(arm: ArmModel) -> Bounds:
     return Bounds(arm.limits, 0.5)
 
 
 @pytest.fixture(scope="module")
-def bare(robot: Robot) -> World:
+def bare(robot: Robot) -> CollisionWorld:
     """The arm without anything round it."""
     found, _ = world_of(robot)
     assert found is not None
@@ -40,42 +40,42 @@ def bare(robot: Robot) -> World:
 
 
 @pytest.fixture(scope="module")
-def world(bare: World) -> World:
+def world(bare: CollisionWorld) -> CollisionWorld:
     """The arm on its table, a wall as thin as a sheet beside it."""
     wall_at = se3.from_rotation_translation(np.eye(3), (0.35, 0.0, 0.16))
     wall = obstacle("wall", wall_at, box((0.30, 0.001, 0.32)))
     return bare.with_obstacles([obstacle("table", np.eye(4), half_space()), wall])
 
 
-def brute_force(path: Path, world: World, places: int = 400) -> float:
+def brute_force(path: Path, world: CollisionWorld, places: int = 400) -> float:
     """[m] the least clearance seen at many places."""
     sweep = Sweep(path)
     found = (world.nearest(sweep.at(s, 0.0)) for s in np.linspace(0.0, 1.0, places).tolist())
     return min(contact.distance for contact in found if contact is not None)
 
 
-def across(arm: Arm, lift: float) -> JointPath:
+def across(arm: ArmModel, lift: float) -> JointPath:
     """From one side of the wall to the other, in one leg."""
     q = np.radians([[50.0, -60.0, 80.0, 10.0, 0.0], [-50.0, -60.0, 80.0, 10.0, 0.0]])
     return JointPath(arm.chain, q + np.array([0.0, lift, 0.0, 0.0, 0.0]))
 
 
-def test_a_wall_thinner_than_any_step_is_not_passed(arm: Arm, world: World) -> None:
+def test_a_wall_thinner_than_any_step_is_not_passed(arm: ArmModel, world: CollisionWorld) -> None:
     path = across(arm, 0.0)
     with pytest.raises(BlockedError, match=r"wall would be .* mm are kept") as told:
         check_clear(path, world, 0.0)
-    share, *point = map(
+    fraction, *point = map(
         float, re.findall(r"blocked (\d+) % .*\((-?\d+), (-?\d+), (-?\d+)\)", str(told.value))[0]
     )
     sweep = Sweep(path)
-    places = [sweep.at(0.01 * (share + off), 0.0) for off in np.linspace(-0.6, 0.6, 41)]
+    places = [sweep.at(0.01 * (fraction + off), 0.0) for off in np.linspace(-0.6, 0.6, 41)]
     near = [world.nearest(x) for x in places]
     assert min(contact.distance for contact in near if contact is not None) < MARGIN
     tools = np.array([1e3 * forward(arm.chain, x[:5])[:3, 3] for x in places])
     assert np.abs(tools - point).max(axis=1).min() < 3.0
 
 
-def test_the_nearest_clearance_is_that_of_brute_force(arm: Arm, world: World) -> None:
+def test_the_nearest_clearance_is_that_of_brute_force(arm: ArmModel, world: CollisionWorld) -> None:
     rng, looked, near = np.random.default_rng(8), 0, 0
     beside = across(arm, 0.0).start
     while looked < 4:
@@ -88,7 +88,7 @@ def test_the_nearest_clearance_is_that_of_brute_force(arm: Arm, world: World) ->
             assert seen < MARGIN + 1e-3
             continue
         sweep = Sweep(path)
-        found = sweep.nearest(Room.about(world, MARGIN, sweep.at(0.0, 0.0)), 0.0)
+        found = sweep.nearest(SweptClearance.about(world, MARGIN, sweep.at(0.0, 0.0)), 0.0)
         assert found is not None
         looked += 1
         near += seen < 0.06
@@ -98,23 +98,23 @@ def test_the_nearest_clearance_is_that_of_brute_force(arm: Arm, world: World) ->
     assert near > 0
 
 
-def test_a_way_round_is_clear_and_the_same_again(arm: Arm, world: World) -> None:
+def test_a_way_round_is_clear_and_the_same_again(arm: ArmModel, world: CollisionWorld) -> None:
     blocked = across(arm, 0.0)
-    path = way_round(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
+    path = collision_free_path(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
     assert brute_force(path, world) >= MARGIN - 1e-4
-    again = way_round(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
+    again = collision_free_path(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
     assert (path.vias == again.vias).all()
     assert (path.blend == again.blend).all()
 
 
-def test_an_end_in_the_wall_is_refused(arm: Arm, world: World) -> None:
+def test_an_end_in_the_wall_is_refused(arm: ArmModel, world: CollisionWorld) -> None:
     clear, inside = across(arm, 0.0).start, np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
     with pytest.raises(BlockedError, match=r"At the end .* too near"):
-        way_round(arm.chain, clear, inside, world, 0.0, 0)
+        collision_free_path(arm.chain, clear, inside, world, 0.0, 0)
 
 
-def test_a_search_that_finds_nothing_ends(
-    arm: Arm, bare: World, monkeypatch: pytest.MonkeyPatch
+def test_unsuccessful_search_ends(
+    arm: ArmModel, bare: CollisionWorld, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Past a wall without end the arm would have to reach over itself."""
     wall_at = se3.from_rotation_translation(np.eye(3), (1.15, 0.0, 0.0))
@@ -122,11 +122,13 @@ def test_a_search_that_finds_nothing_ends(
     monkeypatch.setattr("katana450.maths.planning.sampling.EFFORT", 5)
     path = across(arm, 0.0)
     with pytest.raises(BlockedError, match=r"found in 5 tries from seed 0\. The straight .*wall"):
-        way_round(arm.chain, path.start, path.end, endless, 0.0, 0)
+        collision_free_path(arm.chain, path.start, path.end, endless, 0.0, 0)
 
 
-def test_a_way_out_of_a_contact_is_allowed_and_deeper_is_not(arm: Arm, world: World) -> None:
-    """As when a thing is put where the arm already is."""
+def test_a_way_out_of_a_contact_is_allowed_and_deeper_is_not(
+    arm: ArmModel, world: CollisionWorld
+) -> None:
+    """As when an object is put where the arm already is."""
     touching = np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
     contact = world.nearest(np.append(touching, 0.0))
     assert contact is not None
@@ -138,7 +140,7 @@ def test_a_way_out_of_a_contact_is_allowed_and_deeper_is_not(arm: Arm, world: Wo
 
 
 def test_paths_that_do_not_meet_are_refused(
-    arm: Arm, bounds: Bounds, paths: dict[str, Path], ready: FloatArray
+    arm: ArmModel, bounds: Bounds, paths: dict[str, Path], ready: FloatArray
 ) -> None:
     with pytest.raises(InputError, match=r"Path 2 begins .* deg from where path 1 ends"):
         plan([paths["line"], paths["joints"]], bounds)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
 from katana450.maths.planning.curve import ToolLines
 from katana450.maths.planning.pacing import fastest
@@ -24,7 +24,7 @@ NAMES = ("circle", "line", "pour", "lines", "joints", "via")
 
 
 @pytest.fixture(scope="module")
-def bounds(arm: Arm) -> Bounds:
+def bounds(arm: ArmModel) -> Bounds:
     return Bounds(arm.limits, 0.5)
 
 
@@ -88,7 +88,7 @@ def test_it_takes_not_much_longer_than_it_has_to(
     assert least < scalings[name].duration < most * least
 
 
-def test_a_straight_line_alone_is_at_its_limits(arm: Arm, paths: dict[str, Path]) -> None:
+def test_a_straight_line_alone_is_at_its_limits(arm: ArmModel, paths: dict[str, Path]) -> None:
     """With nothing but the joints to mind, the optimum is known: one joint's own."""
     bounds = Bounds(arm.limits, 50.0)
     scaling = fastest(paths["joints"], bounds)
@@ -149,7 +149,7 @@ def test_the_time_from_rest_to_rest_is_that_of_ruckig(way: float, a: float, j: f
     assert motion_after(trajectory.duration + 1.0, way, a, j) == (way, 0.0, 0.0)
 
 
-def test_numbers_that_are_none_are_refused(arm: Arm) -> None:
+def test_numbers_that_are_none_are_refused(arm: ArmModel) -> None:
     for speed, acceleration in ((0.0, None), (math.nan, None), (0.5, -1.0), (0.5, math.inf)):
         with pytest.raises(InputError, match="above 0"):
             Bounds(arm.limits, speed, acceleration)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
@@ -36,7 +36,7 @@ def q_at(path: Path, sigma: float) -> FloatArray:
 
 
 def test_the_paper_s_circle_is_a_circle_to_a_trillionth_of_a_millimetre(
-    arm: Arm, paths: dict[str, Path]
+    arm: ArmModel, paths: dict[str, Path]
 ) -> None:
     path, chain = paths["circle"], arm.chain_to("flange")
     for number in range(2001):
@@ -47,7 +47,7 @@ def test_the_paper_s_circle_is_a_circle_to_a_trillionth_of_a_millimetre(
         assert abs(math.hypot(y, z + 0.11) - 0.1) < 1e-15
 
 
-def test_its_pitch_stays_and_its_end_is_its_start(arm: Arm, paths: dict[str, Path]) -> None:
+def test_its_pitch_stays_and_its_end_is_its_start(arm: ArmModel, paths: dict[str, Path]) -> None:
     path, chain = paths["circle"], arm.chain_to("flange")
     for sigma in np.linspace(0.0, 1.0, 50).tolist():
         target = ToolTarget.at(chain, q_at(path, sigma))
@@ -58,7 +58,7 @@ def test_its_pitch_stays_and_its_end_is_its_start(arm: Arm, paths: dict[str, Pat
 
 @pytest.mark.parametrize("tool", ["flange", "grasp", "tcp"])
 def test_a_pitch_that_follows_the_circle_leaves_more_room(
-    arm: Arm, circle: ToolArc, tool: str
+    arm: ArmModel, circle: ToolArc, tool: str
 ) -> None:
     """At a constant pitch only the flange gets round, and by 11.9 deg."""
     chain = arm.chain_to(tool)
@@ -71,7 +71,7 @@ def test_a_pitch_that_follows_the_circle_leaves_more_room(
             ToolPath(chain, circle, FRONT_UP, np.zeros(5))
 
 
-def test_an_arc_no_pitch_makes_possible_is_refused(arm: Arm, circle: ToolArc) -> None:
+def test_an_arc_no_pitch_makes_possible_is_refused(arm: ArmModel, circle: ToolArc) -> None:
     with pytest.raises(InputError, match="No pitch"):
         roomiest(arm.chain, FRONT_UP, replace(circle, start=np.array([0.15, 0.0, 0.9])))
 
@@ -124,7 +124,7 @@ def test_one_place_and_many_agree(paths: dict[str, Path], name: str) -> None:
 
 
 def test_lines_are_straight_between_their_corners_and_pass_them_near(
-    arm: Arm, paths: dict[str, Path]
+    arm: ArmModel, paths: dict[str, Path]
 ) -> None:
     path, chain = paths["lines"], arm.chain
     assert isinstance(path, ToolPath)
@@ -134,10 +134,10 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
     legs, on = list(pairwise(points)), 0
     for sigma in np.linspace(0.0, 1.0, 301).tolist():
         T = forward(chain, q_at(path, sigma))
-        wished = np.array([each.c0 for each in curve.at(Jet.variable(sigma))])
-        assert T[:3, 3] == pytest.approx(wished[:3], abs=1e-14)
+        desired = np.array([each.c0 for each in curve.at(Jet.variable(sigma))])
+        assert T[:3, 3] == pytest.approx(desired[:3], abs=1e-14)
         target = ToolTarget.at(chain, q_at(path, sigma))
-        assert (target.pitch, target.roll) == pytest.approx(tuple(wished[3:]), abs=1e-13)
+        assert (target.pitch, target.roll) == pytest.approx(tuple(desired[3:]), abs=1e-13)
         away = min(off_leg(T[:3, 3], *leg) for leg in legs)
         # The farthest from its legs that half of the shorter one with such a blend can be.
         assert away < 0.8 * 0.5 * 0.12
@@ -155,11 +155,11 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
 def off_leg(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
     """[m] How far `p` is from the segment from `a` to `b`."""
     way = b - a
-    share = np.clip((p - a) @ way / max(float(way @ way), 1e-30), 0.0, 1.0)
-    return math.dist(p, a + share * way)
+    fraction = np.clip((p - a) @ way / max(float(way @ way), 1e-30), 0.0, 1.0)
+    return math.dist(p, a + fraction * way)
 
 
-def test_lines_that_are_none_are_refused(arm: Arm, ready: FloatArray) -> None:
+def test_lines_that_are_none_are_refused(arm: ArmModel, ready: FloatArray) -> None:
     at = ToolTarget.at(arm.chain, ready)
     there = ToolTarget(at.position + np.array([0.0, 0.05, 0.0]), at.pitch, at.roll)
     beyond = ToolTarget(at.position + np.array([0.6, 0.0, 0.0]), at.pitch, at.roll)
@@ -181,7 +181,7 @@ def test_lines_that_are_none_are_refused(arm: Arm, ready: FloatArray) -> None:
 
 
 @pytest.mark.parametrize("blend", [0.01, 0.1, 1.0])
-def test_a_corner_however_small_is_no_kink(arm: Arm, ready: FloatArray, blend: float) -> None:
+def test_a_corner_however_small_is_no_kink(arm: ArmModel, ready: FloatArray, blend: float) -> None:
     at = ToolTarget.at(arm.chain, ready)
     steps = ((0.0, 0.0, 0.0), (0.0, 0.08, 0.0), (0.0, 0.0, -0.06), (0.0, -0.05, 0.0))
     vias = tuple(ToolTarget(at.position + step, at.pitch, at.roll) for step in steps)
@@ -195,25 +195,25 @@ def straight(chain: Chain, q: FloatArray, step: tuple[float, float, float]) -> T
     return ToolPath(chain, line, branch_of(chain, q), q)
 
 
-def test_a_line_out_of_reach_is_refused_where_it_leaves(arm: Arm, ready: FloatArray) -> None:
+def test_a_line_out_of_reach_is_refused_where_it_leaves(arm: ArmModel, ready: FloatArray) -> None:
     with pytest.raises(
         InputError, match=r"leaves what the arm reaches.* (\d+\.\d) % along"
     ) as told:
         straight(arm.chain, ready, (0.6, 0.0, 0.0))
-    share = float(str(told.value).split(" % along")[0].split()[-1]) / 100.0
-    straight(arm.chain, ready, (0.6 * (share - 0.01), 0.0, 0.0))
+    fraction = float(str(told.value).split(" % along")[0].split()[-1]) / 100.0
+    straight(arm.chain, ready, (0.6 * (fraction - 0.01), 0.0, 0.0))
     with pytest.raises(InputError, match="reach"):
-        straight(arm.chain, ready, (0.6 * (share + 0.01), 0.0, 0.0))
+        straight(arm.chain, ready, (0.6 * (fraction + 0.01), 0.0, 0.0))
 
 
-def test_a_line_over_a_limit_names_it(arm: Arm, ready: FloatArray) -> None:
+def test_a_line_over_a_limit_names_it(arm: ArmModel, ready: FloatArray) -> None:
     at = ToolTarget.at(arm.chain, ready)
     line = ToolLine(at, ToolTarget(at.position, at.pitch, 4.0))
     with pytest.raises(InputError, match=r"axis 5 over its limit of 171.5 deg 74\.8 % along"):
         ToolPath(arm.chain, line, FRONT_UP, ready)
 
 
-def test_a_limit_touched_between_two_places_is_found(arm: Arm, circle: ToolArc) -> None:
+def test_a_limit_touched_between_two_places_is_found(arm: ArmModel, circle: ToolArc) -> None:
     """The limit is set just below the peak that axis 2 has somewhere between the places."""
     chain = arm.chain_to("flange")
     dense = np.linspace(0.0, 1.0, 50001)
@@ -230,7 +230,7 @@ def test_a_limit_touched_between_two_places_is_found(arm: Arm, circle: ToolArc) 
                 ToolPath(other, circle, FRONT_UP, np.zeros(5))
 
 
-def test_a_line_through_axis_1_is_refused(arm: Arm) -> None:
+def test_a_line_through_axis_1_is_refused(arm: ArmModel) -> None:
     q = np.radians((0.0, -110.0, 100.0, 60.0, 0.0))
     x = float(forward(arm.chain, q)[0, 3])
     with pytest.raises(InputError, match="along it"):
@@ -238,7 +238,7 @@ def test_a_line_through_axis_1_is_refused(arm: Arm) -> None:
 
 
 @pytest.mark.parametrize("beyond", [1e-7, -1e-12])
-def test_a_curve_that_only_grazes_the_reach_is_refused(arm: Arm, beyond: float) -> None:
+def test_a_curve_that_only_grazes_the_reach_is_refused(arm: ArmModel, beyond: float) -> None:
     """Between two of the places that are looked at the arm is stretched, or would have to be."""
     chain, canonical = arm.chain, arm_of(arm.chain)
     radius = canonical.l1 + canonical.l2 + canonical.l3 - 0.1 + beyond
@@ -260,7 +260,7 @@ TWISTS = {
 
 @pytest.mark.parametrize("name", TWISTS)
 def test_a_screw_five_axes_can_follow_is_followed_in_all_six(
-    arm: Arm, ready: FloatArray, name: str
+    arm: ArmModel, ready: FloatArray, name: str
 ) -> None:
     twist = np.array(TWISTS[name])
     q = ready + np.array([0.2, 0.1, 0.0, 0.1, 0.4])
@@ -272,7 +272,7 @@ def test_a_screw_five_axes_can_follow_is_followed_in_all_six(
 
 
 def test_any_screw_keeps_the_point_and_turns_as_near_as_the_arm_can(
-    arm: Arm, ready: FloatArray
+    arm: ArmModel, ready: FloatArray
 ) -> None:
     rng, chain, followed = np.random.default_rng(5), arm.chain, 0
     for _ in range(16):
@@ -323,7 +323,7 @@ def test_a_tool_beside_the_roll_axis_follows_lines_exactly() -> None:
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_numbers_that_are_none_are_refused(arm: Arm, ready: FloatArray, bad: float) -> None:
+def test_numbers_that_are_none_are_refused(arm: ArmModel, ready: FloatArray, bad: float) -> None:
     at = ToolTarget.at(arm.chain, ready)
     still = Linear(0.0, 0.0)
     for wrong in (

@@ -10,9 +10,9 @@ import pytest
 
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs import runner
-from katana450.extensions.programs.bench import PlanContext
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.maths.geometry.arrays import FloatArray
@@ -27,8 +27,8 @@ class Stage:
 
     def __init__(self, arm: MountedArm, *, bare: bool = False) -> None:
         """``bare``: without its gripper."""
-        self.session = described(replace(Settings(), bare=bare), URDF_PATH, None).session
-        self.rig = PlanContext(self.session, arm.T_base_shoulder)
+        self.session = describe_robot(replace(Settings(), bare=bare), URDF_PATH, None).session
+        self.plan_context = PlanContext(self.session, arm.T_base_shoulder)
 
     def begin(self) -> State:
         return self.session.begin(self.session.ready, 0.0, 0.0)
@@ -43,7 +43,7 @@ class Stage:
 
         From differences of the setpoints alone, which are means of the derivatives.
         """
-        limits = self.rig.arm.limits
+        limits = self.plan_context.arm.limits
         q = np.array([state.setpoint for state in states])
         bounds = (limits.speed, limits.acceleration, limits.jerk)
         found = [

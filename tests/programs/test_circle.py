@@ -21,11 +21,11 @@ def test_the_circle_keeps_every_limit_at_every_tick(
     staged = Stage(arm, bare=True) if tool == "flange" else stage
     demo = CircleDemo(tool=tool)
     run, states = staged.play(
-        compiled(parse(demo.text), staged.rig, staged.begin()), staged.begin()
+        compiled(parse(demo.text), staged.plan_context, staged.begin()), staged.begin()
     )
     assert (run.phase, run.why) == (Phase.DONE, "")
     assert staged.loads(states).max() <= 1.0 + 1e-6
-    chain = staged.rig.arm.chain_to(tool)
+    chain = staged.plan_context.arm.chain_to(tool)
     on = [s.q for s in states if s.following is not None and s.following.plan.length > 0.6]
     points = np.array([forward(chain, q)[:3, 3] for q in on])
     assert len(points) > 100

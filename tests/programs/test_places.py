@@ -36,11 +36,13 @@ def spots(number: int) -> tuple[Spot, Spot]:
 def test_every_place_does_or_is_refused(stage: Stage, number: int) -> None:
     cup, basin = spots(number)
     try:
-        program = compiled(parse(PourDemo(cup=cup, basin=basin).text), stage.rig, stage.begin())
+        program = compiled(
+            parse(PourDemo(cup=cup, basin=basin).text), stage.plan_context, stage.begin()
+        )
     except ScriptError as error:
         (problem,) = error.problems
         assert problem.line > 0
-        assert any(each in problem.said for each in REASONS), problem.said
+        assert any(each in problem.text for each in REASONS), problem.text
         return
     check_poured(stage, program)
 

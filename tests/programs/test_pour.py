@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.pour import PourDemo, Spot
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program, compiled
@@ -22,7 +22,7 @@ from tests.programs.conftest import Stage
 
 def planned(stage: Stage, cup: Spot | None = None, basin: Spot | None = None) -> Program:
     text = PourDemo(cup=cup, basin=basin).text
-    return compiled(parse(text), stage.rig, stage.begin())
+    return compiled(parse(text), stage.plan_context, stage.begin())
 
 
 def check_poured(stage: Stage, program: Program) -> None:
@@ -36,16 +36,16 @@ def check_poured(stage: Stage, program: Program) -> None:
     assert found.spilled_ml == 0.0
     # Until it is turned over on purpose the surface stays below the lip.
     (turned,) = (task.order for task in program.tasks if task.name == POURING)
-    assert isinstance(turned, Go)
+    assert isinstance(turned, FollowPlan)
     plan = turned.plan
     carried = list(takewhile(lambda s: s.following is None or s.following.plan is not plan, states))
     assert pouring is not None
-    margins = [pouring.margin_to_rim(s.poured, s.things) for s in carried if s.poured is not None]
+    margins = [pouring.margin_to_rim(s.poured, s.objects) for s in carried if s.poured is not None]
     assert len(margins) > 300
     assert min(margins) > 0.005
     assert stage.loads(states).max() <= 1.0 + 1e-6
-    (cup,) = (each for each in end.things if each.name == "cup")
-    stood = [t for s in carried for t in s.things if t.name == "cup" and not t.held][-1]
+    (cup,) = (each for each in end.objects if each.name == "cup")
+    stood = [t for s in carried for t in s.objects if t.name == "cup" and not t.held][-1]
     assert not cup.held
     np.testing.assert_allclose(cup.T, stood.T, rtol=0, atol=1e-6)
 
@@ -71,11 +71,11 @@ def test_the_script_that_comes_along_is_the_demo() -> None:
         ((220.0, 360.0), None, "cup would stand in basin"),
     ],
 )
-def test_what_stands_badly_is_refused_before_anything_moves(
+def test_invalid_start_scene_is_refused_before_motion(
     stage: Stage, cup: Spot | None, basin: Spot | None, said: str
 ) -> None:
     with pytest.raises(ScriptError) as refused:
         planned(stage, cup, basin)
     (problem,) = refused.value.problems
-    assert said in problem.said
+    assert said in problem.text
     assert problem.line > 0

@@ -11,10 +11,10 @@ import pytest
 
 import katana450.extensions.programs
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Form, Thing
 from katana450.extensions.programs import runner
-from katana450.extensions.programs.order import PATIENCE, Go
+from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
@@ -44,12 +44,14 @@ steps:
 
 @pytest.fixture(scope="module")
 def program(stage: Stage) -> Program:
-    return compiled(parse(SHORT), stage.rig, stage.begin())
+    return compiled(parse(SHORT), stage.plan_context, stage.begin())
 
 
 def point(stage: Stage, state: State) -> np.ndarray:
     """The tool point in the base frame [mm]."""
-    T = stage.rig.T_base_shoulder @ forward(stage.rig.arm.chain_to("tcp"), state.q)
+    T = stage.plan_context.T_base_shoulder @ forward(
+        stage.plan_context.arm.chain_to("tcp"), state.q
+    )
     return np.asarray(1e3 * T[:3, 3])
 
 
@@ -69,7 +71,7 @@ def test_it_does_what_the_script_says(stage: Stage, program: Program) -> None:
     centre = np.array([300.0, 0.0, 150.0])
     assert np.allclose(rests[4], centre + R @ (rests[3] - centre) + [0, 0, 20], atol=1e-6)
     assert np.allclose(point(stage, states[-1]), [320, -40, 150], atol=1e-6)
-    assert states[-1].gripper == stage.rig.arm.gripper.upper
+    assert states[-1].gripper == stage.plan_context.arm.gripper.upper
 
 
 def test_lines_round_their_corners_and_rest_at_their_end(stage: Stage) -> None:
@@ -78,7 +80,9 @@ def test_lines_round_their_corners_and_rest_at_their_end(stage: Stage) -> None:
         "  - lines: {through: [{x: 320, y: 40, z: 150}, {x: 360, y: 40, z: 150, pitch: 60}, "
         "{x: 360, y: 40, z: 190}], blend: 0.4}"
     )
-    run, states = stage.play(compiled(parse(text), stage.rig, stage.begin()), stage.begin())
+    run, states = stage.play(
+        compiled(parse(text), stage.plan_context, stage.begin()), stage.begin()
+    )
     assert (run.phase, run.why) == (Phase.DONE, "")
     rests = [
         point(stage, a) for a, b in pairwise(states) if a.motion.at_rest and not b.motion.at_rest
@@ -88,7 +92,7 @@ def test_lines_round_their_corners_and_rest_at_their_end(stage: Stage) -> None:
     way = [point(stage, state) for state in states]
     for corner, near in (([320, 40, 150], 8.0), ([360, 40, 150], 8.0)):
         assert 0.5 < min(np.linalg.norm(p - corner) for p in way) < near
-    target = ToolTarget.at(stage.rig.arm.chain_to("tcp"), states[-1].q)
+    target = ToolTarget.at(stage.plan_context.arm.chain_to("tcp"), states[-1].q)
     assert np.degrees(target.pitch) == pytest.approx(60.0, abs=1e-9)
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
@@ -99,7 +103,7 @@ def test_a_timeline_has_the_arm_where_the_run_has_it(stage: Stage, program: Prog
     assert np.array_equal(first, program.start)
     _, states = stage.play(program, stage.begin())
     assert last == pytest.approx(states[-1].q, abs=1e-12)
-    assert fingers == stage.rig.arm.gripper.upper
+    assert fingers == stage.plan_context.arm.gripper.upper
     assert timeline.at(-1.0)[0] == pytest.approx(first)
     assert timeline.at(timeline.span + 1.0)[0] == pytest.approx(last, abs=1e-12)
     run_by = np.array([state.q for state in states])
@@ -111,7 +115,7 @@ def test_a_timeline_has_the_arm_where_the_run_has_it(stage: Stage, program: Prog
 def test_every_plan_is_clear_and_meets_the_next(program: Program) -> None:
     q = program.start
     for task in program.tasks:
-        if isinstance(task.order, Go):
+        if isinstance(task.order, FollowPlan):
             plan = task.order.plan
             assert np.abs(plan.start - q).max() < 1e-6
             assert plan.clear_of is not None
@@ -146,17 +150,17 @@ def test_a_pause_keeps_to_the_way_and_waits_no_time_away(stage: Stage, program: 
 @pytest.mark.parametrize("cleared", [False, True])
 def test_patience_begins_where_the_way_is_blocked(stage: Stage, cleared: bool) -> None:
     script = parse("steps:\n  - joints: [60, -68, 85, 8, 0]")
-    program = compiled(script, stage.rig, stage.begin(), speed=0.03)
+    program = compiled(script, stage.plan_context, stage.begin(), speed=0.03)
     at = np.eye(4)
     at[:2, 3] = 0.5 * np.array((np.cos(0.8), np.sin(0.8)))
-    wall = Thing("wall", Form.BOX, (0.1, 0.1, 0.5), at)
-    state = stage.session.step(stage.begin(), [cmd.Place(wall)], 0.01)
+    wall = SceneObject("wall", Shape.BOX, (0.1, 0.1, 0.5), at)
+    state = stage.session.step(stage.begin(), [cmd.PlaceObject(wall)], 0.01)
     run, stood = Run(state.t), 0.0
-    while stood < 0.9 * PATIENCE:
+    while stood < 0.9 * ACTION_TIMEOUT:
         run, state = stage.tick(program, run, state)
         assert run.phase is Phase.RUNNING
         stood += 0.01 * (state.blocked and state.motion.at_rest)
-    assert run.waited > 2.0 * PATIENCE
+    assert run.waited > 2.0 * ACTION_TIMEOUT
     assert runner.progress(program, run, state).status == "blocked"
     if cleared:
         state = stage.session.step(state, [cmd.Remove("wall")], state.t + 0.01)
@@ -211,7 +215,9 @@ def test_an_arm_that_stands_elsewhere_does_not_begin(stage: Stage, program: Prog
 
 def test_speed_is_a_share_of_the_scripts_own(stage: Stage) -> None:
     script = parse("speed: 0.5\nsteps:\n  - joints: [20, -60, 85, 8, 0]")
-    fast, slow = (compiled(script, stage.rig, stage.begin(), speed) for speed in (1.0, 0.5))
+    fast, slow = (
+        compiled(script, stage.plan_context, stage.begin(), speed) for speed in (1.0, 0.5)
+    )
     assert (fast.speed, slow.speed) == (0.5, 0.25)
     ticks = [len(stage.play(program, stage.begin())[1]) for program in (fast, slow)]
     assert 1.5 < ticks[1] / ticks[0] < 2.0
@@ -235,7 +241,7 @@ def test_a_step_that_cannot_be_is_refused_with_its_line(
     stage: Stage, steps: str, line: int, said: str
 ) -> None:
     with pytest.raises(ScriptError, match=said) as told:
-        compiled(parse("steps:\n" + steps), stage.rig, stage.begin())
+        compiled(parse("steps:\n" + steps), stage.plan_context, stage.begin())
     assert told.value.problems[0].line == line
 
 
@@ -244,8 +250,8 @@ def test_repetitions_are_planned_once(stage: Stage) -> None:
         "steps:\n  - repeat: {times: 40, steps: [{joints: [20, -60, 85, 8, 0]}, home, "
         "{gripper: open}, {gripper: closed}]}"
     )
-    program = compiled(parse(text), stage.rig, stage.begin())
-    plans = {id(task.order.plan) for task in program.tasks if isinstance(task.order, Go)}
+    program = compiled(parse(text), stage.plan_context, stage.begin())
+    plans = {id(task.order.plan) for task in program.tasks if isinstance(task.order, FollowPlan)}
     # The fingers are neither open nor closed at first, so that round is one of its own.
     assert len(plans) == 4
     assert program.steps == 160

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from katana450.errors import InputError
 from katana450.extensions.programs.moves import Move
-from katana450.extensions.programs.script import MOST_STEPS, parse
-from katana450.extensions.programs.source import DEEPEST, LARGEST, Problem, ScriptError
+from katana450.extensions.programs.script import MAX_STEPS, parse
+from katana450.extensions.programs.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
 from katana450.extensions.programs.steps import STEPS
 from katana450.extensions.programs.tool_moves import Circle, Line
 
@@ -95,14 +95,14 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps: [home]\nexpect: {speed: 1}", 2, "no 'speed'"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(wrong: str, line: int, said: str) -> None:
+def test_error_is_reported_with_its_line(wrong: str, line: int, said: str) -> None:
     with pytest.raises(ScriptError, match="line") as told:
         parse(wrong)
     assert said in str(told.value)
     assert any(problem.line == line for problem in told.value.problems), str(told.value)
 
 
-def test_all_that_is_wrong_is_told_at_once() -> None:
+def test_all_errors_are_reported_together() -> None:
     with pytest.raises(ScriptError) as told:
         parse("speed: 3\nframe: moon\nsteps:\n  - wait: x\n  - line: {too: 1}\n  - home\n  - fly")
     assert [problem.line for problem in told.value.problems] == [1, 2, 4, 5, 7]
@@ -110,16 +110,16 @@ def test_all_that_is_wrong_is_told_at_once() -> None:
 
 def test_size_depth_and_repetitions_are_bounded() -> None:
     with pytest.raises(ScriptError, match="at most 64 KB"):
-        parse("steps: [home]\n#" + "x" * LARGEST)
+        parse("steps: [home]\n#" + "x" * MAX_BYTES)
     with pytest.raises(ScriptError, match="levels deep"):
         parse("steps: " + "[" * 5000)
     nested = "home"
-    for _ in range(DEEPEST // 3):
+    for _ in range(MAX_DEPTH // 3):
         nested = f"{{repeat: {{times: 99, steps: [{nested}]}}}}"
-    with pytest.raises(ScriptError, match=f"at most {MOST_STEPS}|levels deep"):
+    with pytest.raises(ScriptError, match=f"at most {MAX_STEPS}|levels deep"):
         parse(f"steps: [{nested}]")
-    many = "steps:\n" + "  - home\n" * (MOST_STEPS + 1)
-    with pytest.raises(ScriptError, match=f"at most {MOST_STEPS}"):
+    many = "steps:\n" + "  - home\n" * (MAX_STEPS + 1)
+    with pytest.raises(ScriptError, match=f"at most {MAX_STEPS}"):
         parse(many)
 
 
@@ -165,7 +165,7 @@ def test_no_text_is_more_than_an_error(text: str) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.data())
-def test_a_broken_script_is_told_where(data: st.DataObject) -> None:
+def test_broken_script_is_reported_with_its_position(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(GOOD) - 1))
     broken = GOOD[:at] + data.draw(st.text(max_size=3)) + GOOD[at + data.draw(st.integers(0, 9)) :]
     last = len(broken.splitlines()) + 2

@@ -11,7 +11,7 @@ import trimesh
 import yourdfpy
 
 from katana450.arm.robot.arm_reader import CONDUITS
-from katana450.arm.robot.conduit import GIVE
+from katana450.arm.robot.conduit import STRETCH_FRACTION
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -57,7 +57,7 @@ def test_its_ribs_keep_their_distance_and_it_never_leaps(arm: MountedArm, number
         length = steps.sum() * DENSE / (DENSE - 1)
         # Round axis 1 it is drawn out and pushed together, as far as its ribs give; elsewhere it
         # hangs.
-        give = GIVE if stretch.winds else 0.08
+        give = STRETCH_FRACTION if stretch.winds else 0.08
         assert 1.0 - give < length / stretch.length < 1.0 + give
         # Ribs are drawn at even steps along it.
         assert steps.max() < 1.1 * steps.min()

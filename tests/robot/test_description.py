@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from katana450.arm.robot.loader import load
-from katana450.assembly.robot_session import recognised
+from katana450.assembly.robot_session import find_robot
 from katana450.errors import RobotDescriptionError
 from katana450.settings import Settings
 from tests.robot.public_arms import PX150, urdf, written
@@ -73,7 +73,7 @@ def test_every_fault_of_a_file_is_named_with_its_line(
 ) -> None:
     path = edited(tmp_path, old, new)
     with pytest.raises(RobotDescriptionError, match=said) as raised:
-        recognised(Settings(), path, None)
+        find_robot(Settings(), path, None)
     told = str(raised.value)
     assert "arm.urdf" in told
     for words in ("list.remove", "could not convert", "NoneType", "KeyError", "invalid literal"):

@@ -268,7 +268,7 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
         ("<?xml version='1.0' encoding='klingon'?><robot/>", "its XML is broken, unknown encoding"),
     ],
 )
-def test_what_is_no_robot_description_is_told_as_it_is(
+def test_invalid_robot_description_is_reported_plainly(
     text: str, said: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "arm.urdf"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.robot.collision import standing_around, world_of
+from katana450.arm.robot.collision import initial_objects, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, load_props
 from katana450.arm.robot.robot import Robot
@@ -80,7 +80,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
 def test_what_stands_around_holds_the_props(robot: Robot, arm: MountedArm) -> None:
     """Nothing of a prop's mesh is outside the shape that stands for it, nor the table above it."""
     props = load_props()
-    table, cup, basin = standing_around(props)
+    table, cup, basin = initial_objects(props)
     assert table.name == "table"
     for part, vessel, at in ((cup, props.cup, CUP_AT), (basin, props.basin, BASIN_AT)):
         points = np.asarray(trimesh.load_scene(vessel.mesh).to_mesh().vertices) + at

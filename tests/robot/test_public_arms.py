@@ -17,7 +17,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.loader import load
-from katana450.assembly.robot_session import recognised
+from katana450.assembly.robot_session import find_robot
 from katana450.client.client import connect
 from katana450.errors import RobotDescriptionError
 from katana450.maths.kinematics.forward import forward
@@ -160,7 +160,7 @@ def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J],
     path = written(tmp_path, "arm", joints)
     with pytest.raises(RobotDescriptionError, match=said):
         load(path).require_arm()
-    found = recognised(Settings(), path, None)
+    found = find_robot(Settings(), path, None)
     assert found.robot.arm is None
     assert [note for note in found.notes if note.startswith("Joints only. ") and "arm.urdf" in note]
 
@@ -200,7 +200,7 @@ def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) ->
     path = written(tmp_path, "stewart", stewart())
     said = r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
     with pytest.raises(RobotDescriptionError, match=r"(?i)" + said):
-        recognised(Settings(), path, None)
+        find_robot(Settings(), path, None)
     four_bar = [
         J("a", "revolute", "ground", "crank"),
         J("b", "revolute", "crank", "coupler"),
@@ -209,7 +209,7 @@ def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) ->
     ]
     path = written(tmp_path, "four_bar", four_bar)
     with pytest.raises(RobotDescriptionError, match=r"link 'ground' hangs on itself, by joint 'd'"):
-        recognised(Settings(), path, None)
+        find_robot(Settings(), path, None)
 
 
 def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -> None:

@@ -9,14 +9,14 @@ import pytest
 import yourdfpy
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Form, Thing
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
@@ -50,13 +50,13 @@ def arm(robot: Robot) -> MountedArm:
 
 
 @pytest.fixture
-def world(robot: Robot) -> World:
+def world(robot: Robot) -> CollisionWorld:
     world, _ = world_of(robot)
     assert world is not None
     return world
 
 
-def test_their_bodies_slide(path: Path, arm: MountedArm, world: World) -> None:
+def test_their_bodies_slide(path: Path, arm: MountedArm, world: CollisionWorld) -> None:
     robot = yourdfpy.URDF.load(str(path), load_meshes=False)
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -70,11 +70,11 @@ def test_their_bodies_slide(path: Path, arm: MountedArm, world: World) -> None:
 
 
 def test_no_distance_changes_more_than_their_bodies_travel(
-    robot: Robot, arm: MountedArm, world: World
+    robot: Robot, arm: MountedArm, world: CollisionWorld
 ) -> None:
     ball = se3.from_rotation_translation(np.eye(3), np.array([0.3, 0.0, 0.2]))
-    thing = Thing("box", Form.BOX, (0.02, 0.02, 0.02), ball, can_be_held=True)
-    session = Session(arm, np.zeros(5), world, hand=hand_of(robot, world), things=(thing,))
+    scene_object = SceneObject("box", Shape.BOX, (0.02, 0.02, 0.02), ball, can_be_held=True)
+    session = Session(arm, np.zeros(5), world, hand=hand_of(robot, world), objects=(scene_object,))
     around = session.world_at(session.begin(session.ready, 0.02, 0.0))
     assert around is not None
     pairs = np.arange(len(around.first))
@@ -104,19 +104,21 @@ def run(session: Session, state: State, *commands: cmd.Command) -> State:
     raise AssertionError(f"still on its way: {state.findings}")
 
 
-def test_they_hold_a_thing_and_let_go_of_it(robot: Robot, arm: MountedArm, world: World) -> None:
+def test_they_hold_a_object_and_let_go_of_it(
+    robot: Robot, arm: MountedArm, world: CollisionWorld
+) -> None:
     ready = arm.ready(Settings().ready)
     fingers = np.array([-0.027575, 0.0, 0.0])
     T = arm.T_base_shoulder @ forward(arm.chain, ready)
     T[:3, 3] += T[:3, :3] @ fingers
     width = 0.05
-    thing = Thing("block", Form.BOX, (0.02, width, 0.02), T, can_be_held=True)
-    session = Session(arm, ready, world, hand=hand_of(robot, world), things=(thing,))
+    scene_object = SceneObject("block", Shape.BOX, (0.02, width, 0.02), T, can_be_held=True)
+    session = Session(arm, ready, world, hand=hand_of(robot, world), objects=(scene_object,))
     state = session.begin(ready, arm.gripper.upper, 0.0)
     state = run(session, state, cmd.SetGripper(arm.gripper.lower))
-    (held,) = state.things
+    (held,) = state.objects
     assert held.held
     inside = 0.5 * (width + THICK)
     assert state.gripper_setpoint == pytest.approx(inside, abs=1e-3)
     left = run(session, state, cmd.SetGripper(state.gripper_setpoint + 2e-3))
-    assert not left.things[0].held
+    assert not left.objects[0].held

@@ -13,7 +13,7 @@ from katana450.arm.robot.weight import loads_of
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import joint_frames
-from katana450.maths.kinematics.statics import GRAVITY, Load, holding_torques
+from katana450.maths.kinematics.statics import GRAVITY, LinkLoad, holding_torques
 from katana450.resources import URDF_PATH
 
 
@@ -54,9 +54,7 @@ def test_mujoco_finds_the_same_from_the_file(robot: Robot, arm: MountedArm) -> N
         )
 
 
-def test_what_stands_upright_is_held_by_nobody_and_the_gripper_weighs(
-    robot: Robot, arm: MountedArm
-) -> None:
+def test_vertical_arm_needs_torque_for_the_gripper_only(robot: Robot, arm: MountedArm) -> None:
     chain = arm.chain
     upright = holding_torques(chain, np.deg2rad((30.0, -90.0, 0.0, 0.0, 0.0)), loads_of(robot))
     stretched = holding_torques(chain, np.zeros(chain.n), loads_of(robot))
@@ -70,11 +68,9 @@ def test_what_stands_upright_is_held_by_nobody_and_the_gripper_weighs(
     assert 0.0 < total < 4.8
 
 
-def test_a_weight_on_the_base_is_nobodys_and_a_wrong_posture_is_refused(
-    robot: Robot, arm: MountedArm
-) -> None:
+def test_mass_of_the_base_needs_no_torque(robot: Robot, arm: MountedArm) -> None:
     chain = arm.chain
-    base = Load(0, 100.0, np.array((1.0, 1.0, 1.0)))
+    base = LinkLoad(0, 100.0, np.array((1.0, 1.0, 1.0)))
     assert not holding_torques(chain, np.zeros(chain.n), [base]).any()
     with pytest.raises(InputError):
         holding_torques(chain, np.full(chain.n, np.nan), loads_of(robot))

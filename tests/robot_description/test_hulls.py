@@ -204,10 +204,10 @@ def test_every_hull_stays_near_its_link(link: str) -> None:
     model = surface(reference)
     for number, hull in enumerate(hulls(link)):
         excess = hull - reference
-        share = excess.volume() / (hull.volume() - excess.volume())
+        fraction = excess.volume() / (hull.volume() - excess.volume())
         far, at = standoff(excess, model)
-        assert share <= EXCESS or far <= STANDOFF, (
-            f"{link}_{number} stands {far:.1f} mm off at {at} and is {share:.0%} too big: "
+        assert fraction <= EXCESS or far <= STANDOFF, (
+            f"{link}_{number} stands {far:.1f} mm off at {at} and is {fraction:.0%} too big: "
             "give the link another plane in robot_description/cad/hulls.py"
         )
 

@@ -13,7 +13,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, Verdict
@@ -30,7 +30,7 @@ SILENCE = 0.3
 class Ends:
     """Both, and the loop behind them."""
 
-    def __init__(self, arm: Arm, session: Session) -> None:
+    def __init__(self, arm: ArmModel, session: Session) -> None:
         self.session = session
         self.mailbox = Mailbox(session.check)
         driver = SimulatedDriver(arm, session.ready, 0.0)
@@ -50,7 +50,7 @@ class Ends:
 
 
 @pytest.fixture
-def ends(arm: Arm, session: Session) -> Iterator[Ends]:
+def ends(arm: ArmModel, session: Session) -> Iterator[Ends]:
     ends = Ends(arm, session)
     yield ends
     ends.arm_end.close()
@@ -70,12 +70,12 @@ def test_started_front_has_the_newest_state(ends: Ends) -> None:
     arm_end.start()
     slow = FrontEnd(theirs, ends.session.check)
     ends.front.deliver(cmd.Stop())
-    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
+    until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
     until(theirs.poll)
     time.sleep(0.05)
-    newest: list[bool] = [slow.board.snapshot.state.stopped is not None]
+    newest: list[bool] = [slow.state_publisher.snapshot.state.stopped is not None]
     slow.start()
-    newest.append(slow.board.snapshot.state.stopped is not None)
+    newest.append(slow.state_publisher.snapshot.state.stopped is not None)
     assert newest == [False, True]
     arm_end.close()
 
@@ -84,18 +84,18 @@ def test_a_command_goes_over_and_its_ticket_comes_back(ends: Ends) -> None:
     tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]
     assert ends.front.last_ticket == 3
-    until(lambda: ends.front.board.snapshot.ticket == 3)
-    alive(ends, lambda: not ends.front.board.snapshot.state.moving)
-    state = ends.front.board.snapshot.state
+    until(lambda: ends.front.state_publisher.snapshot.ticket == 3)
+    alive(ends, lambda: not ends.front.state_publisher.snapshot.state.moving)
+    state = ends.front.state_publisher.snapshot.state
     assert (state.q[0], state.q[4]) == (0.1, 0.1)
-    np.testing.assert_array_equal(state.q, ends.loop.board.snapshot.state.q)
+    np.testing.assert_array_equal(state.q, ends.loop.state_publisher.snapshot.state.q)
 
 
 def alive(ends: Ends, true: Callable[[], bool]) -> None:
-    """Wait, and give signs of life meanwhile."""
+    """Wait, and give heartbeats meanwhile."""
 
     def beaten() -> bool:
-        ends.front.beat()
+        ends.front.heartbeat()
         return true()
 
     until(beaten)
@@ -110,47 +110,55 @@ def test_what_cannot_be_asked_does_not_go_over(ends: Ends) -> None:
 def test_more_than_can_be_taken_is_still_answered_for(ends: Ends) -> None:
     for _ in range(3000):
         ends.front.deliver(cmd.Home())
-    until(lambda: ends.front.board.snapshot.ticket == 3000)
+    until(lambda: ends.front.state_publisher.snapshot.ticket == 3000)
 
 
-def test_the_ledger_comes_over_entry_by_entry(ends: Ends) -> None:
+def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
     ends.front.deliver(cmd.SetJoint(0, 99.0))
-    until(lambda: bool(ends.front.board.ledger))
+    until(lambda: bool(ends.front.state_publisher.event_log))
     ends.front.deliver(cmd.SetJoint(0, 0.0))
-    until(lambda: len(ends.front.board.ledger) == len(ends.loop.board.ledger) == 2)
-    told = [(e.t, e.finding, e.began) for e in ends.front.board.ledger]
-    assert told == [(e.t, e.finding, e.began) for e in ends.loop.board.ledger]
+    until(
+        lambda: (
+            len(ends.front.state_publisher.event_log)
+            == len(ends.loop.state_publisher.event_log)
+            == 2
+        )
+    )
+    told = [(e.t, e.finding, e.began) for e in ends.front.state_publisher.event_log]
+    assert told == [(e.t, e.finding, e.began) for e in ends.loop.state_publisher.event_log]
     # A front that comes later knows it too.
     ends.arm_end.close()
     ends.arm_end, late = ends.connect()
-    assert [e.t for e in late.board.ledger] == [e.t for e in ends.loop.board.ledger]
+    assert [e.t for e in late.state_publisher.event_log] == [
+        e.t for e in ends.loop.state_publisher.event_log
+    ]
 
 
 def test_a_front_that_falls_silent_stops_an_arm_that_moves(ends: Ends) -> None:
     time.sleep(2 * SILENCE)
-    assert ends.loop.board.snapshot.state.stopped is None
+    assert ends.loop.state_publisher.snapshot.state.stopped is None
     ends.front.deliver(cmd.SetJoint(0, 2.0))
     began = time.monotonic()
-    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
+    until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
     assert SILENCE < time.monotonic() - began < 2 * SILENCE
-    until(lambda: not ends.loop.board.snapshot.state.moving)
+    until(lambda: not ends.loop.state_publisher.snapshot.state.moving)
 
 
 def test_a_pipe_that_breaks_stops_the_arm_and_the_next_front_moves_nothing(ends: Ends) -> None:
     ends.front.deliver(cmd.SetJoint(0, 2.0))
-    alive(ends, lambda: ends.front.board.snapshot.state.moving)
+    alive(ends, lambda: ends.front.state_publisher.snapshot.state.moving)
     with socket.socket(fileno=os.dup(ends.theirs.fileno())) as line:
         line.shutdown(socket.SHUT_RDWR)
     until(ends.arm_end.cut.is_set, 2.0)
-    until(lambda: ends.loop.board.snapshot.state.stopped is not None)
+    until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
     ends.arm_end, again = ends.connect()
-    assert again.board.snapshot.state.stopped is not None
-    until(lambda: not again.board.snapshot.state.moving)
+    assert again.state_publisher.snapshot.state.stopped is not None
+    until(lambda: not again.state_publisher.snapshot.state.moving)
     again.deliver(cmd.ClearStop())
-    until(lambda: again.board.snapshot.state.stopped is None)
-    q = again.board.snapshot.state.q
+    until(lambda: again.state_publisher.snapshot.state.stopped is None)
+    q = again.state_publisher.snapshot.state.q
     time.sleep(0.2)
-    np.testing.assert_array_equal(again.board.snapshot.state.q, q)
+    np.testing.assert_array_equal(again.state_publisher.snapshot.state.q, q)
 
 
 def test_an_arm_that_hangs_up_is_heard_by_its_front(ends: Ends) -> None:
@@ -158,21 +166,24 @@ def test_an_arm_that_hangs_up_is_heard_by_its_front(ends: Ends) -> None:
     assert ends.front.cut.wait(2.0)
 
 
-def test_how_late_the_ticks_are_is_told_now_and_then(ends: Ends) -> None:
-    until(lambda: ends.front.board.lateness.count > 50)
-    assert ends.front.board.lateness.period == 0.01
+def test_loop_timing_is_reported_periodically(ends: Ends) -> None:
+    until(lambda: ends.front.state_publisher.loop_timing.count > 50)
+    assert ends.front.state_publisher.loop_timing.period == 0.01
 
 
 def test_actor_goes_over_and_is_named_in_the_event_log(ends: Ends) -> None:
     actor = Actor(Person("a key", "Anna", Role.OPERATOR), CommandChannel.API, None, Grounds.LEASE)
     ends.front.deliver(cmd.SetJoint(0, 99.0), actor)
-    until(lambda: bool(ends.front.board.ledger))
-    (entry,) = ends.front.board.ledger
+    until(lambda: bool(ends.front.state_publisher.event_log))
+    (entry,) = ends.front.state_publisher.event_log
     assert (entry.actor, entry.command) == (actor, "SetJoint")
     # A stop of the arm's own process is nobody's.
     ends.mailbox.put(cmd.Stop())
-    until(lambda: ends.front.board.ledger[-1].finding.reason is Reason.STOPPED)
-    assert (ends.front.board.ledger[-1].actor, ends.front.board.ledger[-1].command) == (
+    until(lambda: ends.front.state_publisher.event_log[-1].finding.reason is Reason.STOPPED)
+    assert (
+        ends.front.state_publisher.event_log[-1].actor,
+        ends.front.state_publisher.event_log[-1].command,
+    ) == (
         None,
         "Stop",
     )
@@ -180,7 +191,7 @@ def test_actor_goes_over_and_is_named_in_the_event_log(ends: Ends) -> None:
 
 def test_outcomes_come_back_by_the_tickets_of_the_front(ends: Ends) -> None:
     front, wait = ends.front, 5.0
-    outcomes = front.board.outcomes
+    outcomes = front.state_publisher.outcomes
     fine, far = front.deliver(cmd.SetJoint(0, 0.1)), front.deliver(cmd.SetJoint(1, 99.0))
     assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
     limited = outcomes.of(far).result(wait)
@@ -205,6 +216,6 @@ def test_a_command_for_a_full_mailbox_is_refused_and_not_only_dropped(ends: Ends
     ticket = ends.front.deliver(cmd.Home())
     time.sleep(0.2)
     ends.loop.tick()
-    outcome = ends.front.board.outcomes.of(ticket).result(5.0)
+    outcome = ends.front.state_publisher.outcomes.of(ticket).result(5.0)
     assert outcome.verdict is Verdict.REFUSED
     assert "slower" in outcome.why

@@ -68,7 +68,7 @@ def test_a_flood_is_refused_and_what_waits_is_kept(mailbox: Mailbox) -> None:
     assert mailbox.put(cmd.Home()) == CAPACITY + 1
 
 
-def test_what_the_arm_cannot_be_asked_does_not_enter(mailbox: Mailbox) -> None:
+def test_unsupported_command_is_refused_by_the_session(mailbox: Mailbox) -> None:
     with pytest.raises(InputError, match="no axis 9"):
         mailbox.put(cmd.SetJoint(8, 0.0))
     assert mailbox.drain() == Drained([], [], [], 0)

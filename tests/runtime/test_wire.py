@@ -7,40 +7,40 @@ import pickle
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.following import Following
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
-from katana450.arm.runtime.wire import KEPT_HERE, Names, Plans
+from katana450.arm.runtime.wire import KEPT_HERE, PlanNames, PlanStore
 from katana450.maths.planning.plan import Plan
 
 
 @pytest.fixture(scope="module")
-def plan(arm: Arm) -> Plan:
+def plan(arm: ArmModel) -> Plan:
     session = Session(arm, np.array((0.0, -1.2, 1.5, 0.1, 0.0)))
     state = session.begin(session.ready, 0.0, 0.0)
     return plan_to(arm, None, state, session.ready + 0.2)
 
 
 def test_a_plan_comes_back_as_itself(plan: Plan) -> None:
-    names, plans = Names(), Plans()
+    names, plans = PlanNames(), PlanStore()
     plans.note(7, plan)
     over_there: Plan = pickle.loads(pickle.dumps(plan))
     names.note(7, over_there)
-    data = names.dumped(Following.begun(over_there))
+    data = names.dumped(Following.begin(over_there))
     back = plans.loaded(data)
     assert back.plan is plan
-    assert len(data) < 2000 < len(pickle.dumps(Following.begun(over_there)))
+    assert len(data) < 2000 < len(pickle.dumps(Following.begin(over_there)))
 
 
 def test_one_that_is_not_known_is_sent_whole(plan: Plan) -> None:
-    back = Plans().loaded(Names().dumped(plan))
+    back = PlanStore().loaded(PlanNames().dumped(plan))
     assert np.array_equal(back.end, plan.end)
 
 
 def test_old_ones_are_forgotten(plan: Plan) -> None:
-    names, plans = Names(), Plans()
+    names, plans = PlanNames(), PlanStore()
     each = [pickle.loads(pickle.dumps(plan)) for _ in range(KEPT_HERE + 1)]
     for number, one in enumerate(each):
         plans.note(number, one)
@@ -54,7 +54,7 @@ def solid(key: str) -> Solid:
 
 
 def test_a_solid_goes_whole_once_and_then_as_its_key() -> None:
-    names, plans = Names(), Plans()
+    names, plans = PlanNames(), PlanStore()
     one, other = solid("one"), solid("other")
     first = plans.loaded(names.dumped([one, other, one]))
     assert [each.key for each in first] == ["one", "other", "one"]

@@ -10,7 +10,7 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
+from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 ASPECT = 1.2
 """Width to height of the scene in a window of 1280 by 800 beside the panel."""
@@ -39,9 +39,9 @@ def points_on(robot: Robot, q: FloatArray) -> FloatArray:
     return np.concatenate(points)
 
 
-@pytest.mark.parametrize("preset", LOOKS)
+@pytest.mark.parametrize("preset", CAMERA_POSES)
 def test_no_pose_is_cut_off(robot: Robot, postures: FloatArray, preset: Preset) -> None:
-    look = LOOKS[preset]
+    look = CAMERA_POSES[preset]
     position, target = np.array(look.position), np.array(look.target)
     ahead = (target - position) / np.linalg.norm(target - position)
     right = np.cross(ahead, (0.0, 0.0, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.looks import Looks, Trait
+from katana450.arm.control.appearance import Appearance, AppearanceTrait
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.loader import load
@@ -64,8 +64,8 @@ def test_every_link_is_shown_where_it_is(server: viser.ViserServer, robot: Robot
 def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
     robot = load(GANTRY)
     nodes = MachineNodes(server, robot)
-    blue = Looks().having("cart", Trait.COLOUR, (0.0, 0.0, 1.0))
-    PaintNodes(server, nodes).follow(replace(standing(robot), looks=blue))
+    blue = Appearance().having("cart", AppearanceTrait.COLOUR, (0.0, 0.0, 1.0))
+    PaintNodes(server, nodes).follow(replace(standing(robot), appearance=blue))
     assert not nodes.shapes["cart"][0].visible
     coat: Any = internals.nodes(server)[f"{nodes.path['cart']}/paint0"]
     assert tuple(coat.color) == (0, 0, 255)

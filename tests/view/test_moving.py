@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.choices import Choice
+from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.commands import Command, SetJoints
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.robot.conduit import Stretch
+from katana450.arm.robot.conduit import ConduitStretch
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import so3
@@ -43,7 +43,7 @@ def test_every_link_is_turned_as_its_joint_is(robot: Robot, server: viser.ViserS
 def test_rings_stand_across_the_conduit_also_between_the_angles_worked_out(
     arm: MountedArm, number: int
 ) -> None:
-    stretch: Stretch = arm.stretches[number]
+    stretch: ConduitStretch = arm.stretches[number]
     rings = poses(stretch, 30)
     between = 0.5 * (rings[1:] + rings[:-1])
     for angles, shown in (
@@ -63,7 +63,7 @@ def test_branches_are_looked_for_once_a_second_while_the_arm_moves(
 ) -> None:
     looked: list[State] = []
 
-    def find(state: State) -> tuple[Choice, ...]:
+    def find(state: State) -> tuple[BranchOption, ...]:
         looked.append(state)
         return session.choices(state)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 import viser
 
-from katana450.arm.control.looks import Looks, Trait
+from katana450.arm.control.appearance import Appearance, AppearanceTrait
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.loader import load
@@ -50,14 +50,14 @@ def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
     made = [shape.visible for shape in shown.arm.shapes["pan_link"]]
     assert made
     assert all(made)
-    red = Looks().having("pan_link", Trait.COLOUR, (1.0, 0.0, 0.2))
-    shown.show(looks=red)
+    red = Appearance().having("pan_link", AppearanceTrait.COLOUR, (1.0, 0.0, 0.2))
+    shown.show(appearance=red)
     painted = shown.painted()
     assert set(painted.values()) == {(255, 0, 51)}
     assert all("/pan_link/paint" in name for name in painted)
     assert not any(shape.visible for shape in shown.arm.shapes["pan_link"])
-    glass = Looks().having("pan_link", Trait.TRANSPARENCY, 0.75)
-    shown.show(looks=glass)
+    glass = Appearance().having("pan_link", AppearanceTrait.TRANSPARENCY, 0.75)
+    shown.show(appearance=glass)
     # Of a paint that nobody mixed: the colour of most of what the link is made of.
     robot = load(URDF_PATH)
     (link,) = (link for link in robot.links if link.name == "pan_link")
@@ -65,9 +65,9 @@ def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
     node = nodes(shown.server)["/".join((shown.arm.path["pan_link"], "paint0"))]
     assert isinstance(node, viser.MeshHandle)
     assert node.opacity == 0.25
-    shown.show(looks=Looks().having("pan_link", Trait.CHOICE, -1))
+    shown.show(appearance=Appearance().having("pan_link", AppearanceTrait.CHOICE, -1))
     assert shown.painted() == {}
     assert not any(shape.visible for shape in shown.arm.shapes["pan_link"])
-    shown.show(looks=Looks())
+    shown.show(appearance=Appearance())
     assert [shape.visible for shape in shown.arm.shapes["pan_link"]] == made
     assert shown.painted() == {}

@@ -13,9 +13,9 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.programs.bench import PlanContext
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server.panel import ProgramsPanel, _page
@@ -33,12 +33,12 @@ class ProgramRunner:
     def __init__(self) -> None:
         self.progress: Progress | None = None
         self.program: Program | None = None
-        self.asked: list[tuple[str, Order | None]] = []
+        self.asked: list[tuple[str, ProgramOrder | None]] = []
 
-    def plan(self, text: str, then: Order | None, _actor: Actor) -> None:
+    def plan(self, text: str, then: ProgramOrder | None, _actor: Actor) -> None:
         self.asked.append((text, then))
 
-    def steer(self, order: Order, _actor: Actor) -> None:
+    def steer(self, order: ProgramOrder, _actor: Actor) -> None:
         self.asked.append(("", order))
 
 
@@ -58,7 +58,7 @@ def test_what_is_said_is_text_and_no_markup() -> None:
     assert "2 poses" in page
     assert "a while" in _page(Progress(name="", by="me", status="planning"), 0)
     told = Progress(
-        name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", share=0.5
+        name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", fraction=0.5
     )
     assert "Step 2 of 3, line 7: line, 50%" in _page(told, 0)
     assert _page(None, 0) == ""
@@ -67,19 +67,19 @@ def test_what_is_said_is_text_and_no_markup() -> None:
 def test_it_previews_steers_and_teaches(
     server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
-    performer = ProgramRunner()
+    program_runner = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(
-        server, robot, performer, Scripts(tmp_path), RecordedGestures(), lambda: state
+        server, robot, program_runner, Scripts(tmp_path), RecordedGestures(), lambda: state
     )
     # Not the first, which is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
     way = panel._preview._way
     assert not way.visible
-    rig = PlanContext(session, arm.T_base_shoulder)
+    plan_context = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"
-    performer.program = compiled(parse(text), rig, state)
+    program_runner.program = compiled(parse(text), plan_context, state)
     panel.follow()
     points = np.asarray(way.points).reshape(-1, 3)
     assert np.abs(points[-1] - points[0] - (0.0, 0.0, 0.04)).max() < 1e-6
@@ -87,14 +87,14 @@ def test_it_previews_steers_and_teaches(
 
     panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
-    performer.progress = Progress(name="x", by="me", status="running")
+    program_runner.progress = Progress(name="x", by="me", status="running")
     for said in ("Wait", "Run", "End"):
         panel._orders.value = said  # type: ignore[misc]  # likewise
         panel._order(ANNA)
-    assert [order for _, order in performer.asked] == [
-        Order.RUN, Order.PAUSE, Order.RUN, Order.END
+    assert [order for _, order in program_runner.asked] == [
+        ProgramOrder.RUN, ProgramOrder.PAUSE, ProgramOrder.RUN, ProgramOrder.END
     ]  # fmt: skip
-    assert parse(performer.asked[0][0]).name == "Circle with gripper"
+    assert parse(program_runner.asked[0][0]).name == "Circle with gripper"
 
     for said in ("Add pose", "Add pose", "Save"):
         panel._teach.value = said  # type: ignore[misc]  # likewise
@@ -106,14 +106,14 @@ def test_it_previews_steers_and_teaches(
 def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
-    performer = ProgramRunner()
+    program_runner = ProgramRunner()
     state = session.begin(session.ready, 0.0, 0.0)
     panel = ProgramsPanel(
-        server, robot, performer, Scripts(tmp_path), RecordedGestures(), lambda: state
+        server, robot, program_runner, Scripts(tmp_path), RecordedGestures(), lambda: state
     )
-    rig = PlanContext(session, arm.T_base_shoulder)
+    plan_context = PlanContext(session, arm.T_base_shoulder)
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
-    program = compiled(parse(text), rig, state)
+    program = compiled(parse(text), plan_context, state)
     preview = panel._preview
 
     def ghosts() -> bool:
@@ -122,14 +122,14 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     def looked_at() -> bool:
         return preview._ghost is not None and preview._ghost.root.visible
 
-    performer.program = program
+    program_runner.program = program
     panel.follow()
     # Nobody asked to see it.
     assert not ghosts()
     panel._orders.value = "Preview"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
-    performer.program = compiled(parse(text), rig, state)
-    performer.progress = Progress(name="x", by="me", status="ready")
+    program_runner.program = compiled(parse(text), plan_context, state)
+    program_runner.progress = Progress(name="x", by="me", status="ready")
     panel.follow()
     assert ghosts()
     assert preview._sweep is not None
@@ -149,7 +149,7 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     preview.look(0.0)
     assert not looked_at()
     preview.look(1.0)
-    performer.progress = Progress(name="x", by="me", status="running")
+    program_runner.progress = Progress(name="x", by="me", status="running")
     panel.follow()
     assert not ghosts()
     assert not looked_at()

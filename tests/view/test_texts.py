@@ -8,21 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.choices import Choice
+from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.messages import (
     AXIS_NAMES,
     BRANCH_HEADINGS,
-    READING_HINTS,
-    READINGS,
+    PRIORITIES,
+    PRIORITY_HINTS,
     REASONS,
     STATUS,
-    badge,
+    branch_cells,
     condition,
     degrees,
     headline,
+    limit_text,
     millimetres,
     part,
-    room,
     sentence,
     title,
 )
@@ -31,7 +31,7 @@ from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.branch_metrics import BranchMetrics
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.server.view.view import GHOST_COLOURS
 
 
@@ -59,7 +59,7 @@ def test_every_status_has_a_headline(status: Status) -> None:
 def test_no_text_is_left_over() -> None:
     assert set(REASONS) == set(Reason)
     assert set(STATUS) == set(Status)
-    assert set(READINGS) == set(READING_HINTS) == set(Reading)
+    assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(Priority)
     assert set(GHOST_COLOURS) == set(Status)
     assert len(AXIS_NAMES) == 5
 
@@ -84,13 +84,13 @@ def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, said: s
     assert sentence(with_findings(state, finding)) == said
 
 
-@pytest.mark.parametrize("reading", Reading)
-def test_every_reading_has_a_name_of_its_own_and_a_hint(reading: Reading) -> None:
-    assert list(READINGS.values()).count(READINGS[reading]) == 1
-    assert READING_HINTS[reading]
+@pytest.mark.parametrize("priority", Priority)
+def test_every_reading_has_a_name_of_its_own_and_a_hint(priority: Priority) -> None:
+    assert list(PRIORITIES.values()).count(PRIORITIES[priority]) == 1
+    assert PRIORITY_HINTS[priority]
 
 
-def test_a_gap_is_told_with_the_axis_and_the_leap(state: State) -> None:
+def test_gap_is_reported_with_the_axis_and_the_leap(state: State) -> None:
     held = with_findings(
         state,
         Finding(Reason.ACROSS_GAP, math.radians(68.4), 3),
@@ -100,10 +100,10 @@ def test_a_gap_is_told_with_the_axis_and_the_leap(state: State) -> None:
         "Axis 4 would have to leap 68° to follow: drag another way round, or choose the pose under "
         "Branches; position gives way by 12 mm."
     )
-    assert headline(held) == STATUS[Status.HELD]
+    assert headline(held) == STATUS[Status.GAP]
 
 
-def test_a_contact_is_told_with_both_parts_and_the_distance(state: State) -> None:
+def test_contact_is_reported_with_both_parts_and_the_distance(state: State) -> None:
     parts = ("finger_left_link", "upper_arm_link")
     blocked = with_findings(state, Finding(Reason.CONTACT, 0.0083, parts=parts))
     assert blocked.status is Status.BLOCKED
@@ -129,8 +129,8 @@ def test_the_condition_has_no_digits_of_rounding(values: tuple[float, float], sa
     assert condition(np.array(values)) == said
 
 
-def test_the_nearest_limit_is_told_with_its_axis() -> None:
-    assert room(1, math.radians(7.31)) == "axis 2: 7.3° left"
+def test_nearest_limit_is_reported_with_its_axis() -> None:
+    assert limit_text(1, math.radians(7.31)) == "axis 2: 7.3° left"
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_the_nearest_limit_is_told_with_its_axis() -> None:
         (0.0123, 0.0, ("pan_link", "basin"), "12 mm, shoulder meets basin"),
     ],
 )
-def test_a_badge_is_told_in_three_words(
+def test_branch_cells_have_three_texts(
     state: State,
     position_error: float,
     rotation_error: float,
@@ -154,9 +154,9 @@ def test_a_badge_is_told_in_three_words(
     cost = BranchMetrics(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
-    choice = Choice(cost, contact)
-    assert badge(choice) == (said, "90°, 1.3 s", "0.151")
-    assert len(BRANCH_HEADINGS) == 1 + len(badge(choice))
+    choice = BranchOption(cost, contact)
+    assert branch_cells(choice) == (said, "90°, 1.3 s", "0.151")
+    assert len(BRANCH_HEADINGS) == 1 + len(branch_cells(choice))
 
 
 def test_two_reasons_make_one_sentence(state: State) -> None:

@@ -10,7 +10,7 @@ import viser
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
-from katana450.arm.robot.collision import standing_around
+from katana450.arm.robot.collision import initial_objects
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.tint import Tint
@@ -71,13 +71,15 @@ def test_both_parts_are_coated_until_they_are_apart(robot: Robot, state: State) 
     assert scene.coated() == {"finger_left_link", "upper_arm_link"}
 
 
-@pytest.mark.parametrize("thing", [part.name for part in standing_around(load_props())])
-def test_a_thing_is_coated_too_where_it_stands(robot: Robot, state: State, thing: str) -> None:
+@pytest.mark.parametrize("scene_object", [part.name for part in initial_objects(load_props())])
+def test_a_object_is_coated_too_where_it_stands(
+    robot: Robot, state: State, scene_object: str
+) -> None:
     scene = Scene()
     paths = {body.name: f"/{body.name}" for body in robot.links}
     tint = Tint(cast(Any, Server(scene)), robot, paths, load_props())
-    tint.follow(touching(state, "gripper_link", thing))
-    assert scene.coated() == {"gripper_link", thing}
+    tint.follow(touching(state, "gripper_link", scene_object))
+    assert scene.coated() == {"gripper_link", scene_object}
     tint.follow(state)
     assert scene.coated() == set()
 

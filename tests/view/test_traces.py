@@ -17,7 +17,7 @@ from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import Linear, ToolArc
 from katana450.maths.planning.tool_path import ToolPath
-from katana450.server.view.traces import BAD, GOOD, WORST, Traces, coloured
+from katana450.server.view.traces import BAD_COLOUR, GOOD_COLOUR, WORST_ERROR, Traces, coloured
 from katana450.settings import Settings
 from tests.browser.server import free_port
 
@@ -55,7 +55,7 @@ def test_the_path_and_the_way_that_was_gone_are_the_arc(
     for handle in (desired, traced):
         away = np.linalg.norm(np.asarray(handle.points) - middle, axis=2)
         assert np.abs(away - 0.05).max() < 1e-5
-    assert (np.asarray(traced.colors) == GOOD.astype(np.uint8)).all()
+    assert (np.asarray(traced.colors) == GOOD_COLOUR.astype(np.uint8)).all()
     # Appended ten times a second, not with every tick.
     assert len(set(told)) < 1.2 * len(told) / 10 + 3
     last = traced.points
@@ -64,5 +64,5 @@ def test_the_path_and_the_way_that_was_gone_are_the_arc(
 
 
 def test_errors_have_their_colours() -> None:
-    found = coloured(np.array((0.0, WORST, 5.0 * WORST)))
-    assert found.tolist() == [GOOD.tolist(), BAD.tolist(), BAD.tolist()]
+    found = coloured(np.array((0.0, WORST_ERROR, 5.0 * WORST_ERROR)))
+    assert found.tolist() == [GOOD_COLOUR.tolist(), BAD_COLOUR.tolist(), BAD_COLOUR.tolist()]

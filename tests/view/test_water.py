@@ -11,15 +11,15 @@ import pytest
 import viser
 
 from katana450.arm.robot.props import load_props
-from katana450.arm.robot.water import around_of
+from katana450.arm.robot.water import water_environment
 from katana450.maths.geometry import so3
-from katana450.maths.water.flow import Flow
+from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.puddle import THICKNESS
 from katana450.server.view.water import WORTH_SENDING, WaterNodes
 from tests.viser_bridge.internals import nodes, outlet
 from tests.water.motions import UPRIGHT, over_basin, placed, poured, turned_to
 
-FLOW = Flow(around_of(load_props()))
+FLOW = WaterFlow(water_environment(load_props()))
 
 
 class Told:
@@ -27,7 +27,7 @@ class Told:
 
     def __init__(self, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> None:
         self.server = server
-        self.nodes = WaterNodes(server, FLOW.around)
+        self.nodes = WaterNodes(server, FLOW.water_environment)
         self._messages: list[Any] = []
         interface = outlet(server)
         queue = interface.queue_message
@@ -72,13 +72,13 @@ def test_a_cup_that_moves_level_takes_its_water_along(told: Told) -> None:
     told.nodes.show(FLOW.step(water, placed(0.3, 0.12, 0.2), UPRIGHT, 0.01))
     assert len(told.since()) == 1
     x, y, z = told.node("cup").vertices.mean(axis=0)
-    level = 2e-4 / (math.pi * FLOW.around.cup.inside.radius**2)
+    level = 2e-4 / (math.pi * FLOW.water_environment.cup.inside.radius**2)
     assert (x, y) == pytest.approx((0.3, 0.12), abs=1e-3)
-    assert z == pytest.approx(0.2 + FLOW.around.cup.floor + 0.5 * level, abs=1e-5)
+    assert z == pytest.approx(0.2 + FLOW.water_environment.cup.floor + 0.5 * level, abs=1e-5)
 
 
 def test_all_of_a_pour_is_seen(told: Told) -> None:
-    water = FLOW.begin(2e-4, over_basin(FLOW.around, 0.0))
+    water = FLOW.begin(2e-4, over_basin(FLOW.water_environment, 0.0))
     told.nodes.show(water)
     assert told.node("cup").visible
     assert not told.node("stream").visible
@@ -93,9 +93,9 @@ def test_all_of_a_pour_is_seen(told: Told) -> None:
     assert not told.node("cup").visible
     assert told.node("basin").visible
     assert heights == sorted(heights)
-    level = FLOW.around.basin.level(2e-4)
+    level = FLOW.water_environment.basin.level(2e-4)
     assert heights[-1] == pytest.approx(level, abs=WORTH_SENDING)
-    radius = FLOW.around.basin.radius(level)
+    radius = FLOW.water_environment.basin.radius(level)
     assert told.node("basin").scale[:2] == pytest.approx((radius, radius), abs=WORTH_SENDING)
     assert told.since()
 
@@ -140,7 +140,7 @@ def test_hidden_water_comes_back(told: Told) -> None:
 
 
 def test_a_shape_is_small_on_the_wire(told: Told) -> None:
-    water = FLOW.begin(2e-4, over_basin(FLOW.around, 0.0))
+    water = FLOW.begin(2e-4, over_basin(FLOW.water_environment, 0.0))
     *_, water = poured(FLOW, water, turned_to(2.0, 1.0), 1.0, 0.01)
     told.nodes.show(water)
     assert len(told.node("cup").vertices) + len(told.node("stream").vertices) < 400

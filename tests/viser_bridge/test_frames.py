@@ -39,10 +39,10 @@ def visers_own(monkeypatch: pytest.MonkeyPatch) -> Any:
 class Line:
     """Takes in what is sent."""
 
-    def __init__(self, hatch: frames.FrameSlot | None = None) -> None:
+    def __init__(self, slot: frames.FrameSlot | None = None) -> None:
         self.heard: list[bytes] = []
         self.request = SimpleNamespace(
-            headers={} if hatch is None else {frames.HATCH_HEADER: hatch.name}
+            headers={} if slot is None else {frames.FRAME_SLOT_HEADER: slot.name}
         )
 
     async def send(self, frame: bytes) -> None:
@@ -115,17 +115,17 @@ def test_a_crowd_is_sent_frames_that_were_packed_once(monkeypatch: pytest.Monkey
     assert all(line.heard == lines[0].heard for line in lines)
 
 
-def test_what_is_not_taken_gives_way_to_what_is_newer() -> None:
-    async def take(hatch: frames.FrameSlot) -> list[float]:
-        told = opened(await hatch.take())[0]["messages"]
+def test_unread_state_is_replaced_by_a_newer_one() -> None:
+    async def take(slot: frames.FrameSlot) -> list[float]:
+        told = opened(await slot.take())[0]["messages"]
         return [message["position"][0] for message in told]
 
     async def act(viser: asyncio.AbstractEventLoop) -> None:
-        hatch = frames.FrameSlot()
+        slot = frames.FrameSlot()
 
         async def begin() -> tuple[Any, Any]:
             buffer = AsyncMessageBuffer(viser, persistent_messages=True)
-            return buffer, asyncio.create_task(frames.produce(Line(hatch), buffer, 1))
+            return buffer, asyncio.create_task(frames.produce(Line(slot), buffer, 1))
 
         there = partial(asyncio.run_coroutine_threadsafe, loop=viser)
         buffer, producing = await asyncio.wrap_future(there(begin()))
@@ -137,14 +137,14 @@ def test_what_is_not_taken_gives_way_to_what_is_newer() -> None:
                 await asyncio.sleep(0.05)
 
         await push(1.0, 2.0, 3.0)
-        assert await take(hatch) == [1.0]
-        assert await take(hatch) == [3.0]
-        waiting = asyncio.create_task(take(hatch))
+        assert await take(slot) == [1.0]
+        assert await take(slot) == [3.0]
+        waiting = asyncio.create_task(take(slot))
         await asyncio.sleep(0.1)
         assert not waiting.done()
         await push(4.0, 5.0)
         assert await waiting == [4.0]
-        assert await take(hatch) == [5.0]
+        assert await take(slot) == [5.0]
 
         async def end() -> None:
             producing.cancel()
@@ -165,14 +165,14 @@ def test_what_is_not_taken_gives_way_to_what_is_newer() -> None:
         viser.close()
 
 
-def test_what_a_message_says_later_is_sent_later() -> None:
+def test_later_message_is_sent_later() -> None:
     packer = frames.Packer()
     props = {"visible": True}
     window = [wire.SceneNodeUpdateMessage("/a", props)]
     before = packer.frame(window)
     assert packer.frame(window) is before
     props["visible"] = False
-    asyncio.run(asyncio.sleep(2 * frames.FRESH))
+    asyncio.run(asyncio.sleep(2 * frames.FRESH_SECONDS))
     assert opened(packer.frame(window)) != opened(before)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.flow import Water, WaterFlow
 
 Step = tuple[FloatArray, FloatArray]
 """The pose of the cup (4, 4) and the acceleration of its middle (3,)."""
@@ -23,10 +23,10 @@ def placed(x: float, y: float, z: float, tilt: float = 0.0) -> FloatArray:
     return se3.from_rotation_translation(so3.exp((tilt, 0.0, 0.0)), (x, y, z))
 
 
-def over_basin(around: WaterEnvironment, tilt: float) -> FloatArray:
+def over_basin(environment: WaterEnvironment, tilt: float) -> FloatArray:
     """A cup whose mouth is 20 cm over the table, turned about the middle of it."""
-    x, y, _ = around.basin.at
-    mouth = around.cup.floor + around.cup.inside.depth
+    x, y, _ = environment.basin.at
+    mouth = environment.cup.floor + environment.cup.inside.depth
     R = so3.exp((tilt, 0.0, 0.0))
     return se3.from_rotation_translation(R, np.array((x, y, 0.2)) - R @ (0.0, 0.0, mouth))
 
@@ -41,11 +41,11 @@ def carried(start: float, way: float, duration: float, dt: float) -> Iterator[St
 
 
 def poured(
-    flow: Flow, water: Water, tilt: Callable[[float], float], duration: float, dt: float
+    flow: WaterFlow, water: Water, tilt: Callable[[float], float], duration: float, dt: float
 ) -> Iterator[Water]:
     """The water in a cup over the basin that is tilted by ``tilt`` of the time."""
     for k in range(1, round(duration / dt) + 1):
-        water = flow.step(water, over_basin(flow.around, tilt(k * dt)), UPRIGHT, dt)
+        water = flow.step(water, over_basin(flow.water_environment, tilt(k * dt)), UPRIGHT, dt)
         yield water
 
 

@@ -13,7 +13,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.flow import Water, WaterFlow
 
 DT = 0.01
 LEVEL = np.deg2rad((-50.0, -70.0, 100.0, -30.0, 0.0))
@@ -41,7 +41,7 @@ def swung(arm: MountedArm, stop_after: float) -> tuple[list[FloatArray], FloatAr
 
 
 def carried_by(
-    flow: Flow, volume: float, poses: list[FloatArray], accelerations: FloatArray
+    flow: WaterFlow, volume: float, poses: list[FloatArray], accelerations: FloatArray
 ) -> tuple[Water, float]:
     """The water in the end, and the least margin [m] it had to the rim."""
     water, least = flow.begin(volume, poses[0]), math.inf
@@ -53,7 +53,7 @@ def carried_by(
 
 @pytest.mark.parametrize("stop_after", [9.0, 0.6], ids=["whole way", "stopped"])
 def test_at_full_speed_the_arm_keeps_the_water_off_the_rim(
-    arm: MountedArm, flow: Flow, stop_after: float
+    arm: MountedArm, flow: WaterFlow, stop_after: float
 ) -> None:
     poses, accelerations = swung(arm, stop_after)
     travelled = np.linalg.norm(poses[-1][:3, 3] - poses[0][:3, 3])

@@ -25,12 +25,12 @@ tilts = st.one_of(
     st.floats(-14.0, -1.0).map(lambda e: math.pi - 10.0**e),
 )
 cylinders = st.builds(Cylinder, st.floats(0.005, 0.5), st.floats(0.005, 0.5))
-shares = st.one_of(st.floats(0.0, 1.0), st.floats(-9.0, 0.0).map(lambda e: 10.0**e))
+fractions = st.one_of(st.floats(0.0, 1.0), st.floats(-9.0, 0.0).map(lambda e: 10.0**e))
 
 
-def level_at(cylinder: Cylinder, tilt: float, share: float) -> float:
+def level_at(cylinder: Cylinder, tilt: float, fraction: float) -> float:
     low, high = cylinder.span(tilt)
-    return low + share * (high - low)
+    return low + fraction * (high - low)
 
 
 def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
@@ -48,8 +48,8 @@ def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
 
 @repeatable
 @given(cylinders, st.floats(0.01, math.pi - 0.01), st.floats(0.0, 1.0))
-def test_as_much_as_its_columns_together(cylinder: Cylinder, tilt: float, share: float) -> None:
-    level = level_at(cylinder, tilt, share)
+def test_as_much_as_its_columns_together(cylinder: Cylinder, tilt: float, fraction: float) -> None:
+    level = level_at(cylinder, tilt, fraction)
     expected = summed_up(cylinder, tilt, level)
     assert cylinder.volume(tilt, level) == pytest.approx(expected, abs=5e-4 * cylinder.capacity)
 
@@ -60,8 +60,8 @@ def test_points_thrown_at_random_are_below_as_often() -> None:
     r, turn = np.sqrt(rng.random(n)) * CUP.radius, rng.random(n) * math.tau
     x, z = r * np.cos(turn), rng.random(n) * CUP.depth
     for tilt in np.linspace(0.0, math.pi, 13):
-        for share in (0.1, 0.35, 0.6, 0.9):
-            level = level_at(CUP, tilt, share)
+        for fraction in (0.1, 0.35, 0.6, 0.9):
+            level = level_at(CUP, tilt, fraction)
             below = float((math.sin(tilt) * x + math.cos(tilt) * z <= level).mean())
             assert CUP.volume(tilt, level) / CUP.capacity == pytest.approx(below, abs=5e-3)
 
@@ -79,9 +79,9 @@ def test_known_volumes() -> None:
 
 
 @repeatable
-@given(cylinders, tilts, shares)
-def test_both_sides_make_the_whole(cylinder: Cylinder, tilt: float, share: float) -> None:
-    level = level_at(cylinder, tilt, share)
+@given(cylinders, tilts, fractions)
+def test_both_sides_make_the_whole(cylinder: Cylinder, tilt: float, fraction: float) -> None:
+    level = level_at(cylinder, tilt, fraction)
     # Seen from the other side the plane faces down.
     rest = cylinder.volume(math.pi - tilt, -level)
     up = cylinder.volume(tilt, level)
@@ -92,7 +92,7 @@ def test_both_sides_make_the_whole(cylinder: Cylinder, tilt: float, share: float
 
 
 @repeatable
-@given(cylinders, tilts, shares, shares)
+@given(cylinders, tilts, fractions, fractions)
 def test_a_higher_plane_has_more_below(c: Cylinder, tilt: float, a: float, b: float) -> None:
     low, high = sorted((level_at(c, tilt, a), level_at(c, tilt, b)))
     more = c.volume(tilt, high) - c.volume(tilt, low)
@@ -103,21 +103,23 @@ def test_a_higher_plane_has_more_below(c: Cylinder, tilt: float, a: float, b: fl
 
 
 @repeatable
-@given(cylinders, tilts, shares, st.floats(-1e-9, 1e-9))
-def test_a_hair_of_tilt_changes_a_hair(c: Cylinder, tilt: float, share: float, by: float) -> None:
+@given(cylinders, tilts, fractions, st.floats(-1e-9, 1e-9))
+def test_a_hair_of_tilt_changes_a_hair(
+    c: Cylinder, tilt: float, fraction: float, by: float
+) -> None:
     assume(0.0 <= tilt + by <= math.pi)
-    level = level_at(c, tilt, share)
+    level = level_at(c, tilt, fraction)
     size = math.hypot(c.radius, c.depth)
     change = abs(c.volume(tilt + by, level) - c.volume(tilt, level))
     assert change <= 8.0 * size**3 * abs(by) + 1e-13 * c.capacity
 
 
 @repeatable
-@given(cylinders, tilts, shares)
+@given(cylinders, tilts, fractions)
 def test_the_level_of_a_volume_has_that_volume_below(
-    cylinder: Cylinder, tilt: float, share: float
+    cylinder: Cylinder, tilt: float, fraction: float
 ) -> None:
-    volume = share * cylinder.capacity
+    volume = fraction * cylinder.capacity
     level = cylinder.level(tilt, volume)
     assert cylinder.volume(tilt, level) == pytest.approx(volume, abs=4e-15 * cylinder.capacity)
     low, high = cylinder.span(tilt)
@@ -127,9 +129,9 @@ def test_the_level_of_a_volume_has_that_volume_below(
 @repeatable
 @given(cylinders, st.floats(0.0, math.pi), st.floats(0.05, 0.95))
 def test_the_surface_is_what_the_volume_grows_by(
-    cylinder: Cylinder, tilt: float, share: float
+    cylinder: Cylinder, tilt: float, fraction: float
 ) -> None:
-    level = level_at(cylinder, tilt, share)
+    level = level_at(cylinder, tilt, fraction)
     step = 1e-6 * (cylinder.span(tilt)[1] - cylinder.span(tilt)[0])
     grown = cylinder.volume(tilt, level + step) - cylinder.volume(tilt, level - step)
     scale = cylinder.surface(tilt, level)
@@ -151,8 +153,8 @@ def test_what_it_holds_ends_at_the_lip() -> None:
 
 @repeatable
 @given(cylinders, st.floats(0.001, 0.999))
-def test_it_spills_from_the_tilt_at_which_it_holds_no_more(c: Cylinder, share: float) -> None:
-    volume = share * c.capacity
+def test_it_spills_from_the_tilt_at_which_it_holds_no_more(c: Cylinder, fraction: float) -> None:
+    volume = fraction * c.capacity
     tilt = c.spills_at(volume)
     assert c.holds(tilt) == pytest.approx(volume, rel=1e-9)
     assert c.margin(tilt, c.level(tilt, volume)) == pytest.approx(0.0, abs=1e-9)

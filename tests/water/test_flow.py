@@ -15,7 +15,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.geometry.vectors import Vector
 from katana450.maths.water.environment import Basin, WaterEnvironment
-from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.flow import Water, WaterFlow
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.slosh import steady_acceleration
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
@@ -40,18 +40,18 @@ moves = st.lists(
 )
 
 
-def checked(before: Water, after: Water, flow: Flow) -> None:
+def checked(before: Water, after: Water, flow: WaterFlow) -> None:
     assert after.total == before.total
     assert min(after.cup, after.basin) >= 0
     assert all(parcel.volume > 0 for parcel in after.parcels)
     assert all(puddle.volume > 0 for puddle in after.puddles)
-    assert after.cup <= counted(flow.around.cup.inside.capacity)
-    assert after.basin <= counted(flow.around.basin.capacity)
+    assert after.cup <= counted(flow.water_environment.cup.inside.capacity)
+    assert after.basin <= counted(flow.water_environment.basin.capacity)
 
 
 @repeatable
 @given(st.floats(0.0, 2.4e-4), moves)
-def test_no_motion_makes_or_loses_water(flow: Flow, volume: float, moves: list[Move]) -> None:
+def test_no_motion_makes_or_loses_water(flow: WaterFlow, volume: float, moves: list[Move]) -> None:
     water = flow.begin(volume, placed(0.3, 0.0, 0.2))
     assert abs(water.total * FEMTOLITRE - volume) <= FEMTOLITRE + 1e-9 * volume
     for turn, place, acceleration, dt in moves:
@@ -64,31 +64,31 @@ def test_no_motion_makes_or_loses_water(flow: Flow, volume: float, moves: list[M
 @settings(repeatable, max_examples=25)
 @given(st.floats(0.5, 6.0), st.floats(0.0, math.pi), st.sampled_from([0.01, 0.05]))
 def test_a_cup_over_the_basin_keeps_what_its_tilt_holds_and_the_rest_is_caught(
-    flow: Flow, rate: float, final: float, dt: float
+    flow: WaterFlow, rate: float, final: float, dt: float
 ) -> None:
-    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     for after in poured(flow, water, turned_to(final, rate), final / rate + 2.5, dt):
         checked(water, after, flow)
         assert after.cup <= water.cup
         water = after
-    held = flow.around.cup.inside.holds(final)
+    held = flow.water_environment.cup.inside.holds(final)
     assert water.cup == min(counted(FULL), counted(held))
     assert not water.parcels
     assert water.spilled == 0
 
 
-def test_a_cup_turned_over_is_emptied_into_the_basin_whole(flow: Flow) -> None:
-    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+def test_a_cup_turned_over_is_emptied_into_the_basin_whole(flow: WaterFlow) -> None:
+    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(math.radians(120.0), 1.0), 4.0, 0.01)
     assert (water.cup, water.basin, water.spilled) == (0, water.total, 0)
 
 
-def test_stopped_in_the_middle_it_flows_down_to_the_lip_and_no_farther(flow: Flow) -> None:
+def test_stopped_in_the_middle_it_flows_down_to_the_lip_and_no_farther(flow: WaterFlow) -> None:
     tilt = math.radians(65.0)
-    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     runs = list(poured(flow, water, turned_to(tilt, 1.0), 8.0, 0.01))
     at_stop = round(tilt / 0.01)
-    held = counted(flow.around.cup.inside.holds(tilt))
+    held = counted(flow.water_environment.cup.inside.holds(tilt))
     # It goes on when the arm stands, ever more slowly, and comes to an end within two seconds.
     flowing = [a.cup - b.cup for a, b in pairwise(runs[at_stop:])]
     assert flowing[0] > 0
@@ -100,16 +100,16 @@ def test_stopped_in_the_middle_it_flows_down_to_the_lip_and_no_farther(flow: Flo
     assert (last.cup, last.basin, last.spilled) == (held, last.total - held, 0)
 
 
-def test_the_size_of_the_steps_hardly_matters(flow: Flow) -> None:
+def test_the_size_of_the_steps_hardly_matters(flow: WaterFlow) -> None:
     left = []
     for dt in (0.0025, 0.01, 0.05):
-        water = flow.begin(FULL, over_basin(flow.around, 0.0))
+        water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
         *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, dt)
         left.append(water.cup / MILLILITRE)
     assert left == pytest.approx([left[0]] * 3, abs=6.0)
 
 
-def carry(flow: Flow, way: float, duration: float) -> tuple[Water, float]:
+def carry(flow: WaterFlow, way: float, duration: float) -> tuple[Water, float]:
     water, least = flow.begin(FULL, placed(0.2, -0.3, 0.15)), math.inf
     for T, acceleration in carried(0.2, way, duration, 0.01):
         water = flow.step(water, T, acceleration, 0.01)
@@ -120,10 +120,12 @@ def carry(flow: Flow, way: float, duration: float) -> tuple[Water, float]:
     return water, least
 
 
-def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: Flow) -> None:
+def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: WaterFlow) -> None:
     water, least = carry(flow, 0.4, 2.0)
     assert (water.cup, water.spilled) == (water.total, 0)
-    at_rest = flow.around.cup.inside.depth - FULL / (math.pi * flow.around.cup.inside.radius**2)
+    at_rest = flow.water_environment.cup.inside.depth - FULL / (
+        math.pi * flow.water_environment.cup.inside.radius**2
+    )
     assert 0.7 * at_rest < least < at_rest
     water, least = carry(flow, 0.4, 0.45)
     assert least < 0.0
@@ -131,23 +133,25 @@ def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: Flow) -> None:
     assert water.cup + water.spilled == water.total
 
 
-def test_the_steady_acceleration_is_where_spilling_begins(flow: Flow) -> None:
+def test_the_steady_acceleration_is_where_spilling_begins(flow: WaterFlow) -> None:
     T = placed(0.2, -0.3, 0.15)
-    limit = steady_acceleration(flow.around.cup.inside, FULL)
-    for share, spills in ((0.98, False), (1.02, True)):
+    limit = steady_acceleration(flow.water_environment.cup.inside, FULL)
+    for fraction, spills in ((0.98, False), (1.02, True)):
         water = flow.begin(FULL, T)
         # Brought up slowly, over many swings.
         for k in range(3000):
-            pull = share * limit * min(k / 2500.0, 1.0)
+            pull = fraction * limit * min(k / 2500.0, 1.0)
             water = flow.step(water, T, (0.0, pull, 0.0), 0.01)
         assert (water.spilled > 0) is spills
 
 
-def test_the_surface_leans_against_the_acceleration(flow: Flow) -> None:
+def test_the_surface_leans_against_the_acceleration(flow: WaterFlow) -> None:
     water = flow.begin(1e-4, placed(0.2, -0.3, 0.15))
     upright = flow.surface(water)
     assert upright.tilt == 0.0
-    assert upright.level == pytest.approx(1e-4 / (math.pi * flow.around.cup.inside.radius**2))
+    assert upright.level == pytest.approx(
+        1e-4 / (math.pi * flow.water_environment.cup.inside.radius**2)
+    )
     for _ in range(3000):
         water = flow.step(water, water.T_base_cup, (1.0, 0.0, 0.0), 0.01)
     surface = flow.surface(water)
@@ -156,7 +160,7 @@ def test_the_surface_leans_against_the_acceleration(flow: Flow) -> None:
     assert surface.tilt == pytest.approx(math.atan2(1.0, 9.81), abs=1e-6)
 
 
-def test_water_leaves_with_the_lip_and_flies_on(flow: Flow) -> None:
+def test_water_leaves_with_the_lip_and_flies_on(flow: WaterFlow) -> None:
     T = placed(0.2, -0.3, 0.3, math.radians(80.0))
     water = flow.begin(1.5e-4, T)
     moved = T.copy()
@@ -172,7 +176,7 @@ def test_water_leaves_with_the_lip_and_flies_on(flow: Flow) -> None:
     assert again.parcels[0] == parcel._replace(age=0.01)
 
 
-def test_the_cup_catches_what_falls_into_its_mouth(flow: Flow) -> None:
+def test_the_cup_catches_what_falls_into_its_mouth(flow: WaterFlow) -> None:
     water = flow.begin(1e-4, placed(0.2, -0.3, 0.1))
     drop = Parcel(MILLILITRE, (0.21, -0.3, 0.192), (0.0, 0.0, -1.0), 0.0, 0.01)
     for offset, caught in ((0.0, True), (0.03, False)):
@@ -185,10 +189,10 @@ def test_the_cup_catches_what_falls_into_its_mouth(flow: Flow) -> None:
         checked(flying, after, flow)
 
 
-def test_a_full_basin_spills_onto_the_table(around: WaterEnvironment) -> None:
-    small = Basin(around.basin.at, 0.004, 0.04, 0.05, 0.01, 0.06)
-    flow = Flow(WaterEnvironment(around.cup, small, around.table))
-    water = flow.begin(FULL, over_basin(flow.around, 0.0))
+def test_a_full_basin_spills_onto_the_table(environment: WaterEnvironment) -> None:
+    small = Basin(environment.basin.at, 0.004, 0.04, 0.05, 0.01, 0.06)
+    flow = WaterFlow(WaterEnvironment(environment.cup, small, environment.table))
+    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     assert water.basin == counted(small.capacity)
     assert water.basin + water.spilled == water.total
@@ -197,7 +201,7 @@ def test_a_full_basin_spills_onto_the_table(around: WaterEnvironment) -> None:
         assert math.hypot(puddle.at[0] - x, puddle.at[1] - y) < 0.08
 
 
-def test_in_free_fall_water_stays_and_upside_down_it_does_not(flow: Flow) -> None:
+def test_in_free_fall_water_stays_and_upside_down_it_does_not(flow: WaterFlow) -> None:
     T = placed(0.2, -0.3, 0.3)
     water = flow.begin(FULL, T)
     for _ in range(400):
@@ -207,20 +211,20 @@ def test_in_free_fall_water_stays_and_upside_down_it_does_not(flow: Flow) -> Non
     assert (water.cup, water.air) == (0, 0)
 
 
-def test_water_at_rest_rests(flow: Flow) -> None:
+def test_water_at_rest_rests(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15, 0.2))
     after = flow.step(water, water.T_base_cup, UPRIGHT, 0.01)
     assert (after.cup, after.parcels, after.slosh) == (water.cup, (), water.slosh)
 
 
-def test_a_step_of_no_time_only_moves_the_cup(flow: Flow) -> None:
+def test_a_step_of_no_time_only_moves_the_cup(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15))
     after = flow.step(water, placed(0.3, -0.3, 0.15, 2.0), UPRIGHT, 0.0)
     assert after.cup == water.cup
     assert after.T_base_cup[0, 3] == 0.3
 
 
-def test_the_puddles_stay_few(flow: Flow) -> None:
+def test_the_puddles_stay_few(flow: WaterFlow) -> None:
     water = flow.begin(2.4e-4, placed(-0.2, -0.5, 0.2, 0.3))
     for k in range(600):
         T = placed(-0.2 + k * 1.5e-3, -0.5, 0.2, 0.3 + k * 3e-3)
@@ -230,13 +234,13 @@ def test_the_puddles_stay_few(flow: Flow) -> None:
     assert 4 <= len(water.puddles) <= 8
 
 
-def test_a_cup_cannot_begin_fuller_than_full(flow: Flow) -> None:
+def test_a_cup_cannot_begin_fuller_than_full(flow: WaterFlow) -> None:
     for volume in (-1e-6, 1e-3, math.nan):
         with pytest.raises(InputError, match="ml"):
             flow.begin(volume, np.eye(4))
 
 
-def test_bad_numbers_are_refused(flow: Flow) -> None:
+def test_bad_numbers_are_refused(flow: WaterFlow) -> None:
     water = flow.begin(FULL, np.eye(4))
     with pytest.raises(InputError, match="pose of the cup"):
         flow.step(water, np.ones((4, 4)), UPRIGHT, 0.01)

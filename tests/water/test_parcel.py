@@ -29,14 +29,14 @@ def test_it_flies_as_a_stone_does() -> None:
 @repeatable
 @given(st.tuples(st.floats(-0.2, 0.8), st.floats(-0.6, 0.8), st.floats(0.08, 0.6)), velocities)
 def test_it_lands_where_small_steps_lead(
-    around: WaterEnvironment,
+    environment: WaterEnvironment,
     start: tuple[float, float, float],
     velocity: tuple[float, float, float],
 ) -> None:
-    basin, table = around.basin, around.table
+    basin, table = environment.basin, environment.table
     parcel = Parcel(1, start, velocity, 0.0, 0.01)
     level = 0.01
-    end = landing(parcel, around, level)
+    end = landing(parcel, environment, level)
     (x, y, z), (u, v, w) = start, velocity
     dt, t, ground, off = 1e-4, 0.0, None, math.inf
     while ground is None:
@@ -59,20 +59,20 @@ def test_it_lands_where_small_steps_lead(
         assert end.point == pytest.approx((x, y, z), abs=2e-3)
 
 
-def test_what_leaves_inside_the_basin_stays_there(around: WaterEnvironment) -> None:
-    x, y, _ = around.basin.at
+def test_what_leaves_inside_the_basin_stays_there(environment: WaterEnvironment) -> None:
+    x, y, _ = environment.basin.at
     dipped = Parcel(1, (x, y, 0.03), (0.1, 0.0, 0.0), 0.0, 0.01)
-    assert landing(dipped, around, 0.01).ground is Ground.BASIN
+    assert landing(dipped, environment, 0.01).ground is Ground.BASIN
     beside = dipped._replace(start=(x + 0.2, y, 0.03))
-    assert landing(beside, around, 0.01).ground is Ground.TABLE
+    assert landing(beside, environment, 0.01).ground is Ground.TABLE
 
 
-def test_beside_the_table_there_is_the_floor(around: WaterEnvironment) -> None:
-    (west, _), floor = around.table.x, around.table.floor
-    end = landing(Parcel(1, (west - 0.1, 0.0, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01), around, 0.0)
+def test_beside_the_table_there_is_the_floor(environment: WaterEnvironment) -> None:
+    (west, _), floor = environment.table.x, environment.table.floor
+    end = landing(Parcel(1, (west - 0.1, 0.0, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01), environment, 0.0)
     assert end.ground is Ground.FLOOR
     assert end.point == pytest.approx((west - 0.1, 0.0, floor))
     assert end.age == pytest.approx(math.sqrt(2.0 * (0.3 - floor) / GRAVITY))
     # Already lower than all there is.
     sunk = Parcel(1, (west - 0.1, 0.0, -0.4), (0.0, 0.0, -1.0), 0.0, 0.01)
-    assert landing(sunk, around, 0.0) == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))
+    assert landing(sunk, environment, 0.0) == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))

@@ -6,13 +6,13 @@ import math
 
 import pytest
 
-from katana450.maths.water.flow import Flow
+from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.score import Course, score
 from tests.water.motions import UPRIGHT, over_basin, poured, turned_to
 
 
-def test_a_pour_into_the_basin_counts_whole(flow: Flow) -> None:
-    water = flow.begin(2e-4, over_basin(flow.around, 0.0))
+def test_a_pour_into_the_basin_counts_whole(flow: WaterFlow) -> None:
+    water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     result = score(water, Course())
     assert result.emptied_percent == 100.0
@@ -20,8 +20,8 @@ def test_a_pour_into_the_basin_counts_whole(flow: Flow) -> None:
     assert (result.in_cup_ml, result.in_air_ml, result.spilled_ml) == (0.0, 0.0, 0.0)
 
 
-def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: Flow) -> None:
-    water = flow.begin(2e-4, over_basin(flow.around, 0.0))
+def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
+    water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, 0.01)
     result = score(water, Course())
     assert min(result.in_cup_ml, result.in_basin_ml, result.in_air_ml) > 0.0
@@ -30,13 +30,13 @@ def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: Flow) -> None:
     assert result.emptied_percent == pytest.approx(result.in_basin_ml / 2.0)
 
 
-def test_of_no_water_nothing_can_be_emptied(flow: Flow) -> None:
-    empty = flow.begin(0.0, over_basin(flow.around, 0.0))
-    empty = flow.step(empty, over_basin(flow.around, 2.0), UPRIGHT, 0.01)
+def test_of_no_water_nothing_can_be_emptied(flow: WaterFlow) -> None:
+    empty = flow.begin(0.0, over_basin(flow.water_environment, 0.0))
+    empty = flow.step(empty, over_basin(flow.water_environment, 2.0), UPRIGHT, 0.01)
     assert math.isnan(score(empty, Course()).emptied_percent)
 
 
-def test_a_course_knows_its_time_and_its_greatest_jerk(flow: Flow) -> None:
+def test_a_course_knows_its_time_and_its_greatest_jerk(flow: WaterFlow) -> None:
     course = Course()
     for k in range(201):
         t = 0.01 * k
@@ -44,5 +44,5 @@ def test_a_course_knows_its_time_and_its_greatest_jerk(flow: Flow) -> None:
     assert course.duration == pytest.approx(2.01)
     assert course.peak_jerk == pytest.approx(3.0, rel=1e-3)
     assert course.after((9.0, 9.0, 9.0), 0.0) == course
-    result = score(flow.begin(1e-4, over_basin(flow.around, 0.0)), course)
+    result = score(flow.begin(1e-4, over_basin(flow.water_environment, 0.0)), course)
     assert (result.duration, result.peak_jerk) == (course.duration, course.peak_jerk)

@@ -14,7 +14,7 @@ from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.slosh import (
     DAMPING,
     FIRST_MODE,
-    STILL,
+    REST_TOLERANCE,
     Slosh,
     frequency,
     steady_acceleration,
@@ -40,7 +40,7 @@ def test_one_long_step_is_many_short_ones(
 ) -> None:
     whole = slosh.after(acceleration, omega, dt)
     halves = slosh.after(acceleration, omega, 0.5 * dt).after(acceleration, omega, 0.5 * dt)
-    assert apart(whole, halves) < 2.0 * STILL * omega
+    assert apart(whole, halves) < 2.0 * REST_TOLERANCE * omega
     # The equation itself, by Runge's midpoint rule.
     rest = np.array(acceleration[:2]) / GRAVITY
     x, v = np.array(slosh.lean), np.array(slosh.rate)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.flow import Flow, Surface
+from katana450.maths.water.flow import WaterFlow, WaterSurface
 from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.puddle import THICKNESS
 from katana450.maths.water.surface import (
@@ -48,9 +48,9 @@ def closed(corners: FloatArray, faces: Faces) -> trimesh.Trimesh:
     st.floats(0.02, 0.98),
     st.floats(0.0, math.tau),
 )
-def test_the_body_holds_the_water(tilt: float, share: float, turn: float) -> None:
-    volume = share * CUP.capacity
-    surface = Surface(tilt, CUP.level(tilt, volume), (math.cos(turn), math.sin(turn), 0.0))
+def test_the_body_holds_the_water(tilt: float, fraction: float, turn: float) -> None:
+    volume = fraction * CUP.capacity
+    surface = WaterSurface(tilt, CUP.level(tilt, volume), (math.cos(turn), math.sin(turn), 0.0))
     corners = body(CUP, surface)
     mesh = trimesh.Trimesh(corners, BODY_FACES, process=False)
     # Twenty chords for half an arc: up to half a percent less than the round.
@@ -65,15 +65,17 @@ def test_the_body_holds_the_water(tilt: float, share: float, turn: float) -> Non
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 50.0, 75.0, 89.9, 90.0, 100.0, 150.0, 180.0])
 def test_the_body_is_closed(degrees: float) -> None:
     tilt = math.radians(degrees)
-    for share in (0.05, 0.4, 0.9):
-        level = CUP.level(tilt, share * CUP.capacity)
-        assert closed(body(CUP, Surface(tilt, level, (1.0, 0.0, 0.0))), BODY_FACES).is_watertight
+    for fraction in (0.05, 0.4, 0.9):
+        level = CUP.level(tilt, fraction * CUP.capacity)
+        assert closed(
+            body(CUP, WaterSurface(tilt, level, (1.0, 0.0, 0.0))), BODY_FACES
+        ).is_watertight
 
 
-def test_the_stream_runs_from_the_lip_to_the_water(flow: Flow) -> None:
-    water = flow.begin(2e-4, over_basin(flow.around, 0.0))
+def test_the_stream_runs_from_the_lip_to_the_water(flow: WaterFlow) -> None:
+    water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, 0.01)
-    end = landing(water.parcels[0], flow.around, 0.0)
+    end = landing(water.parcels[0], flow.water_environment, 0.0)
     corners = stream(water.parcels, 0.03, end.age)
     assert np.isfinite(corners).all()
     rings = corners.reshape(-1, SIDES, 3)

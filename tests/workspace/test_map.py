@@ -23,9 +23,9 @@ def survey(arm: MountedArm) -> Survey:
 def test_a_map_holds_what_its_voxels_count(survey: Survey) -> None:
     found = survey.map(survey.count(chunk) for chunk in survey.chunks())
     assert len(found.points) > 50
-    assert np.array_equal(found.share * 12, survey.reachability.count(found.points))
-    assert (found.share > 0.0).all()
-    assert (found.share <= 1.0).all()
+    assert np.array_equal(found.fraction * 12, survey.reachability.count(found.points))
+    assert (found.fraction > 0.0).all()
+    assert (found.fraction <= 1.0).all()
     assert (found.points[:, 2] >= 0.0).all()
 
 
@@ -37,7 +37,7 @@ def test_chunks_do_not_change_the_map(survey: Survey, monkeypatch: pytest.Monkey
     counts = {number: survey.count(chunks[number]) for number in reversed(range(len(chunks)))}
     pieces = survey.map(counts[number] for number in range(len(chunks)))
     assert np.array_equal(whole.points, pieces.points)
-    assert np.array_equal(whole.share, pieces.share)
+    assert np.array_equal(whole.fraction, pieces.fraction)
 
 
 def test_the_cloud_is_the_tool_at_random_joint_angles(survey: Survey, arm: MountedArm) -> None:

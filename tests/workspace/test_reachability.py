@@ -12,7 +12,7 @@ import pytest
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.extensions.reachability.reachability import MOST_STEPS, Reachability
+from katana450.extensions.reachability.reachability import MAX_STEPS, Reachability
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
@@ -201,7 +201,7 @@ def test_every_limit_counts(arm: MountedArm) -> None:
         assert total(narrow_lower, narrow_upper) < whole
 
 
-@pytest.mark.parametrize("steps", [0, -1, MOST_STEPS + 1])
+@pytest.mark.parametrize("steps", [0, -1, MAX_STEPS + 1])
 def test_steps_that_are_none_are_refused(arm: MountedArm, steps: int) -> None:
     with pytest.raises(InputError, match="number of pitches"):
         reachability(arm, pitches=steps)

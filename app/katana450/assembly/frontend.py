@@ -5,54 +5,54 @@ from __future__ import annotations
 from argparse import Namespace
 from multiprocessing.connection import Connection
 
-from katana450.arm.control.things import Environment
+from katana450.arm.control.scene_objects import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.link import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.frontend_process import FrontendConfig
 from katana450.assembly.gateway import Gateway
-from katana450.assembly.robot_session import Described, recognised
+from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import ConfigurationError
 from katana450.extension import serve_extensions
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import guarded
-from katana450.server.view.follower import Follower
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.machine_view import MachineView
 from katana450.server.view.panel_folder import FolderContext
 from katana450.server.view.view import View, ViewOptions
+from katana450.server.view.view_updater import ViewUpdater
 
 
-def attached(
-    gateway: Gateway, outfit: FrontendConfig, meshes: Meshes, pipe: Connection
-) -> tuple[FrontEnd, Follower]:
+def build_frontend(
+    gateway: Gateway, config: FrontendConfig, meshes: Meshes, pipe: Connection
+) -> tuple[FrontEnd, ViewUpdater]:
     """Connect ``gateway`` to the arm and return the front's end of ``pipe`` and the view.
 
     The link runs by then, so that nobody is answered with a state older than the link; the view is
     not started. ``meshes``: the meshes of scene objects. Raises ConfigurationError, EOFError.
     """
-    settings, layers = outfit.settings, _layers(outfit.options)
-    found = recognised(settings, outfit.urdf, outfit.tool)
+    settings, layers = config.settings, _layers(config.options)
+    found = find_robot(settings, config.urdf, config.tool)
     robot, session, _ = found
     link = FrontEnd(pipe, session.check)
-    nodes = _nodes(outfit.options, robot, session.surroundings)
+    nodes = _nodes(config.options, robot, session.environment)
     if robot.arm is None:
         for layer in layers:
             if layer.what:
                 raise ConfigurationError(f"{layer.what} {robot.why}")
         link.start()
         gateway.attach(ArmHandle(robot, session, link, None, nodes))
-        return link, _machine_view(gateway, outfit, robot, link)
-    navigator = PlanningWorker(session, link.board, link)
-    view = _view(gateway, outfit, found, link, ViewOptions(layers, meshes))
-    if outfit.options is not None:
-        _add_folders(view, gateway, outfit.options, robot, link)
-    navigator.tell = gateway.announce
-    navigator.redirected = guarded(gateway.hub.runner.redirected)
+        return link, _machine_view(gateway, config, robot, link)
+    planning_worker = PlanningWorker(session, link.state_publisher, link)
+    view = _view(gateway, config, found, link, ViewOptions(layers, meshes))
+    if config.options is not None:
+        _add_folders(view, gateway, config.options, robot, link)
+    planning_worker.tell = gateway.announce
+    planning_worker.redirected = guarded(gateway.hub.runner.redirected)
     link.start()
-    gateway.attach(ArmHandle(robot, session, link, navigator, nodes))
+    gateway.attach(ArmHandle(robot, session, link, planning_worker, nodes))
     return link, view
 
 
@@ -73,17 +73,21 @@ def _nodes(options: Namespace | None, robot: Robot, environment: Environment) ->
 
 
 def _view(
-    gateway: Gateway, outfit: FrontendConfig, found: Described, link: FrontEnd, besides: ViewOptions
+    gateway: Gateway,
+    config: FrontendConfig,
+    found: DescribedRobot,
+    link: FrontEnd,
+    view_options: ViewOptions,
 ) -> View:
     return View(
         gateway.viser,
         found.robot,
-        link.board,
+        link.state_publisher,
         gateway.gestures,
         lambda: link.last_ticket,
         found.session,
-        outfit.settings.frame_rate,
-        besides,
+        config.settings.frame_rate,
+        view_options,
     )
 
 
@@ -95,7 +99,7 @@ def _add_folders(
         gateway.viser,
         robot,
         gateway.gestures,
-        lambda: link.board.snapshot.state,
+        lambda: link.state_publisher.snapshot.state,
         gateway.hub,
         gateway.call,
         options,
@@ -107,13 +111,13 @@ def _add_folders(
 
 
 def _machine_view(
-    gateway: Gateway, outfit: FrontendConfig, robot: Robot, link: FrontEnd
+    gateway: Gateway, config: FrontendConfig, robot: Robot, link: FrontEnd
 ) -> MachineView:
     return MachineView(
         gateway.viser,
         robot,
-        link.board,
+        link.state_publisher,
         gateway.gestures,
         lambda: link.last_ticket,
-        outfit.settings.frame_rate,
+        config.settings.frame_rate,
     )

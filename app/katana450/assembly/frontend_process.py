@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 START_SECONDS = 60.0
 GOODBYE_SECONDS = 5.0
 
-AWAKE = 0.5
+WAKE_INTERVAL = 0.5
 """[s] How soon it is noticed that there is no view any more."""
 
 OPEN, READY = "open", "ready"
@@ -40,7 +40,7 @@ class FrontendConfig:
 
     ``urdf``, ``tool``: see ``robot.loader.load``. ``listening``: the port for browsers. ``lines``:
     the one for JSON lines. ``options``: those of the extensions; None where none takes part.
-    ``meshes``: those of the things there are at first.
+    ``meshes``: those of the objects there are at first.
     """
 
     settings: Settings
@@ -55,7 +55,7 @@ class FrontendConfig:
 class Front:
     """One such process, as the one that started it sees it."""
 
-    def __init__(self, outfit: FrontendConfig) -> None:
+    def __init__(self, config: FrontendConfig) -> None:
         """Starts it."""
         spawn = multiprocessing.get_context("spawn")
         self._told, telling = spawn.Pipe(duplex=False)
@@ -65,7 +65,7 @@ class Front:
         self.pipe, theirs = ends
         self._process = spawn.Process(
             target=_run,
-            args=(outfit, theirs, telling),
+            args=(config, theirs, telling),
             name="katana450 front",
             daemon=True,
         )
@@ -117,14 +117,14 @@ class Front:
             self._process.join()
 
 
-def _run(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
+def _run(config: FrontendConfig, pipe: Connection, telling: Connection) -> None:
     """What it does, from its start to its end."""
     # Ctrl-C goes to all processes of a terminal; the arm's says when this one is to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     reset_priority()
     start_log()
     try:
-        _serve(outfit, pipe, telling)
+        _serve(config, pipe, telling)
     except KatanaError as error:
         telling.send(error)
     except (EOFError, BrokenPipeError):
@@ -132,21 +132,21 @@ def _run(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
         return
 
 
-def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> None:
+def _serve(config: FrontendConfig, pipe: Connection, telling: Connection) -> None:
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.gateway import Gateway
     from katana450.server.viser_bridge.viser_server import close_server
 
     kept = Meshes()
-    kept.put(outfit.meshes, ())
-    options = outfit.options
+    kept.put(config.meshes, ())
+    options = config.options
     taking_part = () if options is None else serve_extensions()
     routes = [part.routes for part in taking_part if part.routes is not None]
     runners = [part.runner() for part in taking_part if part.runner is not None]
     gateway = Gateway(
-        outfit.settings,
-        outfit.listening,
-        outfit.lines,
+        config.settings,
+        config.listening,
+        config.lines,
         kept,
         routes,
         partial(runners[0], options=options) if runners and options is not None else None,
@@ -155,15 +155,15 @@ def _serve(outfit: FrontendConfig, pipe: Connection, telling: Connection) -> Non
     telling.send(OPEN)
     try:
         # The libraries that read the robot take most of a second: the page loads in the meantime.
-        from katana450.assembly.frontend import attached
+        from katana450.assembly.frontend import build_frontend
 
-        link, view = attached(gateway, outfit, kept, pipe)
+        link, view = build_frontend(gateway, config, kept, pipe)
         view.start()
         # What is there by now stays: looking through it for garbage would keep STOP waiting.
         gc.collect()
         gc.freeze()
         telling.send(READY)
-        while not link.cut.wait(AWAKE):
+        while not link.cut.wait(WAKE_INTERVAL):
             if view.failed.is_set():
                 raise SystemExit(1)
         gateway.stop()

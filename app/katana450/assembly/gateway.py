@@ -31,7 +31,7 @@ from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.runner import Runner
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
-from katana450.server.viser_bridge.message_filter import LARGEST
+from katana450.server.viser_bridge.message_filter import MAX_MESSAGE_BYTES
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.acceptor import Acceptor, raise_descriptor_limit
@@ -40,19 +40,19 @@ from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenti
 from katana450.server.web.channel import ARRIVAL
 from katana450.server.web.http_api import RouteProvider
 from katana450.server.web.listen import reaches_beyond
-from katana450.server.web.program_socket import Lines
+from katana450.server.web.program_socket import LineServer
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
 
-UNSENT = 16_384
+MAX_UNSENT_BYTES = 16_384
 """Bytes that may wait to be sent to a browser: what waits is not replaced by what is newer."""
 
-UNREAD = 4_096
+READ_CHUNK_BYTES = 4_096
 """Bytes that are read at once of what a browser sends: they are taken apart at once, and everybody
 waits for it."""
 
-UNREAD_TLS = 65_536
+TLS_READ_CHUNK_BYTES = 65_536
 """Likewise where TLS reads them, which takes all that the machine holds."""
 
 START_SECONDS = 10.0
@@ -75,7 +75,7 @@ class Gateway:
         runner: Callable[[Hub], Runner] | None = None,
     ) -> None:
         """``listening``: the port; ``lines``: that for programs which speak JSON lines.
-        ``meshes``: those that things are of, where uploaded ones are kept too. ``routes``: of the
+        ``meshes``: those that objects are of, where uploaded ones are kept too. ``routes``: of the
         extensions. ``runner``: see ``Hub``.
 
         Raises ConfigurationError when it must not be served there as ``settings`` say.
@@ -95,13 +95,15 @@ class Gateway:
                     keep_alive(each)
             self.address = _address(settings, self._listening)
             self.hub = Hub(time.monotonic, settings.silence, meshes, runner)
-            door = Authenticator(access, self.port, self.address)
+            authenticator = Authenticator(access, self.port, self.address)
             guard = Guard(self.viser)
             self.gestures = Gestures(self.viser, guard, self.hub)
-            proxy = Proxy(self.hub, door, guard, self.viser.get_port(), key)
+            proxy = Proxy(self.hub, authenticator, guard, self.viser.get_port(), key)
             acceptor, budgets = Acceptor(listening), Budgets(self.hub.clock)
-            app = application(self.hub, door, budgets, proxy, self.address, acceptor, routes)
-            self._lines = Lines(self.hub, door, budgets)
+            app = application(
+                self.hub, authenticator, budgets, proxy, self.address, acceptor, routes
+            )
+            self._lines = LineServer(self.hub, authenticator, budgets)
         except BaseException:
             self._listening.close()
             raise
@@ -111,7 +113,7 @@ class Gateway:
                 app,
                 http="h11",
                 ws=_BrowserSocket,
-                ws_max_size=LARGEST,
+                ws_max_size=MAX_MESSAGE_BYTES,
                 ws_per_message_deflate=False,
                 lifespan="off",
                 log_config=None,
@@ -226,18 +228,18 @@ class _BrowserSocket(WebSocketsSansIOProtocol):
 
     def connection_made(self, transport: BaseTransport) -> None:
         super().connection_made(transport)
-        cast(Transport, transport).set_write_buffer_limits(high=UNSENT)
+        cast(Transport, transport).set_write_buffer_limits(high=MAX_UNSENT_BYTES)
         line = transport.get_extra_info("socket")
         if line is None:
             return
         if hasattr(transport, "max_size"):
             # A smaller buffer of the machine would do as well, but what does not fit in it is
             # dropped, the receipts of what was sent the other way with it, and both ends stall.
-            cast(Any, transport).max_size = UNREAD
+            cast(Any, transport).max_size = READ_CHUNK_BYTES
         else:
-            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, UNREAD_TLS)
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, TLS_READ_CHUNK_BYTES)
         if hasattr(socket, "TCP_NOTSENT_LOWAT"):
-            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, UNSENT)
+            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, MAX_UNSENT_BYTES)
 
     def handle_connect(self, event: Request) -> None:
         super().handle_connect(event)

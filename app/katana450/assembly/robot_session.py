@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from katana450.arm.control.messages import UNCHECKED
+from katana450.arm.control.scene_objects import Hand, SceneObject
 from katana450.arm.control.session import Session
-from katana450.arm.control.things import Hand, Thing
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.bare import bare
-from katana450.arm.robot.collision import hand_of, table, things_of, world_of
+from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.water import around_of
+from katana450.arm.robot.water import water_environment
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.link import ArmEnd
 from katana450.arm.runtime.loop import ControlLoop
@@ -31,7 +31,7 @@ from katana450.settings import Settings
 log = logging.getLogger(__name__)
 
 
-class Described(NamedTuple):
+class DescribedRobot(NamedTuple):
     """A robot as its files describe it, the rules for it, and sentences on what they leave open."""
 
     robot: Robot
@@ -39,7 +39,7 @@ class Described(NamedTuple):
     notes: tuple[str, ...]
 
 
-def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
+def describe_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
     """Return the robot with an arm in the file ``urdf``.
 
     ``tool``: the link its targets are set for; see ``load``. Raises RobotDescriptionError for a
@@ -48,7 +48,7 @@ def described(settings: Settings, urdf: Path, tool: str | None) -> Described:
     return arm_session(settings, load(urdf, tool))
 
 
-def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described:
+def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
     """Return the robot in the file ``urdf``: with all its arm can do, or driven joint by joint.
 
     Raises RobotDescriptionError for a robot that is neither, and for one without an arm where a
@@ -64,10 +64,10 @@ def recognised(settings: Settings, urdf: Path, tool: str | None) -> Described:
     joints = robot.joint_group
     session = Session(joints, joints.ready, travel=robot.distance)
     notes = (*robot.notes, *robot.joint_notes, f"Joints only. {robot.why}")
-    return Described(robot, session, notes)
+    return DescribedRobot(robot, session, notes)
 
 
-def arm_session(settings: Settings, robot: Robot) -> Described:
+def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
     """Return ``robot`` with the rules for its arm. Raises RobotDescriptionError without an arm."""
     if settings.bare:
         robot = bare(robot)
@@ -76,28 +76,28 @@ def arm_session(settings: Settings, robot: Robot) -> Described:
     notes = [*arm.notes, *robot.notes, *left_out]
     props = load_props()
     hand: Hand | None = None
-    things: tuple[Thing, ...] = ()
+    objects: tuple[SceneObject, ...] = ()
     if world is None:
         notes.append(UNCHECKED)
     else:
-        hand, things = hand_of(robot, world), things_of(props)
+        hand, objects = hand_of(robot, world), scene_objects_of(props)
         world = world.with_obstacles((table(),))
     session = Session(
         arm,
         arm.ready(settings.ready),
         world,
         hand=hand,
-        things=things,
-        around=around_of(props) if things else None,
+        objects=objects,
+        water_environment=water_environment(props) if objects else None,
     )
-    return Described(robot, session, tuple(notes))
+    return DescribedRobot(robot, session, tuple(notes))
 
 
 class RunningArm:
     """A simulated arm and its control loop, and whoever speaks for people at the end of a pipe."""
 
     def __init__(
-        self, settings: Settings, found: Described, scene: InitialScene | None = None
+        self, settings: Settings, found: DescribedRobot, scene: InitialScene | None = None
     ) -> None:
         """``scene``: what stands around in place of the robot's own, and where the arm stands."""
         robot, session, self.notes = found

@@ -1,4 +1,4 @@
-"""The routes: our page, its files, viser behind its firewall, and what programs may ask."""
+"""The routes: our page, its files, viser behind its message filter, and what programs may ask."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket
 
 from katana450.arm.control.actor import CommandChannel
-from katana450.server.api.fields import LONGEST_PRESS
+from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
-from katana450.server.service.hub import Hub, visiting
+from katana450.server.service.hub import Hub, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.viser_bridge import viser_page
 from katana450.server.viser_bridge.proxy import Proxy
@@ -34,10 +34,10 @@ from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
-LARGEST_BODY = 1024
+MAX_BODY_BYTES = 1024
 """Bytes of what is sent by POST."""
 
-TRIES, AT_ONCE = 2.0, 20.0
+BAD_LINKS_PER_SECOND, BAD_LINKS_BURST = 2.0, 20.0
 """Bad links that are answered a second, and at once, of everybody together."""
 
 
@@ -47,7 +47,7 @@ class _Entry(msgspec.Struct, forbid_unknown_fields=True):
 
 def application(
     hub: Hub,
-    door: Authenticator,
+    authenticator: Authenticator,
     budgets: Budgets,
     proxy: Proxy,
     address: Address,
@@ -60,7 +60,7 @@ def application(
     viser = viser_page.load()
     viser_file = static_files.File.of(viser.html, static_files.TYPES[".html"])
     page_policy, viser_policy = security.page_policy(), viser_page.policy(viser.script_hashes)
-    tries = TokenBucket(TRIES, AT_ONCE, hub.clock())
+    tries = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, hub.clock())
 
     async def page(request: Request) -> Response:
         return index.answer(request, page_policy)
@@ -73,7 +73,7 @@ def application(
         return found.answer(request, page_policy)
 
     async def viser_index(request: Request) -> Response:
-        _known(door, request)
+        _known(authenticator, request)
         scheme = "wss" if address.cookies_are_secure else "ws"
         origin = f"{scheme}://{request.headers['host']}"
         why = viser_page.objection(request.query_params, origin)
@@ -82,15 +82,15 @@ def application(
         return viser_file.answer(request, viser_policy)
 
     async def enter(request: Request) -> Response:
-        """Come in: with the token of a link where the door asks for one."""
+        """Come in: with the token of a link where the server asks for one."""
         try:
-            entry = msgspec.json.decode(await body_of(request, LARGEST_BODY), type=_Entry)
+            entry = msgspec.json.decode(await body_of(request, MAX_BODY_BYTES), type=_Entry)
         except msgspec.MsgspecError as error:
             raise HTTPException(400, "A token is asked for.") from error
-        if not entry.token and door.visitor(request.cookies) is not None:
+        if not entry.token and authenticator.identity(request.cookies) is not None:
             return Response(status_code=204)
         response = Response(status_code=204)
-        if not door.welcome(entry.token, response):
+        if not authenticator.welcome(entry.token, response):
             # Who has a good link is let in, however many others guess.
             if entry.token and not tries.take(hub.clock()):
                 raise HTTPException(429, "Too many tries. Wait a moment.")
@@ -100,11 +100,11 @@ def application(
 
     async def stop(request: Request) -> Response:
         """The same as the button, for a page whose socket is gone."""
-        visitor = _known(door, request)
-        press = request.query_params.get("press", "")[:LONGEST_PRESS]
-        actor = visiting(visitor, CommandChannel.PAGE)
+        identity = _known(authenticator, request)
+        press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
+        actor = actor_of(identity, CommandChannel.PAGE)
         if PAGE.fullmatch(name := request.query_params.get("page", "")):
-            actor = replace(actor, person=hub.person_of(visitor, name))
+            actor = replace(actor, person=hub.person_of(identity, name))
         hub.stop(actor, press or None)
         return Response(status_code=204)
 
@@ -113,7 +113,7 @@ def application(
         return PlainTextResponse("ok\n" if wrong is None else f"{wrong}\n", 503 if wrong else 200)
 
     async def control(socket: WebSocket) -> None:
-        await control_socket.serve(hub, door, budgets, socket)
+        await control_socket.serve(hub, authenticator, budgets, socket)
 
     routes = [
         Route("/", page),
@@ -124,14 +124,14 @@ def application(
         Route("/health", health),
         WebSocketRoute("/viser", proxy.serve),
         WebSocketRoute("/control", control),
-        *Api(hub, door, budgets, provided).routes(),
+        *Api(hub, authenticator, budgets, provided).routes(),
     ]
-    admission = Admission(Starlette(routes=routes), door, acceptor)
+    admission = Admission(Starlette(routes=routes), authenticator, acceptor)
     return security.SecurityMiddleware(admission, address)
 
 
-def _known(door: Authenticator, request: Request) -> Identity:
-    visitor = door.visitor(request.cookies)
-    if visitor is None:
+def _known(authenticator: Authenticator, request: Request) -> Identity:
+    identity = authenticator.identity(request.cookies)
+    if identity is None:
         raise HTTPException(401, "Come in by the front page.")
-    return visitor
+    return identity

@@ -11,7 +11,7 @@ from katana450.arm.control.lease import Role
 DEFAULT_FILE = Path("access.json")
 DEFAULT_DURATION = "12h"
 SECONDS = {"m": 60, "h": 3600, "d": 86400}
-LONGEST_DAYS = 366
+MAX_DAYS = 366
 
 
 def add_access_options(parser: argparse.ArgumentParser) -> None:
@@ -54,8 +54,8 @@ def add_access_options(parser: argparse.ArgumentParser) -> None:
 def _duration(text: str) -> float:
     found = re.fullmatch(r"(\d{1,4})([mhd])", text)
     seconds = int(found[1]) * SECONDS[found[2]] if found else 0
-    if not 0 < seconds <= LONGEST_DAYS * SECONDS["d"]:
+    if not 0 < seconds <= MAX_DAYS * SECONDS["d"]:
         raise argparse.ArgumentTypeError(
-            f"a time is a number and m, h or d, at most {LONGEST_DAYS}d, not {text!r}"
+            f"a time is a number and m, h or d, at most {MAX_DAYS}d, not {text!r}"
         )
     return float(seconds)

@@ -11,8 +11,8 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from katana450.arm.control.choices import met
-from katana450.arm.robot.collision import standing_around, world_of
+from katana450.arm.control.branch_options import contact_at
+from katana450.arm.robot.collision import initial_objects, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
@@ -24,7 +24,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.projection import project
 
-LONGEST_SHOWN = 40
+MAX_SHOWN_CHARACTERS = 40
 """Characters of a wrong value that an error repeats."""
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
@@ -34,20 +34,20 @@ class Kinematics:
     """Forward and inverse kinematics of the arm in the URDF, on plain JSON values."""
 
     def __init__(
-        self, urdf: Path, tool: str | None, *, in_base_frame: bool, badges: bool = False
+        self, urdf: Path, tool: str | None, *, in_base_frame: bool, all_metrics: bool = False
     ) -> None:
         """``in_base_frame``: poses are in the base frame on the table, else in {S}.
 
         ``urdf``, ``tool``: the arm, and the link that is its default tool; see ``load``.
         ``badges``: solutions carry what they cost to take from the request's ``q``.
         """
-        self._badges = badges
+        self._badges = all_metrics
         robot = load(urdf, tool)
         self._arm = robot.require_arm()
         self._world = None
-        if badges:
+        if all_metrics:
             world, _ = world_of(robot)
-            self._world = world and world.with_obstacles(standing_around(load_props()))
+            self._world = world and world.with_obstacles(initial_objects(load_props()))
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -84,7 +84,7 @@ class Kinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
-                | (self._badge(BranchMetrics.of(chain, solution, start)) if self._badges else {})
+                | (self._metrics(BranchMetrics.of(chain, solution, start)) if self._badges else {})
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
@@ -92,12 +92,12 @@ class Kinematics:
             "rotation_misfit": so3.misfit(np.array(given)[:3, :3]),
         }
 
-    def _badge(self, badge: BranchMetrics) -> dict[str, Any]:
-        contact = met(self._world, badge.q, self._arm.gripper.clamp(0.0))
+    def _metrics(self, metrics: BranchMetrics) -> dict[str, Any]:
+        contact = contact_at(self._world, metrics.q, self._arm.gripper.clamp(0.0))
         return {
-            "distance_rad": badge.distance,
-            "time_s": badge.time,
-            "smallest_singular_value": badge.smallest_singular_value,
+            "distance_rad": metrics.distance,
+            "time_s": metrics.time,
+            "smallest_singular_value": metrics.smallest_singular_value,
             "contact": None if contact is None else contact.parts,
         }
 
@@ -185,7 +185,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return "an object" if isinstance(value, dict) else "a list"
     text = json.dumps(value)
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+    return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
 
 
 def _distance(a: FloatArray, b: FloatArray) -> float:

@@ -17,24 +17,24 @@ from katana450.assembly.log_lines import start_log
 from katana450.extension import serve_extensions
 from katana450.platform_support import stop_signals
 from katana450.resources import URDF_PATH
-from katana450.server.web.listen import HERE, listen
+from katana450.server.web.listen import LOOPBACK, listen
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.arm.control.session import Session
     from katana450.arm.robot.initial_scene import InitialScene
-    from katana450.assembly.robot_session import Described
+    from katana450.assembly.robot_session import DescribedRobot
 
-AWAKE = 0.2
+WAKE_INTERVAL = 0.2
 """[s] How soon a signal is heeded, and a front that ended."""
 
-AGAIN = (0.0, 1.0, 5.0, 15.0)
+RESTART_DELAYS = (0.0, 1.0, 5.0, 15.0)
 """[s] Until it is started again, the longer the more often it ended at once."""
 
-SETTLED = 30.0
+STABLE_SECONDS = 30.0
 """[s] A front that ran for so long did not end at once."""
 
-HUNG = 10.0
+HANG_TIMEOUT = 10.0
 """[s] A front that says nothing for so long has hung."""
 
 log = logging.getLogger(__name__)
@@ -82,17 +82,17 @@ def serve(
         signal.signal(number, stop)
     # Held here, so that nobody else takes it while the front is started again.
     listening = listen(settings.host, settings.port)
-    lines = None if settings.lines is None else listen(HERE, settings.lines)
+    lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
 
     meshes = () if scene is None else scene.meshes
-    outfit = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
-    current, arm = Front(outfit), None
+    config = FrontendConfig(settings, urdf, tool, listening, lines, options, meshes)
+    current, arm = Front(config), None
     try:
         # The libraries that read the robot take most of a second; so does the front meanwhile.
-        from katana450.assembly.robot_session import RunningArm, recognised
+        from katana450.assembly.robot_session import RunningArm, find_robot
 
-        found = recognised(settings, urdf, tool) if robot is None else robot
+        found = find_robot(settings, urdf, tool) if robot is None else robot
         arm = RunningArm(settings, found, scene)
         for note in arm.notes:
             print(f"katana450: {note}", file=sys.stderr)
@@ -102,24 +102,24 @@ def serve(
         arm.attach(current.pipe)
         current.wait_for(READY)
         if lines is not None:
-            print(f"Programs: JSON lines on {HERE}:{lines.getsockname()[1]}.", flush=True)
+            print(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.", flush=True)
         print(f"katana450 is ready: {url} (Ctrl-C stops)", flush=True)
         ended, began = 0, time.monotonic()
         # A signal that another thread is given does not wake this one from its wait.
-        while arm.running and not stopping.wait(AWAKE):
+        while arm.running and not stopping.wait(WAKE_INTERVAL):
             if current.running:
-                if time.monotonic() - began > SETTLED and arm.unheard > HUNG:
-                    log.error("The page's server has not been heard of for %g s.", HUNG)
+                if time.monotonic() - began > STABLE_SECONDS and arm.unheard > HANG_TIMEOUT:
+                    log.error("The page's server has not been heard of for %g s.", HANG_TIMEOUT)
                     current.kill()
                 continue
             log.error(
                 "The page's server ended with status %s; the arm holds. It is started again.",
                 current.exit_code,
             )
-            ended = 0 if time.monotonic() - began > SETTLED else ended + 1
-            stopping.wait(AGAIN[min(ended, len(AGAIN) - 1)])
+            ended = 0 if time.monotonic() - began > STABLE_SECONDS else ended + 1
+            stopping.wait(RESTART_DELAYS[min(ended, len(RESTART_DELAYS) - 1)])
             current.stop()
-            current, began = Front(outfit), time.monotonic()
+            current, began = Front(config), time.monotonic()
             arm.attach(current.pipe)
         if not stopping.is_set():
             log.critical("The control loop has ended, so the server ends too: start it again.")
@@ -136,17 +136,17 @@ def serve(
 
 def _with_scene(
     settings: Settings, urdf: Path, tool: str | None, options: Namespace | None
-) -> tuple[Described | None, InitialScene | None]:
+) -> tuple[DescribedRobot | None, InitialScene | None]:
     """Return the scene that an extension starts with, and the robot if it had to be read for it."""
     if options is None:
         return None, None
-    read: list[Described] = []
+    read: list[DescribedRobot] = []
 
     def session() -> Session:
-        from katana450.assembly.robot_session import described
+        from katana450.assembly.robot_session import describe_robot
 
         if not read:
-            read.append(described(settings, urdf, tool))
+            read.append(describe_robot(settings, urdf, tool))
         return read[0].session
 
     scene = None

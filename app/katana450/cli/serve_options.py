@@ -9,7 +9,7 @@ from katana450.cli.arm_options import add_arm_options
 from katana450.extension import serve_extensions
 from katana450.settings import Settings
 
-SHORTEST_SILENCE, LONGEST_SILENCE = 0.2, 2.0
+MIN_SILENCE, LONGEST_SILENCE = 0.2, 2.0
 """[s] Heartbeats are 0.1 s apart, and after 3 s the arm is anybody's."""
 
 
@@ -29,8 +29,8 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         type=_silence,
         default=Settings.silence,
         metavar="SECONDS",
-        help="without a sign of life of whoever drives until a moving arm is stopped; the page "
-        f"gives ten a second ({SHORTEST_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
+        help="without a heartbeat of whoever drives until a moving arm is stopped; the page "
+        f"gives ten a second ({MIN_SILENCE:g} to {LONGEST_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
         "--access",
@@ -80,9 +80,9 @@ def heartbeat_timeout(text: str, longest: float) -> float:
         seconds = float(text)
     except ValueError:
         seconds = -1.0
-    if not SHORTEST_SILENCE <= seconds <= longest:
+    if not MIN_SILENCE <= seconds <= longest:
         raise argparse.ArgumentTypeError(
-            f"a number of seconds from {SHORTEST_SILENCE:g} to {longest:g}, not {text!r}"
+            f"a number of seconds from {MIN_SILENCE:g} to {longest:g}, not {text!r}"
         )
     return seconds
 

@@ -22,20 +22,20 @@ from katana450.server.api.fields import ROOT, Id
 
 SOCKET = f"{ROOT}/socket"
 
-ASKED_FOR = 5.0
+ANSWER_TIMEOUT = 5.0
 """[s] An answer that takes longer does not come."""
 
-GOODBYE = 1.0
+CLOSE_TIMEOUT = 1.0
 """[s] For hanging up properly; then the connection is cut off."""
 
-FOLLOWED = 30.0
+FOLLOW_RATE = 30.0
 """[Hz] States while a motion is waited for."""
 
 A = TypeVar("A", bound=answers.Answer)
 
 
 class AsyncClient:
-    """One connection; made by ``aconnect``, which also gives signs of life."""
+    """One connection; made by ``aconnect``, which also gives heartbeats."""
 
     def __init__(self, socket: ClientConnection, welcome: answers.Welcome, site: Site) -> None:
         self._socket = socket
@@ -52,7 +52,7 @@ class AsyncClient:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        await hang_up(self._socket)
+        await close_quietly(self._socket)
 
     async def ask(self, request: requests.Request) -> answers.Answer:
         """The answer to any request. Raises RefusedError with the reason, LostError."""
@@ -62,10 +62,10 @@ class AsyncClient:
         self._waiting[self._asked] = future
         try:
             await self._say(request)
-            async with asyncio.timeout(ASKED_FOR):
+            async with asyncio.timeout(ANSWER_TIMEOUT):
                 return await future
         except TimeoutError as error:
-            raise LostError(f"No answer has come in {ASKED_FOR:g} s.") from error
+            raise LostError(f"No answer has come in {ANSWER_TIMEOUT:g} s.") from error
         finally:
             self._waiting.pop(request.id, None)
 
@@ -74,13 +74,13 @@ class AsyncClient:
         await self._say(request)
 
     async def query(self, kind: type[A]) -> A:
-        """One of answers.State, Arm, Ledger, Branches, Loop, Things, World, Links."""
-        answer = await self.ask(requests.Query(at=kind.__name__.lower()))  # type: ignore[arg-type]
+        """One of answers.State, Arm, EventLog, Branches, Loop, Objects, World, Links."""
+        answer = await self.ask(requests.Query(at=kind.__struct_config__.tag))  # type: ignore[arg-type]
         if not isinstance(answer, kind):
             raise LostError(f"{kind.__name__} was asked for, and {answer} came.")
         return answer
 
-    async def states(self, hz: float = FOLLOWED) -> AsyncGenerator[answers.State, None]:
+    async def states(self, hz: float = FOLLOW_RATE) -> AsyncGenerator[answers.State, None]:
         """The state, so many times a second; the newest, when it is asked for more slowly.
 
         Raises LostError when the server has hung up or sends no more.
@@ -89,7 +89,7 @@ class AsyncClient:
         self._states.append(queue)
         try:
             await self.ask(requests.Watch(hz=hz))
-            patience = ASKED_FOR + 1.0 / hz
+            patience = ANSWER_TIMEOUT + 1.0 / hz
             while (state := await _next_of(queue, patience)) is not None:
                 yield state
             raise LostError(self._lost or "The server has hung up.")
@@ -156,13 +156,13 @@ class AsyncClient:
         if self._lost is not None:
             raise LostError(self._lost)
         try:
-            async with asyncio.timeout(ASKED_FOR):
+            async with asyncio.timeout(ANSWER_TIMEOUT):
                 await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
         except ConnectionClosed as error:
             raise LostError(f"The server has hung up: {error}.") from error
         except TimeoutError as error:
-            self._lose(f"The server has read nothing for {ASKED_FOR:g} s.")
-            raise LostError(f"The server has read nothing for {ASKED_FOR:g} s.") from error
+            self._lose(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.")
+            raise LostError(f"The server has read nothing for {ANSWER_TIMEOUT:g} s.") from error
 
     async def _heartbeat(self) -> None:
         while True:
@@ -214,13 +214,13 @@ async def _next_of(
         raise LostError(f"No state has come for {seconds:.1f} s.") from error
 
 
-async def hang_up(socket: ClientConnection) -> None:
+async def close_quietly(socket: ClientConnection) -> None:
     """Close ``socket``, at the latest after GOODBYE.
 
     ``close`` alone first sends all that is left: it never ends if the server reads nothing.
     """
     with suppress(TimeoutError):
-        async with asyncio.timeout(GOODBYE):
+        async with asyncio.timeout(CLOSE_TIMEOUT):
             await socket.close()
     socket.transport.abort()
 
@@ -246,21 +246,21 @@ async def aconnect(
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     try:
         socket = await open_websocket(
-            address, additional_headers=headers, compression=None, close_timeout=GOODBYE
+            address, additional_headers=headers, compression=None, close_timeout=CLOSE_TIMEOUT
         )
     except (OSError, InvalidHandshake) as error:
         raise LostError(f"There is no katana450 server at {url}: {error}.") from error
     try:
-        async with asyncio.timeout(ASKED_FOR):
+        async with asyncio.timeout(ANSWER_TIMEOUT):
             welcome = answers.decoded(await socket.recv())
     except ConnectionClosed as error:
         why = error.rcvd.reason if error.rcvd is not None else str(error)
         raise RefusedError(why) from error
     except (TimeoutError, msgspec.MsgspecError) as error:
-        await hang_up(socket)
+        await close_quietly(socket)
         raise LostError(f"There is no katana450 server at {url}: {error}.") from error
     if not isinstance(welcome, answers.Welcome):
-        await hang_up(socket)
+        await close_quietly(socket)
         raise LostError(f"The server at {url} speaks another language: {welcome}.")
     client = AsyncClient(socket, welcome, Site(url, token))
     try:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy.typing as npt
 
-from katana450.client.asynchronous import FOLLOWED, AsyncClient, aconnect
+from katana450.client.asynchronous import FOLLOW_RATE, AsyncClient, aconnect
 from katana450.server.api import answers, requests
 
 T = TypeVar("T")
@@ -19,7 +19,7 @@ A = TypeVar("A", bound=answers.Answer)
 
 
 class Client:
-    """One connection; made by ``connect``. It gives its signs of life in a thread of its own."""
+    """One connection; made by ``connect``. It gives its heartbeats in a thread of its own."""
 
     def __init__(self, client: AsyncClient, loop: asyncio.AbstractEventLoop) -> None:
         self._client = client
@@ -66,7 +66,7 @@ class Client:
         """See ``AsyncClient.load_scene``."""
         return self._wait(self._client.load_scene(data))
 
-    def states(self, hz: float = FOLLOWED) -> Iterator[answers.State]:
+    def states(self, hz: float = FOLLOW_RATE) -> Iterator[answers.State]:
         """See ``AsyncClient.states``."""
         states = self._client.states(hz)
         try:

@@ -13,7 +13,7 @@ from katana450.errors import KatanaError
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 
-PATIENCE = 60.0
+REQUEST_TIMEOUT = 60.0
 """[s]"""
 
 
@@ -53,7 +53,7 @@ class Site:
         headers = {"Authorization": f"Bearer {self.token}"} if self.token else {}
         asked = urllib.request.Request(self.url.rstrip("/") + path, data=data, headers=headers)
         try:
-            with urllib.request.urlopen(asked, timeout=PATIENCE) as answer:
+            with urllib.request.urlopen(asked, timeout=REQUEST_TIMEOUT) as answer:
                 content: bytes = answer.read()
                 return content
         except urllib.error.HTTPError as error:

@@ -37,12 +37,12 @@ def progress(
 
 
 def _line(label: str, done: int, total: int, elapsed: float) -> str:
-    share = done / total if total else 1.0
-    filled = int(share * _WIDTH)
-    left = f"{_clock(elapsed * (1.0 - share) / share)} left" if share else ""
+    fraction = done / total if total else 1.0
+    filled = int(fraction * _WIDTH)
+    left = f"{_clock(elapsed * (1.0 - fraction) / fraction)} left" if fraction else ""
     bar = "#" * filled + "." * (_WIDTH - filled)
     # Trailing blanks wipe what a longer line before left behind.
-    return f"\r{label} [{bar}] {share:4.0%}  {left:<14}"
+    return f"\r{label} [{bar}] {fraction:4.0%}  {left:<14}"
 
 
 def _clock(seconds: float) -> str:

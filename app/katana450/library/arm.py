@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy.typing as npt
 
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Thing
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
@@ -48,14 +48,14 @@ class Arm:
         session: the rules of motion: limits, collision bodies, what stands around.
         notes: sentences on what was taken for granted in the file.
         pose_frame: the frame of poses and points.
-        things: objects that plans keep clear of.
+        objects: objects that plans keep clear of.
     """
 
     robot: Robot
     session: Session
     notes: tuple[str, ...]
     pose_frame: PoseFrame
-    things: tuple[Thing, ...]
+    objects: tuple[SceneObject, ...]
 
     @property
     def name(self) -> str:
@@ -334,13 +334,13 @@ class Arm:
             seed: seed of these postures.
 
         Returns a map with ``points`` (N, 3) [m] in the base frame whatever the frame of poses,
-        ``share`` (N,), the fraction of orientations, and ``cloud`` (K, 3) [m].
+        ``fraction`` (N,), the fraction of orientations, and ``cloud`` (K, 3) [m].
 
         Raises InputError for numbers that make no map, RobotDescriptionError for an arm whose axis
         1 is not upright.
 
         >>> map = arm.reachability(0.1, pitches=12, rolls=8)
-        >>> bool((map.share > 0.0).all() and (map.share <= 1.0).all())
+        >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
         True
         """
         reachability = Reachability(
@@ -379,7 +379,7 @@ class Arm:
         """Return the state of the arm at rest at ``q`` (n,) [rad], among its objects."""
         angles = self.chain.check_q(q)
         state = self.session.begin(angles, self._mounted.gripper.clamp(0.0), 0.0)
-        return replace(state, things=self.things)
+        return replace(state, objects=self.objects)
 
     @cached_property
     def _planner(self) -> Planner:

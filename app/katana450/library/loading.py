@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from katana450.assembly.robot_session import described
-from katana450.extensions.importers.initial_scene import furnished
+from katana450.assembly.robot_session import describe_robot
+from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.library.arm import Arm
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH
@@ -45,12 +45,14 @@ def load(
         ...
     katana450.errors.RobotDescriptionError: ...
     """
-    robot, session, notes = described(Settings(), URDF_PATH if urdf is None else Path(urdf), tool)
-    stored, _ = furnished(session, None if scene is None else Path(scene), ())
+    robot, session, notes = describe_robot(
+        Settings(), URDF_PATH if urdf is None else Path(urdf), tool
+    )
+    stored, _ = load_initial_scene(session, None if scene is None else Path(scene), ())
     return Arm(
         robot=robot,
         session=session,
         notes=notes,
         pose_frame=PoseFrame.of(robot.require_arm(), frame),
-        things=stored.scene.things,
+        objects=stored.scene.objects,
     )

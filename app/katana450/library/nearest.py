@@ -12,10 +12,10 @@ from katana450.errors import InputError
 from katana450.library.pose_frame import PoseFrame
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
-from katana450.maths.kinematics.reading import Reading
 
-PRIORITIES = {"pose": Reading.POSE, "pitch": Reading.PITCH, "position": Reading.POSITION}
+PRIORITIES = {"pose": Priority.POSE, "pitch": Priority.PITCH, "position": Priority.POSITION}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +55,16 @@ def nearest(
     if priority not in PRIORITIES:
         known = ", ".join(PRIORITIES)
         raise InputError(f"There is no priority {priority!r}; choose from {known}.")
-    reading = PRIORITIES[priority]
+    chosen = PRIORITIES[priority]
     best = project(
         chain,
         frame.to_shoulder(T),
         branch=None if branch is None else Branch.parse(str(branch)),
         within_limits=within_limits,
         q_hint=q_hint,
-        reading=reading,
+        priority=chosen,
     )
-    findings = of_projection(chain, best, reading, yaw_was_wished=reading is Reading.POSE)
+    findings = of_projection(chain, best, chosen, yaw_was_given=chosen is Priority.POSE)
     said = "; ".join(REASONS[finding.reason](finding) for finding in findings)
     best = replace(best, T=frame.from_shoulder(best.T))
     return NearestPose(

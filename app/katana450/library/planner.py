@@ -12,9 +12,9 @@ import numpy.typing as npt
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import Bench, Draft, PlanContext
 from katana450.extensions.programs.places import ROOMIEST
-from katana450.extensions.programs.tool_moves import Circle, Line, Turn
+from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
+from katana450.extensions.programs.tool_moves import ArcGeometry, Circle, Line
 from katana450.library.nearest import nearest
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.library.solutions import IKSolutions
@@ -39,14 +39,14 @@ class Planner:
 
     def to(self, goal: npt.ArrayLike, start: npt.ArrayLike | None, seed: int) -> Plan:
         """Plan to joint angles (n,) [rad] or to a pose (4, 4)."""
-        bench = self._bench(start, seed)
+        builder = self._builder(start, seed)
         if dimensions(goal) == 2:
-            self._to_pose(bench, goal)
+            self._to_pose(builder, goal)
         else:
-            bench.move_to(self.session.require_arm().chain.check_q(goal), "plan")
-        if not bench.orders:
+            builder.move_to(self.session.require_arm().chain.check_q(goal), "plan")
+        if not builder.orders:
             raise InputError("The arm is at the goal already; there is nothing to plan.")
-        return _timed(bench)
+        return _timed(builder)
 
     def line(
         self,
@@ -66,9 +66,9 @@ class Planner:
             _angle(roll, "roll"),
             self.frame.in_base,
         )
-        bench = self._bench(start)
-        step.lay(bench)
-        return _timed(bench)
+        builder = self._builder(start)
+        step.build(builder)
+        return _timed(builder)
 
     def circle(
         self,
@@ -94,7 +94,7 @@ class Planner:
             raise InputError(
                 f"The number of turns is {count:g}; it must be up to {MAX_TURNS:g} and not 0."
             )
-        turn = Turn(
+        turn = ArcGeometry(
             finite_array(centre, (3,), "The centre of the circle"),
             axis / length,
             pitch if pitch == ROOMIEST else _angle(pitch, "pitch"),
@@ -102,16 +102,16 @@ class Planner:
             self.frame.in_base,
         )
         wanted = None if branch is None else Branch.parse(str(branch))
-        bench = self._bench(start)
-        Circle(turn, size, count, wanted).lay(bench)
+        builder = self._builder(start)
+        Circle(turn, size, count, wanted).build(builder)
         if start is None:
-            del bench.orders[:-1]
-        return _timed(bench)
+            del builder.orders[:-1]
+        return _timed(builder)
 
-    def _to_pose(self, bench: Bench, goal: npt.ArrayLike) -> None:
+    def _to_pose(self, builder: PlanBuilder, goal: npt.ArrayLike) -> None:
         """Go to the nearest posture that takes the pose ``goal`` (4, 4) and can be reached."""
-        chain = bench.chain
-        found = IKSolutions.of_pose(chain, self.frame.to_shoulder(goal), bench.q).feasible
+        chain = builder.chain
+        found = IKSolutions.of_pose(chain, self.frame.to_shoulder(goal), builder.q).feasible
         if not found:
             best = nearest(
                 chain,
@@ -119,25 +119,27 @@ class Planner:
                 goal,
                 priority="pose",
                 branch=None,
-                q_hint=bench.q,
+                q_hint=builder.q,
                 within_limits=True,
             )
             why = best.reason or "only the nearest pose is"
             raise InputError(
                 f"The arm cannot take this pose: {why}. `Arm.nearest` gives the nearest it can."
             )
-        q = bench.q
+        q = builder.q
         nearest_first = sorted(found, key=lambda each: float(np.abs(each.q - q).max()))
-        bench.first(nearest_first, lambda each: bench.move_to(each.q, "plan"))
+        builder.first(nearest_first, lambda each: builder.move_to(each.q, "plan"))
 
-    def _bench(self, start: npt.ArrayLike | None, seed: int = 0) -> Bench:
-        rig = PlanContext(self.session, self.T_base_shoulder, seed)
-        return Bench(rig, self.standing(self.session.ready if start is None else start))
+    def _builder(self, start: npt.ArrayLike | None, seed: int = 0) -> PlanBuilder:
+        plan_context = PlanContext(self.session, self.T_base_shoulder, seed)
+        return PlanBuilder(
+            plan_context, self.standing(self.session.ready if start is None else start)
+        )
 
 
-def _timed(bench: Bench) -> Plan:
+def _timed(builder: PlanBuilder) -> Plan:
     """Time the paths that ``bench`` has, one after another."""
-    drafts = [order for _, order in bench.orders if isinstance(order, Draft)]
+    drafts = [order for _, order in builder.orders if isinstance(order, UntimedPath)]
     paths = tuple(path for draft in drafts for path in draft.paths)
     return replace(drafts[0], paths=paths).timed().plan
 

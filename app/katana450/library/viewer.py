@@ -22,7 +22,7 @@ from katana450.library.motion_plan import MotionPlan
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
-from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
+from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 if TYPE_CHECKING:
     from katana450.library.arm import Arm
@@ -60,7 +60,7 @@ class Viewer:
         """Address of the scene, for a browser."""
         scene = self._server.scene
         scene.set_up_direction("+z")
-        look = LOOKS[Preset.FREE]
+        look = CAMERA_POSES[Preset.FREE]
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
         session = arm.session

@@ -13,7 +13,7 @@ from katana450.maths.motion.limiter import Limits
 
 
 @dataclass(frozen=True)
-class Gripper:
+class GripperModel:
     """The driven finger joint: limits [rad], greatest speed [rad/s]; ``lower`` is closed.
 
     Where it slides, its numbers are in m and m/s. That of an arm without fingers has nowhere to go.
@@ -34,18 +34,18 @@ class Gripper:
         return min(max(value, self.lower), self.upper)
 
 
-GENTLE = 0.9
+SPEED_RISE_TIME = 0.9
 """[s] Until a joint runs at its greatest speed, as the Katana's own controllers have it at the
 quicker of their two settings."""
 
-SOFT = 0.1
+ACCELERATION_RISE_TIME = 0.1
 """[s] Until it accelerates as it may."""
 
-NO_GRIPPER = Gripper(0.0, 0.0, 0.0)
+NO_GRIPPER = GripperModel(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class ArmModel:
     """A 5-axis arm with interchangeable tool frames.
 
     Attributes:
@@ -59,7 +59,7 @@ class Arm:
     chain: Chain
     tools: Mapping[str, FloatArray]
     default_tool: str
-    gripper: Gripper
+    gripper: GripperModel
     acceleration: FloatArray | None = None
     jerk: FloatArray | None = None
 
@@ -93,5 +93,5 @@ def limits_of(
     lower: FloatArray, upper: FloatArray, speed: FloatArray, acceleration: FloatArray | None = None
 ) -> Limits:
     """Gentle ones of joints whose own, (n,) each, say no more."""
-    acceleration = speed / GENTLE if acceleration is None else acceleration
-    return Limits(lower, upper, speed, acceleration, acceleration / SOFT)
+    acceleration = speed / SPEED_RISE_TIME if acceleration is None else acceleration
+    return Limits(lower, upper, speed, acceleration, acceleration / ACCELERATION_RISE_TIME)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm import Arm
-from katana450.arm.control.joints import Joints
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.pouring import CUP, Pouring
+from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject
 from katana450.arm.control.support import check_carried, is_loose
-from katana450.arm.control.things import Environment, Mount, Thing
 from katana450.errors import InputError
 
 NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
 
 
-def check_joints(joints: Joints, command: cmd.Command) -> None:
+def check_joints(joints: JointSet, command: cmd.Command) -> None:
     """Raise InputError if a robot with ``joints`` and no arm cannot be asked for ``command``."""
     match command:
         case cmd.Batch(commands=commands):
@@ -30,7 +30,7 @@ def check_joints(joints: Joints, command: cmd.Command) -> None:
 
 
 def check(
-    arm: Arm, pouring: Pouring | None, surroundings: Environment, command: cmd.Command
+    arm: ArmModel, pouring: Pouring | None, environment: Environment, command: cmd.Command
 ) -> None:
     """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
     n = arm.chain.n
@@ -39,7 +39,7 @@ def check(
             command.targets(np.zeros(n))
         case cmd.Batch(commands=commands):
             for each in commands:
-                check(arm, pouring, surroundings, each)
+                check(arm, pouring, environment, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
             raise InputError(f"This arm has {n} joints, the command {q.size}.")
         case cmd.SetTool(name=name):
@@ -49,24 +49,24 @@ def check(
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
                 raise InputError("The plan was made for another arm.")
         case _:
-            _check_things(pouring, surroundings, command)
+            _check_objects(pouring, environment, command)
 
 
-def _check_things(pouring: Pouring | None, surroundings: Environment, command: cmd.Command) -> None:
+def _check_objects(pouring: Pouring | None, environment: Environment, command: cmd.Command) -> None:
     match command:
         case cmd.Fill(volume=volume):
             _check_water(pouring, volume)
-        case cmd.Furnish(things=things, volume=volume):
-            for thing in things:
-                _check_hand(surroundings, thing)
-                if is_loose(thing):
-                    check_carried(surroundings.table, things, thing)
+        case cmd.ReplaceScene(objects=objects, volume=volume):
+            for scene_object in objects:
+                _check_hand(environment, scene_object)
+                if is_loose(scene_object):
+                    check_carried(environment.table, objects, scene_object)
             if volume is not None:
-                has_cup = any(thing.name == CUP for thing in things)
+                has_cup = any(scene_object.name == CUP for scene_object in objects)
                 _check_water(pouring if has_cup else None, volume)
-        case cmd.Place(thing=thing):
-            _check_hand(surroundings, thing)
-        case cmd.Attach(to=Mount.HAND) if surroundings.hand is None:
+        case cmd.PlaceObject(scene_object=scene_object):
+            _check_hand(environment, scene_object)
+        case cmd.Attach(to=Attachment.HAND) if environment.hand is None:
             raise InputError(NO_HAND)
 
 
@@ -76,6 +76,6 @@ def _check_water(pouring: Pouring | None, volume: float) -> None:
     pouring.check(volume)
 
 
-def _check_hand(surroundings: Environment, thing: Thing) -> None:
-    if thing.fixed and surroundings.hand is None:
+def _check_hand(environment: Environment, scene_object: SceneObject) -> None:
+    if scene_object.fixed and environment.hand is None:
         raise InputError(NO_HAND)

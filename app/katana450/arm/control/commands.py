@@ -21,76 +21,76 @@ from katana450.arm.control.joint_commands import (
     SetJoints,
     with_axes,
 )
-from katana450.arm.control.thing_commands import (
+from katana450.arm.control.object_commands import (
     Attach,
-    Dress,
     Fill,
-    Furnish,
-    Place,
+    MoveObject,
+    PlaceObject,
     Remove,
-    Shift,
+    ReplaceScene,
+    SetAppearance,
 )
 from katana450.arm.control.traits import (
     BaseCommand,
-    Traits,
+    CommandTraits,
 )
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES, Branch
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.planning.plan import Plan
 
 __all__ = [
     "JOG_TIME",
-    "LEAST_SPEED",
+    "MIN_SPEED",
     "Attach",
     "AxisCommand",
     "BaseCommand",
     "Batch",
     "ClearStop",
     "Command",
-    "Dress",
     "EndDrag",
     "Fill",
     "Follow",
-    "Furnish",
     "GoAlong",
     "GoToZero",
     "Hold",
     "Home",
     "Jog",
+    "MoveObject",
     "MoveTool",
     "Nudge",
     "Pause",
-    "Place",
+    "PlaceObject",
     "Remove",
+    "ReplaceScene",
     "Resume",
     "Servo",
+    "SetAppearance",
     "SetAxes",
     "SetGripper",
     "SetJoint",
     "SetJoints",
     "SetPose",
-    "SetReading",
+    "SetPriority",
     "SetTool",
-    "Shift",
     "SpeedScale",
     "Stop",
     "TakeBranch",
     "TurnTool",
 ]
 
-LEAST_SPEED = 0.01
-"""A share below this is a hold, for which there are Pause and Stop."""
+MIN_SPEED = 0.01
+"""A fraction below this is a hold, for which there are Pause and Stop."""
 
 
 @dataclass(frozen=True, eq=False)
 class MoveTool(BaseCommand):
     """Bring the tool point to ``position``, (3,) [m] in {S}; pitch and roll stay as wished."""
 
-    traits: ClassVar[Traits] = Traits(stream=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
 
     position: FloatArray
 
@@ -106,7 +106,7 @@ class TurnTool(BaseCommand):
     the turn about the tool's own axis, theta5: the two rotations a 5-axis arm is free to choose.
     """
 
-    traits: ClassVar[Traits] = Traits(stream=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
 
     pitch: float
     roll: float
@@ -120,7 +120,7 @@ class TurnTool(BaseCommand):
 class SetPose(BaseCommand):
     """Bring the tool to the pose ``T``, (4, 4) in {S}, as near as five axes can."""
 
-    traits: ClassVar[Traits] = Traits(stream=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
 
     T: FloatArray
 
@@ -136,7 +136,7 @@ class Nudge(AxisCommand):
     limit it.
     """
 
-    traits: ClassVar[Traits] = Traits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
     axis: int
     by: float
@@ -152,7 +152,7 @@ class Nudge(AxisCommand):
 class SetGripper(BaseCommand):
     """Drive the finger joint to ``angle`` [rad]."""
 
-    traits: ClassVar[Traits] = Traits(stream=True, supersedes=False, passive=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True, supersedes=False, passive=True)
 
     angle: float
 
@@ -164,30 +164,31 @@ class SetGripper(BaseCommand):
 class SetTool(BaseCommand):
     """From now on targets and read-outs are of the tool frame ``name``; nothing moves."""
 
-    traits: ClassVar[Traits] = Traits()
+    traits: ClassVar[CommandTraits] = CommandTraits()
 
     name: str
 
 
 @dataclass(frozen=True)
-class SetReading(BaseCommand):
-    """From now on ``reading`` says which numbers of a target count; the one there is, is reread."""
+class SetPriority(BaseCommand):
+    """From now on ``priority`` says which numbers of a target count; the one there is, is
+    reread."""
 
-    traits: ClassVar[Traits] = Traits()
+    traits: ClassVar[CommandTraits] = CommandTraits()
 
-    reading: Reading
+    priority: Priority
 
     def __post_init__(self) -> None:
-        if self.reading not in tuple(Reading):
-            known = ", ".join(f"Reading.{reading.name}" for reading in Reading)
-            raise InputError(f"A reading is one of {known}, not {self.reading!r}.")
+        if self.priority not in tuple(Priority):
+            known = ", ".join(f"Priority.{priority.name}" for priority in Priority)
+            raise InputError(f"A reading is one of {known}, not {self.priority!r}.")
 
 
 @dataclass(frozen=True)
 class TakeBranch(BaseCommand):
     """Go for the wished pose on ``branch``, however far that is: the same tool, another arm."""
 
-    traits: ClassVar[Traits] = Traits(planned=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(planned=True)
 
     branch: Branch
 
@@ -201,63 +202,65 @@ class TakeBranch(BaseCommand):
 class EndDrag(BaseCommand):
     """End a drag: the nearest pose that the arm can reach becomes the target."""
 
-    traits: ClassVar[Traits] = Traits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
 
 @dataclass(frozen=True)
 class Home(BaseCommand):
     """Drive to the ready posture."""
 
-    traits: ClassVar[Traits] = Traits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
 
 @dataclass(frozen=True)
 class GoToZero(BaseCommand):
     """Drive to the zero posture, the arm stretched along x (paper, Fig. 2)."""
 
-    traits: ClassVar[Traits] = Traits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
 
 @dataclass(frozen=True)
 class Hold(BaseCommand):
     """Come to rest and forget the targets of arm and gripper."""
 
-    traits: ClassVar[Traits] = Traits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
 
 @dataclass(frozen=True)
 class Stop(BaseCommand):
     """Come to rest as fast as the arm can, and accept no motion until ClearStop."""
 
-    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True, safety=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(
+        while_stopped=True, joints_only=True, safety=True
+    )
 
 
 @dataclass(frozen=True)
 class ClearStop(BaseCommand):
     """Accept motion again after a stop. Nothing moves by this."""
 
-    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
 
 @dataclass(frozen=True)
 class Pause(BaseCommand):
     """Come to rest on the way, and keep the goal."""
 
-    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True)
 class Resume(BaseCommand):
     """Go on to the goal there is."""
 
-    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True, eq=False)
 class Follow(BaseCommand):
     """Follow ``plan`` from its start, where the arm has to stand, to its end."""
 
-    traits: ClassVar[Traits] = Traits()
+    traits: ClassVar[CommandTraits] = CommandTraits()
 
     plan: Plan
 
@@ -268,23 +271,24 @@ class Follow(BaseCommand):
 
 @dataclass(frozen=True)
 class GoAlong(BaseCommand):
-    """Go on or back along the plan that is followed, to ``share`` of it: 0 its start, 1 its end."""
+    """Go on or back along the plan that is followed, to ``fraction`` of it: 0 its start, 1 its
+    end."""
 
-    traits: ClassVar[Traits] = Traits()
+    traits: ClassVar[CommandTraits] = CommandTraits()
 
-    share: float
+    fraction: float
 
     def __post_init__(self) -> None:
-        check_finite("The share of the plan", self.share)
-        if not 0.0 <= self.share <= 1.0:
-            raise InputError(f"The share of the plan is from 0 to 1, not {self.share}.")
+        check_finite("The fraction of the plan", self.fraction)
+        if not 0.0 <= self.fraction <= 1.0:
+            raise InputError(f"The fraction of the plan is from 0 to 1, not {self.fraction}.")
 
 
 @dataclass(frozen=True)
 class SpeedScale(BaseCommand):
     """From now on no joint and no tool is faster than ``value`` of its most, above 0 up to 1."""
 
-    traits: ClassVar[Traits] = Traits(
+    traits: ClassVar[CommandTraits] = CommandTraits(
         pacing=True, while_stopped=True, supersedes=False, passive=True, joints_only=True
     )
 
@@ -292,8 +296,8 @@ class SpeedScale(BaseCommand):
 
     def __post_init__(self) -> None:
         check_finite("The speed", self.value)
-        if not LEAST_SPEED <= self.value <= 1.0:
-            raise InputError(f"The speed is a share from {LEAST_SPEED} to 1, not {self.value}.")
+        if not MIN_SPEED <= self.value <= 1.0:
+            raise InputError(f"The speed is a fraction from {MIN_SPEED} to 1, not {self.value}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,7 +307,7 @@ class Jog(BaseCommand):
     Sent again and again while a hand holds on; when it does not come the arm comes to rest.
     """
 
-    traits: ClassVar[Traits] = Traits(while_paused=False)
+    traits: ClassVar[CommandTraits] = CommandTraits(while_paused=False)
 
     rates: FloatArray
     frame: JogFrame = JogFrame.BASE
@@ -318,7 +322,7 @@ class Jog(BaseCommand):
 class Batch(BaseCommand):
     """Several commands in one tick: all of them, or none if one is invalid."""
 
-    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
     commands: tuple[Command, ...]
 
@@ -342,7 +346,7 @@ Command = (
     | SetPose
     | SetGripper
     | SetTool
-    | SetReading
+    | SetPriority
     | TakeBranch
     | EndDrag
     | Home
@@ -354,13 +358,13 @@ Command = (
     | Resume
     | Follow
     | GoAlong
-    | Place
+    | PlaceObject
     | Remove
     | Attach
-    | Furnish
+    | ReplaceScene
     | Fill
-    | Shift
-    | Dress
+    | MoveObject
+    | SetAppearance
     | Batch
     | SpeedScale
     | Jog

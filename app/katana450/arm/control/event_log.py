@@ -9,7 +9,7 @@ from katana450.arm.control.state import Finding, Reason, State
 
 
 @dataclass(frozen=True)
-class Entry:
+class LogEntry:
     """One reason, when it began to hold the arm back or slow it, and what the numbers were.
 
     t: [s] on the clock of the states. began: whether it came; otherwise it is over. actor: the
@@ -24,20 +24,20 @@ class Entry:
     command: str = ""
 
 
-def news(
+def entries_between(
     before: State, after: State, actor: Actor | None = None, command: str = ""
-) -> tuple[Entry, ...]:
+) -> tuple[LogEntry, ...]:
     """What ``after`` is held back by that ``before`` was not, and what of that is over.
 
     A reason that stays is no news, whatever its number does meanwhile. ``actor``, ``command``:
-    see ``Entry``.
+    see ``LogEntry``.
     """
     old, new = ({_key(finding) for finding in state.findings} for state in (before, after))
     came = tuple(
-        Entry(after.t, f, True, actor, command) for f in after.findings if _key(f) not in old
+        LogEntry(after.t, f, True, actor, command) for f in after.findings if _key(f) not in old
     )
     went = tuple(
-        Entry(after.t, f, False, actor, command) for f in before.findings if _key(f) not in new
+        LogEntry(after.t, f, False, actor, command) for f in before.findings if _key(f) not in new
     )
     return (*went, *came)
 

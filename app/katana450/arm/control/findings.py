@@ -11,21 +11,21 @@ from katana450 import tolerances
 from katana450.arm.control.state import Finding, Reason
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import (
     ANGLE_WORTH_TELLING,
     POSITION_WORTH_TELLING,
     Projection,
 )
-from katana450.maths.kinematics.reading import Reading
 from katana450.maths.kinematics.tracker import Tracked
-from katana450.maths.kinematics.velocity import followed, limit_distances
+from katana450.maths.kinematics.velocity import limit_distances, limited_jog
 from katana450.maths.motion.limiter import Limits
 
-HARDLY = 0.05
-"""Share of a jog that does not move the tool to speak of."""
+MIN_JOG_FRACTION = 0.05
+"""Fraction of a jog that does not move the tool to speak of."""
 
-FREELY = 0.9
-"""Share of a jog from which on nothing is missed."""
+FULL_JOG_FRACTION = 0.9
+"""Fraction of a jog from which on nothing is missed."""
 
 AT_LIMIT = math.radians(0.5)
 """A joint so near to its limit holds a jog up."""
@@ -52,23 +52,23 @@ def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[
 
 
 def of_projection(
-    chain: Chain, best: Projection, reading: Reading, *, yaw_was_wished: bool
+    chain: Chain, best: Projection, priority: Priority, *, yaw_was_given: bool
 ) -> tuple[Finding, ...]:
     """What the nearest feasible pose ``best`` gives up of the wished one."""
     findings = []
     in_place = best.position_error <= POSITION_WORTH_TELLING
     pitch_gave_way, roll_error = best.pitch_error > ANGLE_WORTH_TELLING, best.roll_error
     if not in_place:
-        kept = reading is Reading.PITCH and not pitch_gave_way
+        kept = priority is Priority.PITCH and not pitch_gave_way
         reason = Reason.POSITION_CHANGED if kept else Reason.OUT_OF_REACH
         findings.append(Finding(reason, best.position_error))
-    if yaw_was_wished and best.yaw_error > ANGLE_WORTH_TELLING:
+    if yaw_was_given and best.yaw_error > ANGLE_WORTH_TELLING:
         findings.append(Finding(Reason.YAW_FIXED, best.yaw_error))
     elif in_place and not pitch_gave_way:
         roll_error = max(roll_error, best.rotation_error)
     if roll_error > ANGLE_WORTH_TELLING:
         findings.append(Finding(Reason.ROLL_CHANGED, roll_error))
-    if pitch_gave_way and (in_place or reading is Reading.PITCH):
+    if pitch_gave_way and (in_place or priority is Priority.PITCH):
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
     if findings:
         if best.axis1:
@@ -85,11 +85,11 @@ def of_projection(
 
 def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
     """What keeps a jog with the twist ``V`` (6,) in {S} from going on at ``q`` (n,) [rad]."""
-    if followed(chain, q, V) < HARDLY:
+    if limited_jog(chain, q, V) < MIN_JOG_FRACTION:
         return (Finding(Reason.SINGULAR),)
     near = limit_distances(chain, q) <= AT_LIMIT
     # Looked at only where it matters: a tick has other things to do.
-    if not near.any() or followed(chain, q, V, AT_LIMIT) > FREELY:
+    if not near.any() or limited_jog(chain, q, V, AT_LIMIT) > FULL_JOG_FRACTION:
         return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(
@@ -98,14 +98,14 @@ def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
     )
 
 
-def of_tracked(chain: Chain, tracked: Tracked, reading: Reading) -> tuple[Finding, ...]:
+def of_tracked(chain: Chain, tracked: Tracked, priority: Priority) -> tuple[Finding, ...]:
     """What following a drag gives up; first of all the leap that it does not make."""
-    given_up = of_projection(chain, tracked.best, reading, yaw_was_wished=False)
-    if tracked.ahead is None:
+    given_up = of_projection(chain, tracked.best, priority, yaw_was_given=False)
+    if tracked.beyond_gap is None:
         return given_up
     axis, leap = tracked.leap_ahead()
     held = Finding(Reason.ACROSS_GAP, leap, axis)
-    if tracked.ahead.position_error <= POSITION_WORTH_TELLING:
+    if tracked.beyond_gap.position_error <= POSITION_WORTH_TELLING:
         # Out of reach is what the arm cannot do at all.
         given_up = tuple(
             replace(f, reason=Reason.POSITION_CHANGED) if f.reason is Reason.OUT_OF_REACH else f

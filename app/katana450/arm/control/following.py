@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.motion.limiter import Motion
+from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.plan import Plan, Segment
 
 
@@ -27,13 +27,13 @@ class Following:
 
     plan: Plan
     number: int
-    pace: Motion
+    pace: JointMotion
     towards: float
 
     @staticmethod
-    def begun(plan: Plan) -> Following:
+    def begin(plan: Plan) -> Following:
         """At the start of ``plan``, about to follow it to its end."""
-        return Following(plan, 0, Motion.rest(np.zeros(1)), plan.span)
+        return Following(plan, 0, JointMotion.rest(np.zeros(1)), plan.span)
 
     @property
     def segment(self) -> Segment:
@@ -60,7 +60,7 @@ class Following:
         return self.plan.begins[self.number] + self.local
 
     @property
-    def share(self) -> float:
+    def fraction(self) -> float:
         """How much of the plan lies behind the arm, from 0 to 1."""
         return min(self.tau / self.plan.span, 1.0)
 
@@ -84,7 +84,7 @@ class Following:
 
     def at(self, tau: float) -> Following:
         """At rest at ``tau`` of the same segment [s]."""
-        return replace(self, pace=Motion.rest(np.array([tau])))
+        return replace(self, pace=JointMotion.rest(np.array([tau])))
 
     def turned_over(self) -> Following:
         """On the next segment where the way leads beyond this one and it is done."""
@@ -93,13 +93,13 @@ class Following:
         after = replace(self, number=self.number + self._beyond)
         return after.at(0.0 if self._beyond > 0 else after.segment.scaling.span)
 
-    def motion(self) -> Motion:
+    def motion(self) -> JointMotion:
         """The joints on the plan, and how they move."""
         if self.there:
-            return Motion.rest(self.goal)
+            return JointMotion.rest(self.goal)
         moving = self.segment.at(self.local)
         if self.pace.at_rest:
-            return Motion.rest(moving.q)
+            return JointMotion.rest(moving.q)
         v, a = float(self.pace.qd[0]), float(self.pace.qdd[0])
         qdd = v * v * moving.second + a * moving.first
-        return Motion(moving.q, frozen(v * moving.first), frozen(qdd))
+        return JointMotion(moving.q, frozen(v * moving.first), frozen(qdd))

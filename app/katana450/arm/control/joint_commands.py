@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from katana450.arm.control.checked import check_finite, vector
-from katana450.arm.control.traits import BaseCommand, Traits
+from katana450.arm.control.traits import BaseCommand, CommandTraits
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -50,7 +50,7 @@ def check_axis(axis: object) -> None:
 class SetJoint(AxisCommand):
     """Drive one joint to ``value`` [rad]; ``axis`` counts from 0."""
 
-    traits: ClassVar[Traits] = Traits(stream=True, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)
 
     axis: int
     value: float
@@ -73,7 +73,7 @@ class SetAxes(AxisCommand):
     The others go on to where they were going.
     """
 
-    traits: ClassVar[Traits] = Traits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
     values: tuple[tuple[int, float], ...]
 
@@ -89,7 +89,7 @@ class SetAxes(AxisCommand):
 class SetJoints(BaseCommand):
     """Drive all joints to ``q``, (n,) [rad]."""
 
-    traits: ClassVar[Traits] = Traits(stream=True, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)
 
     q: FloatArray
 
@@ -105,7 +105,7 @@ class Servo(BaseCommand):
     [s], on the clock of ``State.t``; None for the tick that takes it.
     """
 
-    traits: ClassVar[Traits] = Traits(stream=True, joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)
 
     q: FloatArray
     qd: FloatArray | None = None

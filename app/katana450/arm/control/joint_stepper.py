@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from katana450.arm.control.joints import Joints
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.motion.limiter import Limiter, Motion
+from katana450.maths.motion.limiter import JointMotion, Limiter
 from katana450.maths.motion.pursuit import stream_step
 
 Travel = Callable[[FloatArray, FloatArray], float]
@@ -23,7 +23,7 @@ def no_travel(_q: FloatArray, _to: FloatArray) -> float:
 class JointStepper:
     """Moves the setpoints of joints, tick by tick. Its methods are pure."""
 
-    def __init__(self, joints: Joints, travel: Travel) -> None:
+    def __init__(self, joints: JointSet, travel: Travel) -> None:
         self._joints = joints
         self._travel = travel
         self._limiter = Limiter(joints.limits)
@@ -34,17 +34,17 @@ class JointStepper:
             return state
         return replace(state, motion=self._ahead(state, dt))
 
-    def halt(self, state: State) -> tuple[FloatArray, float, float]:
+    def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
         """The end (n,) [rad or m] of a brake begun now, the travel until then [m], and its time."""
         motion = state.motion
-        end = self._joints.clamp(self._limiter.halt(motion))
-        return end, self._travel(motion.q, end), self._limiter.time_to_halt(motion)
+        end = self._joints.clamp(self._limiter.stopping_point(motion))
+        return end, self._travel(motion.q, end), self._limiter.stopping_time(motion)
 
     def may_leave(self, state: State) -> bool:  # noqa: ARG002
         """Whether the joints may brake beside their plan: they never follow one."""
         return True
 
-    def _ahead(self, state: State, dt: float) -> Motion:
+    def _ahead(self, state: State, dt: float) -> JointMotion:
         limiter, motion, servo = self._limiter, state.motion, state.servo
         if state.stopped is not None:
             return limiter.stop(motion, dt)

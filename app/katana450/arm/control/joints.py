@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.arm import NO_GRIPPER, Gripper, limits_of
+from katana450.arm.control.arm import NO_GRIPPER, GripperModel, limits_of
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import Limits
 
 
 @dataclass(frozen=True, eq=False)
-class Joints:
+class JointSet:
     """Those that follow no other, in the order of every joint vector.
 
     Attributes:
@@ -46,7 +46,7 @@ class Joints:
         return f"Only its joints can be driven. {self.why}"
 
     @property
-    def gripper(self) -> Gripper:
+    def gripper(self) -> GripperModel:
         """Fingers are joints like any other."""
         return NO_GRIPPER
 

@@ -13,10 +13,10 @@ from typing import Self
 
 from katana450.errors import LeaseError
 
-BEAT = 0.1
-"""[s] Between two signs of life that whoever drives is asked for."""
+HEARTBEAT_INTERVAL = 0.1
+"""[s] Between two heartbeats that whoever drives is asked for."""
 
-LOST_AFTER = 3.0
+LEASE_TIMEOUT = 3.0
 """[s] Of silence: a page that reloads is back sooner, one that is gone must not keep the arm."""
 
 
@@ -54,7 +54,7 @@ class Lease:
 
     Attributes:
         holder: the one person who may move the arm, if there is one.
-        heard: when the holder last gave a sign of life [s].
+        heard: when the holder last gave a heartbeat [s].
         waiting: who has asked for the arm, the first to ask first; never the holder.
     """
 
@@ -118,7 +118,7 @@ class Lease:
         return replace(self, holder=None, heard=-math.inf)
 
     def hear(self, person: Person, t: float) -> Self:
-        """A sign of life of the holder."""
+        """A heartbeat of the holder."""
         self._check_holds(person)
         return replace(self, heard=max(t, self.heard))
 
@@ -131,12 +131,12 @@ class Lease:
 
     def expire(self, t: float) -> Self:
         """Free, once the holder has been silent for LOST_AFTER; else as it was."""
-        if self.holder is None or self.silence(t) < LOST_AFTER:
+        if self.holder is None or self.silence(t) < LEASE_TIMEOUT:
             return self
         return replace(self, holder=None, heard=-math.inf)
 
     def silence(self, t: float) -> float:
-        """How long the holder has given no sign of life [s]; 0 when nobody holds the arm."""
+        """How long the holder has given no heartbeat [s]; 0 when nobody holds the arm."""
         return 0.0 if self.holder is None else max(t - self.heard, 0.0)
 
     def _given(self, person: Person, t: float) -> Self:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
@@ -28,7 +28,7 @@ class Margins:
     nearest: Contact | None
 
 
-def margins(chain: Chain, world: World | None, x: FloatArray) -> Margins:
+def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margins:
     """``x``: (n + 1,) the joints and the finger joint [rad]. ``chain`` ends in the tool."""
     q = x[: chain.n]
     distances = limit_distances(chain, q)

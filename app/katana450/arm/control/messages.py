@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from katana450.arm.control.choices import Choice
+from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
-from katana450.maths.kinematics.reading import Reading
 
 AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
 
@@ -49,7 +49,7 @@ UNCHECKED = "No collision checking: the robot description gives the links no col
 
 
 def part(name: str) -> str:
-    """A link or a thing, as people call it."""
+    """A link or an object, as people call it."""
     return PARTS.get(name, name.removesuffix("_link").replace("_", " "))
 
 
@@ -62,9 +62,9 @@ def _contact(finding: Finding) -> str:
 
 
 def _lopsided(finding: Finding) -> str:
-    finger, thing = finding.parts or ("a finger", "something")
+    finger, item = finding.parts or ("a finger", "something")
     return (
-        f"{part(finger)} is {_short(1e3 * finding.amount)} mm from {part(thing)}, which the other "
+        f"{part(finger)} is {_short(1e3 * finding.amount)} mm from {part(item)}, which the other "
         "touches: open, put the gripper about its middle, close again"
     )
 
@@ -107,23 +107,23 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
 STATUS: dict[Status, str] = {
     Status.OK: "On target",
     Status.LIMITED: "As near as it can",
-    Status.HELD: "Held at the edge",
+    Status.GAP: "Held at the edge",
     Status.BLOCKED: "Contact ahead",
     Status.PAUSED: "Paused",
     Status.STOPPED: "Stopped",
     Status.FAULT: "Fault",
 }
 
-READINGS: dict[Reading, str] = {
-    Reading.POSE: "Position, then orientation",
-    Reading.PITCH: "Pitch, then position",
-    Reading.POSITION: "Position, then pitch",
+PRIORITIES: dict[Priority, str] = {
+    Priority.POSE: "Position, then orientation",
+    Priority.PITCH: "Pitch, then position",
+    Priority.POSITION: "Position, then pitch",
 }
 
-READING_HINTS: dict[Reading, str] = {
-    Reading.POSE: "The tool point goes where it is wished, and the tool turns as near as it can.",
-    Reading.PITCH: "The tool keeps the wished pitch, and stops where it cannot.",
-    Reading.POSITION: "The tool point goes where it is wished, with the nearest pitch it can have.",
+PRIORITY_HINTS: dict[Priority, str] = {
+    Priority.POSE: "The tool point goes where it is wished, and the tool turns as near as it can.",
+    Priority.PITCH: "The tool keeps the wished pitch, and stops where it cannot.",
+    Priority.POSITION: "The tool point goes to the target, with the nearest pitch it can have.",
 }
 
 BRANCH_HEADINGS = ("branch", "off by", "way there", "singular")
@@ -159,12 +159,12 @@ def sentence(state: State) -> str:
     return _capital("; ".join(REASONS[each.reason](each) for each in state.findings)) + "."
 
 
-def told(finding: Finding) -> str:
+def finding_text(finding: Finding) -> str:
     """One reason by itself."""
     return _capital(REASONS[finding.reason](finding))
 
 
-def room(number: int, angle: float) -> str:
+def limit_text(number: int, angle: float) -> str:
     """How far an axis counted from 0 is from its nearer limit [rad]."""
     return f"{axis(number)}: {degrees(angle)} left"
 
@@ -182,19 +182,19 @@ def condition(values: FloatArray) -> str:
     return "∞" if values[0] >= FLAT * values[-1] else _short(float(values[0] / values[-1]))
 
 
-def badge(choice: Choice) -> tuple[str, str, str]:
+def branch_cells(choice: BranchOption) -> tuple[str, str, str]:
     """What a branch gives up, how long the way to it is, and how far it is from a singularity."""
-    badge = choice.badge
+    metrics = choice.metrics
     lost = []
-    if badge.position_error > POSITION_WORTH_TELLING:
-        lost.append(f"{_short(1e3 * badge.position_error)} mm")
-    if badge.rotation_error > ANGLE_WORTH_TELLING:
-        lost.append(f"{_short(math.degrees(badge.rotation_error))}°")
+    if metrics.position_error > POSITION_WORTH_TELLING:
+        lost.append(f"{_short(1e3 * metrics.position_error)} mm")
+    if metrics.rotation_error > ANGLE_WORTH_TELLING:
+        lost.append(f"{_short(math.degrees(metrics.rotation_error))}°")
     if choice.contact is not None:
         one, other = choice.contact.parts
         lost.append(f"{part(one)} meets {part(other)}")
-    way = f"{degrees(badge.distance, 0)}, {badge.time:.1f} s"
-    return ", ".join(lost) or NOTHING_LOST, way, f"{badge.smallest_singular_value:.3f}"
+    way = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, way, f"{metrics.smallest_singular_value:.3f}"
 
 
 def _capital(said: str) -> str:

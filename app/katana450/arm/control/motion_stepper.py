@@ -12,38 +12,38 @@ from itertools import pairwise
 
 import numpy as np
 
-from katana450.arm.control.aims import with_place
-from katana450.arm.control.arm import Arm
-from katana450.arm.control.follower import Follower
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.following import Following
+from katana450.arm.control.goals import with_place
 from katana450.arm.control.modes import Jogging, Leaving
+from katana450.arm.control.plan_follower import PlanFollower
 from katana450.arm.control.state import Finding, Reason, State
-from katana450.maths.collision.clearance import SETTLING, STOP, advance, surely_clear
+from katana450.maths.collision.clearance import MIN_STOP_TIME, STOP, advance, is_surely_clear
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import LONGEST_WAY, World
+from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.maths.kinematics.velocity import JogFrame, jog, tool_speed, tool_speed_bound
-from katana450.maths.motion.limiter import Limiter, Limits, Motion
+from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 from katana450.maths.motion.pursuit import stream_step
 
 PROBE = 0.02
 """[rad] An arm that waits goes on once the way is clear so far; from less it would only come back
 to where it was."""
 
-PLANNED = 0.9
+PLANNED_SPEED_FRACTION = 0.9
 """Of the tool's most, what is planned for: what is planned at one place is faster at the next."""
 
-AHEAD = 0.3
+SLOWDOWN_TIME = 0.3
 """[s] About what it takes to slow down by as much as the tool gains on a bend."""
 
 SLOWINGS = 4
 """How often a step is planned slower when the tool would be too fast."""
 
-SURE = 0.97
+BRAKE_SPEED_FRACTION = 0.97
 """[1] Of the tool's most, what it keeps below in the samples of a brake: between them it may be
 faster."""
 
@@ -55,7 +55,11 @@ class MotionStepper:
     """Moves the setpoints of one arm, tick by tick. Its methods are pure."""
 
     def __init__(
-        self, arm: Arm, world: World | None, tool_speed: float, touch: FloatArray | None = None
+        self,
+        arm: ArmModel,
+        world: CollisionWorld | None,
+        tool_speed: float,
+        touch: FloatArray | None = None,
     ) -> None:
         """``world``: what must not be touched. ``tool_speed``: the most of the tool point [m/s].
 
@@ -72,9 +76,9 @@ class MotionStepper:
             self._touching = frozenset(
                 frozenset((names[world.first[pair]], names[world.second[pair]])) for pair in soft
             )
-        self._most = tool_speed
-        self._tool_speed = PLANNED * tool_speed
-        self._follower = Follower(world, slides=arm.gripper.slides)
+        self._maximum = tool_speed
+        self._tool_speed = PLANNED_SPEED_FRACTION * tool_speed
+        self._follower = PlanFollower(world, slides=arm.gripper.slides)
         self._any = Limiter(arm.limits)
         self._elbow = {elbow: Limiter(_bent(arm, elbow)) for elbow in ("up", "down")}
 
@@ -129,15 +133,18 @@ class MotionStepper:
                 return self._any
         return limiter
 
-    def halt(self, state: State) -> tuple[FloatArray, float, float]:
+    def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
         """Where a brake begun now ends (n,) [rad], how far off the tool is then [m], and when."""
         motion, chain = state.motion, self._arm.chain_to(state.tool)
         if state.following is not None:
-            end = self._follower.halt(state.following).motion().q
-            time = self._follower.time_to_halt(state.following)
+            end = self._follower.stopping_point(state.following).motion().q
+            time = self._follower.stopping_time(state.following)
         else:
             # A plan that ends at a limit may miss it by rounding, and nobody could go there.
-            end, time = chain.clamp(self._any.halt(motion)), self._any.time_to_halt(motion)
+            end, time = (
+                chain.clamp(self._any.stopping_point(motion)),
+                self._any.stopping_time(motion),
+            )
         way = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
         return frozen(end), way, time
 
@@ -146,7 +153,7 @@ class MotionStepper:
         if state.motion.at_rest:
             return True
         chain = self._arm.chain_to(state.tool)
-        if not self._below(self._most, chain, state.motion, FINE):
+        if not self._below(self._maximum, chain, state.motion, FINE):
             return False
         return (
             self._world is None
@@ -157,7 +164,7 @@ class MotionStepper:
         # How far a stop takes has been said, so it goes on as it began.
         return state.motion.at_rest or (state.stopped is None and self.may_leave(state))
 
-    def _ahead(self, state: State, dt: float) -> tuple[Motion, Following | None]:
+    def _ahead(self, state: State, dt: float) -> tuple[JointMotion, Following | None]:
         """The next motion, and the place on the plan if one is followed."""
         following = state.following
         if following is None:
@@ -167,7 +174,7 @@ class MotionStepper:
         ahead = self._follower.ahead(following, dt, state.speed)
         return ahead.motion(), ahead
 
-    def _beside(self, state: State, dt: float) -> Motion:
+    def _beside(self, state: State, dt: float) -> JointMotion:
         """The next motion of an arm that follows no plan.
 
         From every step the arm could brake with the tool below its most speed all the way: where no
@@ -180,7 +187,7 @@ class MotionStepper:
         if state.paused:
             pause = limiter.pause(motion, state.goal, dt)
             return self._slow_or_braking(chain, motion, pause, dt)
-        share = min(state.speed, self._share(chain, state))
+        fraction = min(state.speed, self._fraction(chain, state))
         rates = None
         if state.jogging is not None:
             V = wished_twist(chain, motion.q, state.jogging)
@@ -188,32 +195,34 @@ class MotionStepper:
             rates = jog(chain, motion.q, V, JogFrame.BASE, dt, bounds=bounds)
         for _ in range(SLOWINGS):
             if rates is not None:
-                ahead = self._any.at_rate(motion, share * rates, dt)
+                ahead = self._any.at_rate(motion, fraction * rates, dt)
             elif state.servo is not None:
-                ahead = stream_step(limiter, motion, state.servo, state.t, dt, share)
+                ahead = stream_step(limiter, motion, state.servo, state.t, dt, fraction)
             else:
-                ahead = limiter.towards(motion, state.goal, dt, share)
+                ahead = limiter.towards(motion, state.goal, dt, fraction)
             speed = tool_speed(chain, ahead.q, ahead.qd)
             enough = max(self._tool_speed, tool_speed(chain, motion.q, motion.qd))
             if speed <= enough and self._slow_to_rest(chain, ahead):
                 return ahead
-            share *= 0.9 * min(1.0, self._tool_speed / speed)
+            fraction *= 0.9 * min(1.0, self._tool_speed / speed)
         return self._slow_or_braking(chain, motion, ahead, dt)
 
-    def _slow_or_braking(self, chain: Chain, now: Motion, ahead: Motion, dt: float) -> Motion:
+    def _slow_or_braking(
+        self, chain: Chain, now: JointMotion, ahead: JointMotion, dt: float
+    ) -> JointMotion:
         return ahead if self._slow_to_rest(chain, ahead) else self._any.stop(now, dt)
 
-    def _slow_to_rest(self, chain: Chain, motion: Motion) -> bool:
+    def _slow_to_rest(self, chain: Chain, motion: JointMotion) -> bool:
         """Whether the tool keeps below its most speed if every joint brakes now."""
-        return self._below(SURE * self._most, chain, motion, COARSE)
+        return self._below(BRAKE_SPEED_FRACTION * self._maximum, chain, motion, COARSE)
 
-    def _below(self, most: float, chain: Chain, motion: Motion, spacing: float) -> bool:
+    def _below(self, maximum: float, chain: Chain, motion: JointMotion, spacing: float) -> bool:
         """Whether the tool keeps below ``most`` [m/s] in samples of a brake begun now.
 
         They are ``spacing`` [s] apart, or as long as the tool needs in any case to get as fast.
         """
         fastest = self._any.fastest(motion)
-        if tool_speed_bound(chain, fastest) <= most:
+        if tool_speed_bound(chain, fastest) <= maximum:
             return True
         limits = self._any.limits
         # Braking, the joints turn the tool about each other's axes and slow it down or speed it up.
@@ -221,31 +230,31 @@ class MotionStepper:
         rising = float((np.abs(motion.qdd) / limits.jerk).max())
         at, duration = self._any.braking(motion)
         t, braking = 0.0, motion
-        while (speed := tool_speed(chain, braking.q, braking.qd)) <= most:
-            t += max(spacing, (most - speed) / pull)
+        while (speed := tool_speed(chain, braking.q, braking.qd)) <= maximum:
+            t += max(spacing, (maximum - speed) / pull)
             if t >= duration:
                 return True
             braking = at(t)
             # Soon they are so slow that no posture can make the tool too fast.
-            if t > rising and tool_speed_bound(chain, braking.qd) <= most:
+            if t > rising and tool_speed_bound(chain, braking.qd) <= maximum:
                 return True
         return False
 
-    def _brake(self, state: State, dt: float) -> tuple[Motion, Following | None]:
+    def _brake(self, state: State, dt: float) -> tuple[JointMotion, Following | None]:
         """The very way to rest that the tick before found clear."""
         if state.following is None:
             return self.limiter(state).stop(state.motion, dt), None
         along = self._follower.braking(state.following, dt)
         return along.motion(), along
 
-    def _share(self, chain: Chain, state: State) -> float:
+    def _fraction(self, chain: Chain, state: State) -> float:
         """Of the joints' speeds, how much the tool may have on its way to the goal."""
         way = state.goal - state.setpoint
         if state.jogging is not None or state.servo is not None or not way.any():
             return 1.0
         fastest = way / float(np.max(np.abs(way) / chain.speed))
         # Where the arm is by the time it could have slowed down the tool may be farther out.
-        soon = np.clip(state.setpoint + AHEAD * state.motion.qd, chain.lower, chain.upper)
+        soon = np.clip(state.setpoint + SLOWDOWN_TIME * state.motion.qd, chain.lower, chain.upper)
         speed = max(tool_speed(chain, q, fastest) for q in (state.setpoint, soon))
         return min(1.0, self._tool_speed / speed) if speed > 0.0 else 1.0
 
@@ -258,7 +267,7 @@ class MotionStepper:
         )
 
     def _met(
-        self, state: State, ahead: Motion, along: Following | None, fingers: float
+        self, state: State, ahead: JointMotion, along: Following | None, fingers: float
     ) -> Contact | None:
         """What is met on the way to ``ahead`` and on to rest; None when nothing is."""
         assert self._world is not None
@@ -266,11 +275,11 @@ class MotionStepper:
             met = self._follower.met(state.following, along, fingers)
             return None if met is None else self._as_it_is(met, np.append(state.setpoint, fingers))
         limiter, x = self.limiter(state), np.append(state.setpoint, fingers)
-        if surely_clear(self._world, x, np.append(limiter.halt(ahead), fingers)):
+        if is_surely_clear(self._world, x, np.append(limiter.stopping_point(ahead), fingers)):
             return None
-        way = limiter.way_to_halt(ahead, LONGEST_WAY)
+        way = limiter.stopping_path(ahead, MAX_PATH_LENGTH)
         for a, b in pairwise([state.setpoint, *way]):
-            step = advance(self._world, np.append(a, fingers), np.append(b, fingers), SETTLING)
+            step = advance(self._world, np.append(a, fingers), np.append(b, fingers), MIN_STOP_TIME)
             if step.contact is not None or step.stopped:
                 if step.contact is None:
                     return self._world.nearest(x)
@@ -302,14 +311,14 @@ class MotionStepper:
         way = state.goal - state.setpoint
         if not way.any():
             return True
-        share = min(1.0, PROBE / float(np.abs(way).sum()))
+        fraction = min(1.0, PROBE / float(np.abs(way).sum()))
         x = state.x_setpoint
-        towards = np.append(state.setpoint + share * way, state.gripper_setpoint)
-        step = advance(self._world, x, towards, SETTLING)
+        towards = np.append(state.setpoint + fraction * way, state.gripper_setpoint)
+        step = advance(self._world, x, towards, MIN_STOP_TIME)
         return bool((step.x == towards).all())
 
 
-def _bent(arm: Arm, elbow: str) -> Limits:
+def _bent(arm: ArmModel, elbow: str) -> Limits:
     """The limits of ``arm`` with its elbow kept on one side of the stretched arm."""
     canonical = arm_of(arm.chain)
     limits = arm.limits

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import told
+from katana450.arm.control.messages import finding_text
+from katana450.arm.control.scene_objects import MAX_OBJECTS, named
 from katana450.arm.control.state import ACCEPTED, Outcome, PartRefusal, Reason, State, Verdict
-from katana450.arm.control.things import MOST, named
 from katana450.arm.control.transitions import Effect, effect_of
 
-EFFECTS = (Reason.STOPPED, Reason.PAUSED)
+INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED)
 """Reasons that are what a command asks for, and limit nothing."""
 
 
@@ -51,13 +51,13 @@ def refusal(state: State, command: cmd.Command) -> str:
     if effect_of(command, state) is Effect.REFUSED:
         return _why_refused(state, command)
     match command:
-        case cmd.Place(thing=thing):
-            known = named(state.things, thing.name)
-            if known is None and len(state.things) >= MOST:
-                return f"There are {MOST} things already: remove one first."
-            return _held(state, thing.name)
-        case cmd.Remove(name=name) | cmd.Shift(name=name) | cmd.Attach(name=name):
-            if named(state.things, name) is None:
+        case cmd.PlaceObject(scene_object=scene_object):
+            known = named(state.objects, scene_object.name)
+            if known is None and len(state.objects) >= MAX_OBJECTS:
+                return f"There are {MAX_OBJECTS} objects already: remove one first."
+            return _held(state, scene_object.name)
+        case cmd.Remove(name=name) | cmd.MoveObject(name=name) | cmd.Attach(name=name):
+            if named(state.objects, name) is None:
                 return f"There is no {name!r}."
             return _held(state, name)
     return ""
@@ -81,7 +81,8 @@ def outcome(before: State, after: State) -> Outcome:
     found = tuple(
         each
         for each in after.findings
-        if each.reason not in EFFECTS and not any(each is known for known in before.findings)
+        if each.reason not in INTENDED_REASONS
+        and not any(each is known for known in before.findings)
     )
     if any(each.reason is Reason.NOT_AT_START for each in found):
         return Outcome(Verdict.REFUSED, found)
@@ -89,15 +90,15 @@ def outcome(before: State, after: State) -> Outcome:
 
 
 def _held(state: State, name: str) -> str:
-    thing = named(state.things, name)
-    if thing is None or not thing.held:
+    scene_object = named(state.objects, name)
+    if scene_object is None or not scene_object.held:
         return ""
     return f"The gripper holds {name!r}: open it first."
 
 
 def reason(refusal: Outcome) -> str:
     """Return in words why a command is refused."""
-    return refusal.why or "; ".join(told(each) for each in refusal.findings) + "."
+    return refusal.why or "; ".join(finding_text(each) for each in refusal.findings) + "."
 
 
 def _merged(batch: cmd.Batch, outcomes: list[Outcome]) -> Outcome:

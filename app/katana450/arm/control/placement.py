@@ -1,4 +1,4 @@
-"""Where a new thing stands: on the table in front of the arm, beside what is there."""
+"""Where a new object stands: on the table in front of the arm, beside what is there."""
 
 from __future__ import annotations
 
@@ -7,39 +7,39 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from katana450.arm.control.things import Form, Thing
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
-NEAREST, FARTHEST = 0.36, 0.60
+MIN_DISTANCE, MAX_DISTANCE = 0.36, 0.60
 """[m] From axis 1, of its middle: in reach, and clear of the arm at rest in its ready posture."""
 
-APART = 0.02
-"""[m] Between two things."""
+OBJECT_GAP = 0.02
+"""[m] Between two objects."""
 
 AZIMUTHS = tuple(math.radians(sign * angle) for angle in range(0, 110, 12) for sign in (1, -1))
 
 
-def free_place(thing: Thing, things: Sequence[Thing]) -> FloatArray:
+def free_place(scene_object: SceneObject, objects: Sequence[SceneObject]) -> FloatArray:
     """(4, 4) in the base frame: straight ahead if there is room, else aside, else farther out.
 
     Straight ahead too where there is room nowhere.
     """
-    others = [each for each in things if each.name != thing.name and not each.carried]
-    for distance in np.arange(NEAREST, FARTHEST, 0.06).tolist():
+    others = [each for each in objects if each.name != scene_object.name and not each.carried]
+    for distance in np.arange(MIN_DISTANCE, MAX_DISTANCE, 0.06).tolist():
         for azimuth in AZIMUTHS:
             at = np.array((distance * math.cos(azimuth), distance * math.sin(azimuth), 0.0))
             gaps = (
-                math.hypot(*(each.T[:2, 3] - at[:2])) - girth(each) - girth(thing)
+                math.hypot(*(each.T[:2, 3] - at[:2])) - girth(each) - girth(scene_object)
                 for each in others
             )
-            if all(gap >= APART for gap in gaps):
+            if all(gap >= OBJECT_GAP for gap in gaps):
                 return se3.from_rotation_translation(np.eye(3), at)
-    return se3.from_rotation_translation(np.eye(3), (NEAREST, 0.0, 0.0))
+    return se3.from_rotation_translation(np.eye(3), (MIN_DISTANCE, 0.0, 0.0))
 
 
-def girth(thing: Thing) -> float:
+def girth(scene_object: SceneObject) -> float:
     """[m] How far it reaches from its middle, seen from above and upright."""
-    if thing.form in (Form.CYLINDER, Form.SPHERE):
-        return thing.extent[0]
-    return 0.5 * math.hypot(*thing.extent[:2])
+    if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+        return scene_object.extent[0]
+    return 0.5 * math.hypot(*scene_object.extent[:2])

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.arm.control.state import State
 from katana450.errors import BlockedError
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, Plan, check_clear, plan
-from katana450.maths.planning.sampling import way_round
+from katana450.maths.planning.sampling import collision_free_path
 from katana450.maths.planning.scaling import Bounds
 
 
 def path_to(
-    arm: Arm, world: World | None, state: State, q_goal: FloatArray, seed: int = 0
+    arm: ArmModel, world: CollisionWorld | None, state: State, q_goal: FloatArray, seed: int = 0
 ) -> JointPath:
     """The way of the joints from where ``state`` has them to ``q_goal`` (n,) [rad].
 
@@ -34,13 +34,13 @@ def path_to(
         check_clear(straight, world, state.gripper_setpoint)
     except BlockedError:
         start, end = straight.start, straight.end
-        return way_round(chain, start, end, world, state.gripper_setpoint, seed)
+        return collision_free_path(chain, start, end, world, state.gripper_setpoint, seed)
     return straight
 
 
 def plan_to(
-    arm: Arm,
-    world: World | None,
+    arm: ArmModel,
+    world: CollisionWorld | None,
     state: State,
     q_goal: FloatArray,
     seed: int = 0,
@@ -51,8 +51,8 @@ def plan_to(
 
 
 def plan_along(
-    arm: Arm,
-    world: World | None,
+    arm: ArmModel,
+    world: CollisionWorld | None,
     state: State,
     paths: list[Path],
     tool_speed: float = TOOL_SPEED,

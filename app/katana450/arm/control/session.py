@@ -11,26 +11,25 @@ import numpy as np
 from katana450 import tolerances
 from katana450.arm.control import commands as cmd
 from katana450.arm.control import tool_targets
-from katana450.arm.control.aims import (
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.branch_options import BranchOption, branch_options, current_target
+from katana450.arm.control.checks import check, check_joints
+from katana450.arm.control.findings import of_joints
+from katana450.arm.control.goals import (
+    end_drag,
     follow_plan,
-    go_along,
-    let_go,
+    move_along_plan,
     paused,
     resumed,
-    stamped,
-    streamed,
     with_goal,
     with_mode,
+    with_stream_sample,
+    with_time,
     without_finding,
 )
-from katana450.arm.control.arm import Arm
-from katana450.arm.control.arrangement import arranged
-from katana450.arm.control.checks import check, check_joints
-from katana450.arm.control.choices import Choice, choices, wish
-from katana450.arm.control.findings import of_joints
 from katana450.arm.control.grip import gripped
 from katana450.arm.control.joint_stepper import JointStepper, Travel, no_travel
-from katana450.arm.control.joints import Joints
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.modes import (
     IDLE,
     Jogging,
@@ -42,6 +41,8 @@ from katana450.arm.control.modes import (
 from katana450.arm.control.motion_stepper import MotionStepper
 from katana450.arm.control.outcome import outcome, take_all
 from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.scene_changes import with_scene_change
+from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
 from katana450.arm.control.state import (
     ACCEPTED,
     Finding,
@@ -50,19 +51,18 @@ from katana450.arm.control.state import (
     State,
     StoppingDistance,
 )
-from katana450.arm.control.things import Environment, Hand, Thing
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
-from katana450.maths.motion.limiter import Motion
+from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.water.environment import WaterEnvironment
 
 TOOL_SPEED = 0.5
 """[m/s] Default maximum of the tool point: a person can follow it."""
 
-LONGEST_STEP = 0.05
+MAX_STEP_TIME = 0.05
 """[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
 must not turn into a leap."""
 
@@ -77,7 +77,7 @@ class Stepper(Protocol):
         """``state`` with its setpoints moved on by ``dt`` [s]."""
         ...
 
-    def halt(self, state: State) -> tuple[FloatArray, float, float]:
+    def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
         """The end (n,) [rad or m] of a brake begun now, the travel until then [m], and its time."""
         ...
 
@@ -97,13 +97,13 @@ class Session:
 
     def __init__(
         self,
-        robot: Arm | Joints,
+        robot: ArmModel | JointSet,
         ready: FloatArray,
-        world: World | None = None,
+        world: CollisionWorld | None = None,
         tool_speed: float = TOOL_SPEED,
         hand: Hand | None = None,
-        things: tuple[Thing, ...] = (),
-        around: WaterEnvironment | None = None,
+        objects: tuple[SceneObject, ...] = (),
+        water_environment: WaterEnvironment | None = None,
         travel: Travel = no_travel,
     ) -> None:
         """Create the rules of ``robot``. Raises InputError for ``ready`` beyond the limits.
@@ -114,21 +114,25 @@ class Session:
             world: what the arm must not touch; None to check no contacts.
             tool_speed: maximum speed of the tool point [m/s].
             hand: what takes objects.
-            things: objects in the first state.
+            objects: objects in the first state.
             around: what water is in and falls on; None for no water.
             travel: for joints, the distance [m] that the links travel between two joint vectors.
         """
-        self.arm = robot if isinstance(robot, Arm) else None
+        self.arm = robot if isinstance(robot, ArmModel) else None
         self.world = world
-        self.surroundings = Environment(world, hand, None if around is None else around.table)
-        self.pouring = None if around is None else Pouring(around, self.surroundings)
+        self.environment = Environment(
+            world, hand, None if water_environment is None else water_environment.table
+        )
+        self.pouring = (
+            None if water_environment is None else Pouring(water_environment, self.environment)
+        )
         self._robot = robot
         self._limits = robot.limits
-        self._things = things
+        self._objects = objects
         self._tool_speed = tool_speed
-        self._joint_stepper = JointStepper(robot, travel) if isinstance(robot, Joints) else None
+        self._joint_stepper = JointStepper(robot, travel) if isinstance(robot, JointSet) else None
         # For the objects of the newest state: no state, but what follows from them.
-        self._made: tuple[tuple[Thing, ...], World | None, Stepper] | None = None
+        self._made: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
         self.check(cmd.SetJoints(ready))
         self.ready = frozen(ready)
         if of_joints(self._limits, robot.slides, self.ready):
@@ -140,26 +144,26 @@ class Session:
         if self.arm is None:
             return State.standing(q, gripper, t, "", NO_BRANCH)
         branch = branch_of(self.arm.chain, q)
-        return State.standing(q, gripper, t, self.arm.default_tool, branch, self._things)
+        return State.standing(q, gripper, t, self.arm.default_tool, branch, self._objects)
 
-    def require_arm(self) -> Arm:
+    def require_arm(self) -> ArmModel:
         """The arm. Raises InputError, with the reason, where only joints can be driven."""
-        if isinstance(self._robot, Joints):
+        if isinstance(self._robot, JointSet):
             raise InputError(self._robot.refusal)
         return self._robot
 
-    def world_at(self, state: State) -> World | None:
-        """What the arm must not touch, with the things of ``state``."""
+    def world_at(self, state: State) -> CollisionWorld | None:
+        """What the arm must not touch, with the objects of ``state``."""
         return self._for(state)[1]
 
-    def _for(self, state: State) -> tuple[tuple[Thing, ...], World | None, Stepper]:
-        if self._made is None or self._made[0] is not state.things:
-            world = self.surroundings.world(state.things)
+    def _for(self, state: State) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper]:
+        if self._made is None or self._made[0] is not state.objects:
+            world = self.environment.world(state.objects)
             stepper: Stepper | None = self._joint_stepper
             if stepper is None:
-                touch = None if world is None else self.surroundings.touch(world, state.things)
+                touch = None if world is None else self.environment.touch(world, state.objects)
                 stepper = MotionStepper(self.require_arm(), world, self._tool_speed, touch)
-            self._made = (state.things, world, stepper)
+            self._made = (state.objects, world, stepper)
         return self._made
 
     def _stepper(self, state: State) -> Stepper:
@@ -167,14 +171,14 @@ class Session:
 
     def check(self, command: cmd.Command) -> None:
         """Raise InputError, for the sender, if this robot cannot even be asked for ``command``."""
-        if isinstance(self._robot, Joints):
+        if isinstance(self._robot, JointSet):
             check_joints(self._robot, command)
         else:
-            check(self._robot, self.pouring, self.surroundings, command)
+            check(self._robot, self.pouring, self.environment, command)
 
-    def choices(self, state: State) -> tuple[Choice, ...]:
+    def choices(self, state: State) -> tuple[BranchOption, ...]:
         """The choice on each branch. Raises InputError where there is no arm."""
-        return choices(self.require_arm(), state, self.world_at(state))
+        return branch_options(self.require_arm(), state, self.world_at(state))
 
     def step(self, state: State, commands: Iterable[cmd.Command], t: float) -> State:
         """Take the commands in order, then move the setpoints on by the time that has passed.
@@ -188,7 +192,7 @@ class Session:
         for command in commands:
             self.check(command)
             before = state
-            state, found = take_all(self._take, state, stamped(command, t))
+            state, found = take_all(self._take, state, with_time(command, t))
             outcomes.append(found)
         if isinstance(state.intent, Tracking):
             state = tool_targets.tracked(self.require_arm(), state, state.intent)
@@ -198,15 +202,15 @@ class Session:
             state = replace(state, outcomes=tuple(outcomes))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = self._at_rest_soon(state)
-        dt = min(t - state.t, LONGEST_STEP)
+        dt = min(t - state.t, MAX_STEP_TIME)
         state = self._stepper(state).step(replace(state, t=max(t, state.t)), dt)
-        state = gripped(self.surroundings, self.world_at(state), state)
+        state = gripped(self.environment, self.world_at(state), state)
         if self.pouring is not None and state.poured is not None:
             x = state.x_setpoint
-            state = replace(state, poured=self.pouring.step(state.poured, state.things, x, dt))
+            state = replace(state, poured=self.pouring.step(state.poured, state.objects, x, dt))
         if not isinstance(state.intent, Jogging):
             return state
-        rest = self._stepper(state).halt(state)[0]
+        rest = self._stepper(state).stopping_point(state)[0]
         return tool_targets.jogged(self.require_arm(), state, state.intent, rest)
 
     @staticmethod
@@ -219,7 +223,7 @@ class Session:
         """Hold after an error of our own: no target survives it."""
         held = replace(
             state,
-            motion=Motion.rest(state.setpoint),
+            motion=JointMotion.rest(state.setpoint),
             goal=state.setpoint,
             gripper_goal=state.gripper_setpoint,
             mode=IDLE,
@@ -249,23 +253,25 @@ class Session:
                 return replace(state, speed=value)
             case cmd.SetTool(name=name):
                 return replace(self._retooled(state, name), mode=state.mode)
-            case cmd.SetReading(reading=reading):
-                return replace(state, reading=reading)
+            case cmd.SetPriority(priority=priority):
+                return replace(state, priority=priority)
             case cmd.EndDrag():
-                return let_go(state)
+                return end_drag(state)
             case cmd.SetGripper(angle=angle):
                 return self._grip(state, angle)
-        return arranged(self.surroundings, self.pouring, state, command)
+        return with_scene_change(self.environment, self.pouring, state, command)
 
     def _continued(self, state: State, command: cmd.Command) -> State:
         """``state`` after a command that the present mode takes in."""
         match command:
-            case cmd.GoAlong(share=fraction):
-                return go_along(self.require_arm().chain, state, fraction)
+            case cmd.GoAlong(fraction=fraction):
+                return move_along_plan(self.require_arm().chain, state, fraction)
             case cmd.EndDrag():
-                return let_go(state)
-            case cmd.SetReading(reading=reading):
-                return tool_targets.reread(self.require_arm(), replace(state, reading=reading))
+                return end_drag(state)
+            case cmd.SetPriority(priority=priority):
+                return tool_targets.with_reapplied_priority(
+                    self.require_arm(), replace(state, priority=priority)
+                )
         # The others begin their mode just as they renew it.
         return self._superseded(state, command)
 
@@ -273,9 +279,9 @@ class Session:
         """``state`` in the mode that ``command`` begins."""
         match command:
             case cmd.Stop():
-                return self._halt(state)
+                return self._stop_motion(state)
             case cmd.ClearStop():
-                goal = self._stepper(state).halt(state)[0]
+                goal = self._stepper(state).stopping_point(state)[0]
                 free = with_mode(replace(state, stopped=None, goal=goal), IDLE)
                 return without_finding(free, Reason.STOPPED)
             case cmd.Hold():
@@ -286,7 +292,9 @@ class Session:
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
             case cmd.Servo(q=q):
-                return streamed(state, self._aim(state, q), command, self._limits.acceleration)
+                return with_stream_sample(
+                    state, self._aim(state, q), command, self._limits.acceleration
+                )
             case cmd.Home():
                 return self._aim(state, self.ready)
             case cmd.GoToZero() if self.arm is None:
@@ -296,18 +304,18 @@ class Session:
             case cmd.Jog(rates=rates, frame=frame):
                 return with_mode(state, Jogging(rates, frame, state.t + cmd.JOG_TIME))
             case cmd.EndDrag():
-                return let_go(state)
+                return end_drag(state)
             case _:
                 return self._to_tool_target(self.require_arm(), state, command)
 
-    def _to_tool_target(self, arm: Arm, state: State, command: cmd.Command) -> State:
+    def _to_tool_target(self, arm: ArmModel, state: State, command: cmd.Command) -> State:
         """``state`` in the mode that a command about the tool begins."""
         match command:
             case cmd.MoveTool(position=position):
-                target = replace(wish(arm, state), position=position)
+                target = replace(current_target(arm, state), position=position)
                 return tool_targets.dragged(arm, state, target)
             case cmd.TurnTool(pitch=pitch, roll=roll):
-                target = replace(wish(arm, state), pitch=pitch, roll=roll)
+                target = replace(current_target(arm, state), pitch=pitch, roll=roll)
                 return tool_targets.dragged(arm, state, target)
             case cmd.SetPose(T=T):
                 return tool_targets.with_pose_target(arm, state, PoseTarget(T))
@@ -337,15 +345,15 @@ class Session:
 
     def _at_rest_soon(self, state: State) -> State:
         """``state`` that brakes and holds, without a target."""
-        return with_mode(self._aim(state, self._stepper(state).halt(state)[0]), IDLE)
+        return with_mode(self._aim(state, self._stepper(state).stopping_point(state)[0]), IDLE)
 
-    def _halt(self, state: State) -> State:
+    def _stop_motion(self, state: State) -> State:
         """Brake, and forget every target. The grip stays: what is held must not be dropped."""
         if state.stopped is not None:
             return state
         free = state.following is None or self._stepper(state).may_leave(state)
         state = replace(state, mode=IDLE) if free else with_mode(state, IDLE)
-        goal, way, time = self._stepper(state).halt(state)
+        goal, way, time = self._stepper(state).stopping_point(state)
         stopped = replace(
             state,
             stopped=StoppingDistance(way, time),

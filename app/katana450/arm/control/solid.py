@@ -1,4 +1,4 @@
-"""What a mesh counts as where contacts are looked for, and how a thing looks."""
+"""What a mesh counts as where contacts are looked for, and how an object looks."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.maths.collision.outer import MOST
+from katana450.maths.collision.convex_body import MAX_CORNERS
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
-LONGEST_KEY = 64
+MAX_KEY_LENGTH = 64
 
-FAINTEST = 0.05
-"""Opacity: what is fainter cannot be seen, for which there is ``Look.hidden``."""
+MIN_OPACITY = 0.05
+"""Opacity: what is fainter cannot be seen, for which there is ``ObjectAppearance.hidden``."""
 
 Colour = tuple[int, int, int]
 """Red, green, blue of 255."""
@@ -35,23 +35,23 @@ class Solid:
     corners: FloatArray
 
     def __post_init__(self) -> None:
-        if not (self.key.isalnum() and len(self.key) <= LONGEST_KEY):
-            raise InputError(f"The key of a mesh is up to {LONGEST_KEY} letters and digits.")
+        if not (self.key.isalnum() and len(self.key) <= MAX_KEY_LENGTH):
+            raise InputError(f"The key of a mesh is up to {MAX_KEY_LENGTH} letters and digits.")
         size = finite_array(self.size, (3,), "The size of a mesh")
         if size.min() < 0.0 or size.max() <= 0.0:
             raise InputError(f"The size of a mesh is three lengths, not {self.size}.")
         x, y, z = size.tolist()
         object.__setattr__(self, "size", (x, y, z))
         corners = np.asarray(self.corners, dtype=np.float64)
-        if not 4 <= len(corners) <= MOST:
-            raise InputError(f"A mesh counts as 4 to {MOST} corners, not {len(corners)}.")
+        if not 4 <= len(corners) <= MAX_CORNERS:
+            raise InputError(f"A mesh counts as 4 to {MAX_CORNERS} corners, not {len(corners)}.")
         corners = finite_array(corners, (len(corners), 3), "The corners of a mesh")
         object.__setattr__(self, "corners", frozen(corners))
 
 
 @dataclass(frozen=True)
-class Look:
-    """How a thing is drawn.
+class ObjectAppearance:
+    """How an object is drawn.
 
     Attributes:
         colour: None for its own.
@@ -68,9 +68,9 @@ class Look:
             len(self.colour) == 3 and all(type(c) is int and 0 <= c <= 255 for c in self.colour)
         ):
             raise InputError(f"A colour is three whole numbers from 0 to 255, not {self.colour}.")
-        if not FAINTEST <= self.opacity <= 1.0:
-            raise InputError(f"An opacity is from {FAINTEST} to 1, not {self.opacity}.")
+        if not MIN_OPACITY <= self.opacity <= 1.0:
+            raise InputError(f"An opacity is from {MIN_OPACITY} to 1, not {self.opacity}.")
 
 
-PLAIN = Look()
-"""Of a thing of which nobody says."""
+PLAIN = ObjectAppearance()
+"""Of an object of which nobody says."""

@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from katana450.arm.control.looks import ALL_AS_MADE, Looks
+from katana450.arm.control.appearance import ALL_AS_MADE, Appearance
 from katana450.arm.control.modes import (
     IDLE,
     Following,
@@ -23,12 +23,12 @@ from katana450.arm.control.modes import (
     ToolTarget,
     Tracking,
 )
-from katana450.arm.control.pouring import Poured
-from katana450.arm.control.things import Thing
+from katana450.arm.control.pouring import MotionWithWater
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
-from katana450.maths.kinematics.reading import Reading
-from katana450.maths.motion.limiter import Motion
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
 
 __all__ = [
@@ -55,7 +55,7 @@ class Status(Enum):
     LIMITED = "limited"
     PAUSED = "paused"
     BLOCKED = "blocked"
-    HELD = "held"
+    GAP = "gap"
     STOPPED = "stopped"
     FAULT = "fault"
 
@@ -99,7 +99,7 @@ class Finding:
             the tool, or else any link, went until it was at rest [m]; for a plan, how far its start
             is [rad].
         axis: the axis it is about, counted from 0, where it is about one.
-        parts: the two links or things it is about, where it is about two.
+        parts: the two links or objects it is about, where it is about two.
         time: for a stop, how long that took [s].
     """
 
@@ -177,41 +177,42 @@ class State:
         tool: the tool frame that targets and read-outs are of; empty where there are only joints,
             and then the branch and the reading say nothing.
         branch: the branch that dragging keeps.
-        reading: which numbers of a target count, and what gives way.
+        priority: which numbers of a target count, and what gives way.
         findings: why the goal is not what was last wished, or is not gone to; else empty.
         blocked: whether the arm waits on its way because it would touch something.
         stopped: the stop that holds the arm until it is cleared; None when there is none.
         paused: whether the arm waits on its way because a person wants it to.
-        speed: the share of every greatest speed that is allowed, above 0 and up to 1.
+        speed: the fraction of every greatest speed that is allowed, above 0 and up to 1.
         mode: what decides where the goal is. A drag is over once the goal is there; until then
             the findings are those from before.
-        things: what stands around or is held, and can be put elsewhere.
-        grip: the angle of the finger joint at which a thing is held [rad]; None with an empty hand.
+        objects: what stands around or is held, and can be put elsewhere.
+        grip: the angle of the finger joint at which an object is held [rad]; None with an empty
+        hand.
         poured: the water of the cup; None where there is none.
-        looks: how links and things are shown.
+        looks: how links and objects are shown.
         outcomes: what became of the commands of this tick, one for each.
     """
 
     t: float
     q: FloatArray
     gripper: float
-    motion: Motion
+    motion: JointMotion
     gripper_setpoint: float
     goal: FloatArray
     gripper_goal: float
     tool: str
     branch: Branch
-    reading: Reading = Reading.POSE
+    priority: Priority = Priority.POSE
     findings: tuple[Finding, ...] = ()
     blocked: bool = False
     stopped: StoppingDistance | None = None
     paused: bool = False
     speed: float = 1.0
     mode: Mode = IDLE
-    things: tuple[Thing, ...] = ()
+    objects: tuple[SceneObject, ...] = ()
     grip: float | None = None
-    poured: Poured | None = None
-    looks: Looks = ALL_AS_MADE
+    poured: MotionWithWater | None = None
+    appearance: Appearance = ALL_AS_MADE
     outcomes: tuple[Outcome, ...] = ()
 
     @staticmethod
@@ -221,20 +222,20 @@ class State:
         t: float,
         tool: str,
         branch: Branch,
-        things: tuple[Thing, ...] = (),
+        objects: tuple[SceneObject, ...] = (),
     ) -> State:
         """Joints that stand at ``q`` (n,) and hold, with nothing asked of them yet."""
         return State(
             t=t,
             q=q,
             gripper=gripper,
-            motion=Motion.rest(q),
+            motion=JointMotion.rest(q),
             gripper_setpoint=gripper,
             goal=q,
             gripper_goal=gripper,
             tool=tool,
             branch=branch,
-            things=things,
+            objects=objects,
         )
 
     @property
@@ -249,7 +250,7 @@ class State:
         if any(finding.reason is Reason.CONTACT for finding in self.findings):
             return Status.BLOCKED
         if any(finding.reason is Reason.ACROSS_GAP for finding in self.findings):
-            return Status.HELD
+            return Status.GAP
         return Status.LIMITED if self.findings else Status.OK
 
     @property
@@ -310,14 +311,14 @@ class State:
 
     @property
     def near(self) -> frozenset[str]:
-        """The links and things that are about to touch."""
+        """The links and objects that are about to touch."""
         met = (each.parts for each in self.findings if each.reason is Reason.CONTACT)
         return frozenset(part for parts in met for part in parts or ())
 
     @property
-    def held(self) -> Thing | None:
+    def held(self) -> SceneObject | None:
         """What the fingers hold."""
-        return next((each for each in self.things if each.held), None)
+        return next((each for each in self.objects if each.held), None)
 
     @property
     def under_way(self) -> bool:

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.aims import with_goal, with_mode
-from katana450.arm.control.arm import Arm
-from katana450.arm.control.choices import choice, wish, wish_on
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.branch_options import branch_option, current_target, target_on_branch
 from katana450.arm.control.findings import of_jog, of_projection, of_tracked
+from katana450.arm.control.goals import with_goal, with_mode
 from katana450.arm.control.modes import (
     IDLE,
     Jogging,
@@ -27,28 +27,28 @@ from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tracker import track
 
-STILL = frozen(np.zeros(5))
+NO_RATES = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
-KEPT = (Reason.PAUSED, Reason.CONTACT, *GRIPPER_LIMITS)
+KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, *GRIPPER_LIMITS)
 """The reasons that a jog does not work out anew."""
 
 
-def with_pose_target(arm: Arm, state: State, target: PoseTarget) -> State:
+def with_pose_target(arm: ArmModel, state: State, target: PoseTarget) -> State:
     """``state`` with the nearest that ``arm`` can do to ``target`` on its branch as the goal."""
     chain = arm.chain_to(state.tool)
-    best = project(chain, target.T, reading=state.reading, branch=state.branch, q_hint=state.goal)
-    findings = of_projection(chain, best, state.reading, yaw_was_wished=True)
+    best = project(chain, target.T, priority=state.priority, branch=state.branch, q_hint=state.goal)
+    findings = of_projection(chain, best, state.priority, yaw_was_given=True)
     return with_goal(state, best.q, findings, Positioning(target))
 
 
-def dragged(arm: Arm, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
+def dragged(arm: ArmModel, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
     """``state`` that tracks ``target`` from now on, along the path of the hand."""
-    since = wish(arm, state) if state.since is None else state.since
+    since = current_target(arm, state) if state.since is None else state.since
     return with_mode(state, Tracking(target, since, let_go))
 
 
-def tracked(arm: Arm, state: State, tracking: Tracking) -> State:
+def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
     """``state`` with its goal taken on towards the target of a drag, as far as one tick allows."""
     chain = arm.chain_to(state.tool)
     found = track(
@@ -56,17 +56,17 @@ def tracked(arm: Arm, state: State, tracking: Tracking) -> State:
         state.goal,
         tracking.target,
         branch=state.branch,
-        reading=state.reading,
+        priority=state.priority,
         since=tracking.since,
     )
     if found.since is not None:
         return with_mode(replace(state, goal=found.best.q), replace(tracking, since=found.since))
     target = JointTarget(found.best.q) if tracking.let_go else tracking.target
-    findings = of_tracked(chain, found, state.reading)
+    findings = of_tracked(chain, found, state.priority)
     return with_goal(state, found.best.q, findings, Positioning(target))
 
 
-def reread(arm: Arm, state: State) -> State:
+def with_reapplied_priority(arm: ArmModel, state: State) -> State:
     """``state`` with its pose or tool target projected anew, in the reading there is now."""
     match state.intent:
         case Positioning(target=PoseTarget() as target):
@@ -78,33 +78,33 @@ def reread(arm: Arm, state: State) -> State:
     return state
 
 
-def with_branch(arm: Arm, state: State, branch: Branch) -> State:
+def with_branch(arm: ArmModel, state: State, branch: Branch) -> State:
     """``state`` that goes to ``branch`` with the tool at its target."""
-    best = choice(arm, state, branch)
+    best = branch_option(arm, state, branch)
     target: Target = JointTarget(best.q)
     if isinstance(state.target, PoseTarget):
         target = state.target
     elif isinstance(state.target, ToolTarget):
-        target = wish_on(arm, state, branch)
+        target = target_on_branch(arm, state, branch)
     findings = of_projection(
         arm.chain_to(state.tool),
         best,
-        state.reading,
-        yaw_was_wished=isinstance(target, PoseTarget),
+        state.priority,
+        yaw_was_given=isinstance(target, PoseTarget),
     )
     return with_goal(replace(state, branch=branch), best.q, findings, Positioning(target))
 
 
-def jogged(arm: Arm, state: State, jogging: Jogging, rest: FloatArray) -> State:
+def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> State:
     """``state`` after a tick of a jog: the goal is ``rest`` (n,), where it would come to rest.
 
     So the arm does come to rest there when the jog is not renewed.
     """
     chain = arm.chain_to(state.tool)
-    kept = tuple(f for f in state.findings if f.reason in KEPT)
+    kept = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
     held = of_jog(chain, state.setpoint, wished_twist(chain, state.setpoint, jogging))
     aimed = replace(state, goal=rest, branch=branch_of(chain, rest), findings=kept + held)
     if state.t < jogging.until:
         return aimed
     # Braked as a jog, in step, the tool stays on its way.
-    return with_mode(aimed, IDLE if state.motion.at_rest else replace(jogging, rates=STILL))
+    return with_mode(aimed, IDLE if state.motion.at_rest else replace(jogging, rates=NO_RATES))

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 
 @dataclass(frozen=True, kw_only=True)
-class Traits:
+class CommandTraits:
     """Traits of one class of commands. The default is a motion of an arm that has a tool.
 
     Attributes:
@@ -44,7 +44,7 @@ class Traits:
 class BaseCommand:
     """Base of all commands. Each class declares ``traits``."""
 
-    traits: ClassVar[Traits]
+    traits: ClassVar[CommandTraits]
 
     @property
     def parts(self) -> tuple[BaseCommand, ...]:

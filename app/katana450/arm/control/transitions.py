@@ -77,18 +77,18 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     # The target was one of the other tool frame; the goal stays.
     cmd.SetTool: _row(Positioning,      A,   S,   S,   S,   S,   A),
     # A tool target is projected anew.
-    cmd.SetReading: _row(None,          A,   C,   C,   A,   A,   A),
+    cmd.SetPriority: _row(None,          A,   C,   C,   A,   A,   A),
     cmd.Pause: _row(None,               A,   A,   A,   A,   A,   A),
     cmd.Resume: _row(None,              A,   A,   A,   A,   A,   A),
     cmd.SpeedScale: _row(None,          A,   A,   A,   A,   A,   A),
     cmd.SetGripper: _row(None,          A,   A,   A,   A,   A,   A),
-    cmd.Place: _row(None,               A,   A,   A,   A,   A,   A),
-    cmd.Shift: _row(None,               A,   A,   A,   A,   A,   A),
+    cmd.PlaceObject: _row(None,               A,   A,   A,   A,   A,   A),
+    cmd.MoveObject: _row(None,               A,   A,   A,   A,   A,   A),
     cmd.Attach: _row(None,              A,   A,   A,   A,   A,   A),
-    cmd.Furnish: _row(None,             A,   A,   A,   A,   A,   A),
+    cmd.ReplaceScene: _row(None,             A,   A,   A,   A,   A,   A),
     cmd.Remove: _row(None,              A,   A,   A,   A,   A,   A),
     cmd.Fill: _row(None,                A,   A,   A,   A,   A,   A),
-    cmd.Dress: _row(None,               A,   A,   A,   A,   A,   A),
+    cmd.SetAppearance: _row(None,               A,   A,   A,   A,   A,   A),
     # Each of its commands has the effect of its own row.
     cmd.Batch: _row(None,               A,   A,   A,   A,   A,   A),
 }  # fmt: skip

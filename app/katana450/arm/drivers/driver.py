@@ -9,7 +9,7 @@ from katana450.maths.geometry.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Sent:
+class SentSetpoint:
     """What a driver really told the arm: ``q`` (n,) [rad] and the finger joint [rad]."""
 
     q: FloatArray
@@ -19,11 +19,11 @@ class Sent:
 class Driver(Protocol):
     """An arm that takes a position setpoint each tick. Called from the control loop alone."""
 
-    def start(self, t: float) -> Sent:
+    def start(self, t: float) -> SentSetpoint:
         """Connect, and say where the arm stands. ``t``: now [s]."""
         ...
 
-    def send(self, q: FloatArray, gripper: float, t: float) -> Sent:
+    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
         """Pass the setpoint (n,) [rad] and the finger joint [rad] on, and say what was sent.
 
         A driver never sends what its arm must not be sent: it refuses what is not finite with an

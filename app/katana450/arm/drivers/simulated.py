@@ -6,41 +6,41 @@ from typing import Protocol
 
 import numpy as np
 
-from katana450.arm.control.arm import Gripper
-from katana450.arm.drivers.driver import Sent
+from katana450.arm.control.arm import GripperModel
+from katana450.arm.drivers.driver import SentSetpoint
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import Limits
 
 
-class Jointed(Protocol):
+class JointLimitsSource(Protocol):
     """What it has to know of an arm; any ``Arm`` is one."""
 
     @property
     def limits(self) -> Limits: ...
 
     @property
-    def gripper(self) -> Gripper: ...
+    def gripper(self) -> GripperModel: ...
 
 
 class SimulatedDriver:
     """Keeps to limits and speeds by itself, so that a fault upstream shows instead of hiding."""
 
-    def __init__(self, arm: Jointed, q: FloatArray, gripper: float) -> None:
+    def __init__(self, arm: JointLimitsSource, q: FloatArray, gripper: float) -> None:
         """The arm stands at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad or m].
 
         What is beyond its limits is set to the limit.
         """
         self._limits = arm.limits
         self._fingers = arm.gripper
-        self._sent = Sent(self._clamped(q), self._fingers.clamp(gripper))
+        self._sent = SentSetpoint(self._clamped(q), self._fingers.clamp(gripper))
         self._t: float | None = None
 
-    def start(self, t: float) -> Sent:
+    def start(self, t: float) -> SentSetpoint:
         self._t = t
         return self._sent
 
-    def send(self, q: FloatArray, gripper: float, t: float) -> Sent:
+    def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
         if self._t is None:
             raise InputError("The simulated arm takes no setpoint before it is started.")
         if not (np.isfinite(q).all() and np.isfinite(gripper)):
@@ -51,7 +51,7 @@ class SimulatedDriver:
             return self._sent
         step = self._limits.speed * dt
         moved = self._sent.q + np.clip(self._clamped(q) - self._sent.q, -step, step)
-        self._sent = Sent(frozen(moved), self._gripper(gripper, dt))
+        self._sent = SentSetpoint(frozen(moved), self._gripper(gripper, dt))
         return self._sent
 
     def stop(self) -> None:

@@ -19,7 +19,7 @@ from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.ideal import idealised
+from katana450.maths.kinematics.exact_member import exact_member
 
 SHOULDER_FRAME = "shoulder_frame"
 """The link that is the paper's frame {S}."""
@@ -55,9 +55,9 @@ def arm_in(urdf: Urdf, links: Sequence[Link], path: Path, tool: str | None) -> M
         names=tuple(joint.name for joint in joints),
     )
     up = T_shoulder_base[:3, 2]
-    chain, notes = idealised(described, up)
+    chain, notes = exact_member(described, up)
     tools = {
-        link: idealised(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
+        link: exact_member(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
         for link in structure.tools
     }
     fingers = fingers_of(structure.hand, structure.others, frames)

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.arm.control.things import Form, Hand, Thing
+from katana450.arm.control.scene_objects import Hand, SceneObject, Shape
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.maths.collision.linkage import GROUND, Linkage, Mover
+from katana450.maths.collision.linkage import GROUND, Linkage, RigidGroup
 from katana450.maths.collision.pairs import pairs_that_meet
-from katana450.maths.collision.shape import Shape, half_space, hull
-from katana450.maths.collision.world import Part, World, obstacle
+from katana450.maths.collision.shape import CollisionShape, half_space, hull
+from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
-def world_of(robot: Robot) -> tuple[World | None, tuple[str, ...]]:
+def world_of(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
     """Return the arm's own collision bodies, and sentences for a person on what they leave out.
 
     Every shape counts as its convex hull. x is the arm's joint angles (n,) and the driven finger
@@ -26,7 +26,7 @@ def world_of(robot: Robot) -> tuple[World | None, tuple[str, ...]]:
     RobotDescriptionError where there is no arm.
     """
     arm = robot.require_arm()
-    movers: list[Mover] = []
+    movers: list[RigidGroup] = []
     # Of each body the piece it moves with, and where it is in the frame of that.
     places: dict[str | None, tuple[int, FloatArray]] = {None: (GROUND, np.eye(4))}
     parts: list[Part] = []
@@ -37,7 +37,7 @@ def world_of(robot: Robot) -> tuple[World | None, tuple[str, ...]]:
         joint = link.joint
         drive = None if joint is None else _drive(arm, joint)
         if joint is not None and drive is not None:
-            movers.append(Mover(piece, T, joint.axis, *drive, slides=joint.slides))
+            movers.append(RigidGroup(piece, T, joint.axis, *drive, slides=joint.slides))
             piece, T = len(movers), np.eye(4)
         places[link.name] = piece, T
         shapes, refused = _shapes(link)
@@ -52,7 +52,9 @@ def world_of(robot: Robot) -> tuple[World | None, tuple[str, ...]]:
     linkage = Linkage(movers)
     chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
-    return World(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(notes)
+    return CollisionWorld(linkage, parts, pairs_that_meet(linkage, parts, lower, upper)), tuple(
+        notes
+    )
 
 
 def table() -> Part:
@@ -60,12 +62,12 @@ def table() -> Part:
     return obstacle("table", np.eye(4), half_space())
 
 
-def things_of(props: Props) -> tuple[Thing, ...]:
+def scene_objects_of(props: Props) -> tuple[SceneObject, ...]:
     """Cup and basin where they stand at first, as the cylinders round them."""
     return tuple(
-        Thing(
+        SceneObject(
             name,
-            Form.CYLINDER,
+            Shape.CYLINDER,
             (vessel.outer_radius, vessel.height),
             se3.from_rotation_translation(np.eye(3), at),
             can_be_held=name == "cup",
@@ -74,13 +76,16 @@ def things_of(props: Props) -> tuple[Thing, ...]:
     )
 
 
-def standing_around(props: Props) -> tuple[Part, ...]:
-    """The table and ``things_of`` as obstacles that stay where they are."""
-    things = things_of(props)
-    return (table(), *(obstacle(each.name, each.T_shape, each.shape) for each in things))
+def initial_objects(props: Props) -> tuple[Part, ...]:
+    """The table and ``scene_objects_of`` as obstacles that stay where they are."""
+    objects = scene_objects_of(props)
+    return (
+        table(),
+        *(obstacle(each.name, each.T_collision_shape, each.collision_shape) for each in objects),
+    )
 
 
-def hand_of(robot: Robot, world: World) -> Hand:
+def hand_of(robot: Robot, world: CollisionWorld) -> Hand:
     """Return the fingers and what they hang on; without any, what the last joint turns.
 
     Raises RobotDescriptionError where there is no arm.
@@ -107,8 +112,8 @@ def _drive(arm: MountedArm, joint: Joint) -> tuple[int, float, float] | None:
     return None
 
 
-def _shapes(link: Link) -> tuple[tuple[Shape, ...], list[str]]:
-    shapes: list[Shape] = []
+def _shapes(link: Link) -> tuple[tuple[CollisionShape, ...], list[str]]:
+    shapes: list[CollisionShape] = []
     refused: list[str] = []
     for collision in link.collisions:
         try:

@@ -33,11 +33,11 @@ HALVINGS = 24
 """Of the way the middle may bulge: to less than a micrometre."""
 
 
-EASE = 6.0
+SLACK_EXPONENT = 6.0
 """How sharply a slack curve becomes a taut one: the length is a norm of both, of this order."""
 
-GIVE = 0.25
-"""Share of its length by which a conduit with ribs can be drawn out or pushed together."""
+STRETCH_FRACTION = 0.25
+"""Fraction of its length by which a conduit with ribs can be drawn out or pushed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Hinge(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class ConduitStretch:
     """One free run of conduit.
 
     start, end: its ends; the tangents lead from the first to the second. radius, length: [m], the
@@ -86,7 +86,8 @@ class Stretch:
         return np.linspace(self.hinge.lower, self.hinge.upper, ANGLES)
 
     def between(self, angle: float) -> tuple[int, float]:
-        """The number of the last of ``angles`` before ``angle`` [rad], and the share beyond it."""
+        """The number of the last of ``angles`` before ``angle`` [rad], and the fraction beyond
+        it."""
         lower, upper = self.hinge.lower, self.hinge.upper
         row = (min(max(angle, lower), upper) - lower) / (upper - lower) * (ANGLES - 1)
         low = min(int(row), ANGLES - 2)
@@ -148,8 +149,8 @@ class Stretch:
         first[:, 1] *= mean
         last[:, 1] *= mean
         outward = np.broadcast_to((1.0, 0.0, 0.0), first.shape)
-        least = (1.0 - GIVE) * self.length
-        return rolled(_of_length(least, first, a_lead, last, b_lead, outward, rolled))
+        minimum = (1.0 - STRETCH_FRACTION) * self.length
+        return rolled(_of_length(minimum, first, a_lead, last, b_lead, outward, rolled))
 
 
 ZERO = np.zeros(3)
@@ -175,7 +176,7 @@ def _of_length(
         return np.asarray(np.linalg.norm(np.diff(curve, axis=1), axis=2).sum(axis=1))
 
     taut = long(np.zeros(len(p)))
-    wanted = (taut**EASE + length**EASE) ** (1.0 / EASE)
+    wanted = (taut**SLACK_EXPONENT + length**SLACK_EXPONENT) ** (1.0 / SLACK_EXPONENT)
     low, high = np.zeros(len(p)), wanted
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
@@ -224,9 +225,9 @@ def _even(curves: FloatArray) -> FloatArray:
 def _between(rows: FloatArray, spots: FloatArray, axis: int) -> FloatArray:
     """What ``rows`` come to at ``spots`` (n,), which count them along ``axis`` from 0."""
     low = np.minimum(spots.astype(int), rows.shape[axis] - 2)
-    share = np.expand_dims(spots - low, (1, 2) if axis == 0 else (0, 2))
+    fraction = np.expand_dims(spots - low, (1, 2) if axis == 0 else (0, 2))
     first, second = rows.take(low, axis), rows.take(low + 1, axis)
-    return np.asarray(first + share * (second - first))
+    return np.asarray(first + fraction * (second - first))
 
 
 def _across(v: FloatArray, chord: FloatArray) -> FloatArray:
@@ -244,7 +245,7 @@ def _frame_along(axis: FloatArray) -> FloatArray:
     return np.stack((np.cross(y, axis), y, axis), axis=1)
 
 
-def read_stretches(path: Path, find: Callable[[str, str], Hinge]) -> tuple[Stretch, ...]:
+def read_stretches(path: Path, find: Callable[[str, str], Hinge]) -> tuple[ConduitStretch, ...]:
     """The stretches in a file of conduits, JSON with lengths in m; none when there is no file.
 
     find: the one joint between two links; KeyError when there is not one.
@@ -260,7 +261,7 @@ def read_stretches(path: Path, find: Callable[[str, str], Hinge]) -> tuple[Stret
         raise RobotDescriptionError(f"{path} does not describe conduits: {error!r}.") from error
 
 
-def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> Stretch:
+def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> ConduitStretch:
     start, end = (
         End(
             str(one["link"]),
@@ -273,4 +274,4 @@ def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> Stretch:
     radius, length = float(each["radius"]), float(each["length"])
     if not 0.0 < radius < length < math.inf:
         raise ValueError(f"a conduit {length} m long and {radius} m thick is none")
-    return Stretch(start, end, radius, length, hinge, winds=each["winds"] == hinge.joint)
+    return ConduitStretch(start, end, radius, length, hinge, winds=each["winds"] == hinge.joint)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.arm import NO_GRIPPER, Gripper
+from katana450.arm.control.arm import NO_GRIPPER, GripperModel
 from katana450.arm.robot.urdf import UrdfJoint
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray
@@ -35,7 +35,7 @@ class Fingers:
         notes: sentences for a person on the joints that stay where they are.
     """
 
-    gripper: Gripper
+    gripper: GripperModel
     follow: Mapping[str, tuple[float, float]]
     driven: tuple[str, ...]
     resting: Mapping[str, float]
@@ -60,7 +60,7 @@ def fingers_of(
         follow = {lead.name: (1.0, 0.0)} | {j.name: _beside(lead, j, frames) for j in rest}
         speed = min(_speed(j) / abs(follow[j.name][0]) for j in able)
         lower, upper = _range(lead)
-        gripper = Gripper(lower, upper, speed, slides=lead.type == SLIDING)
+        gripper = GripperModel(lower, upper, speed, slides=lead.type == SLIDING)
     by_name = {joint.name: joint for joint in (*hand, *others)}
     notes = []
     for joint in hand:

@@ -19,7 +19,7 @@ class InitialScene(NamedTuple):
         notes: Sentences to print, on what was read.
     """
 
-    command: cmd.Furnish
+    command: cmd.ReplaceScene
     joints: FloatArray | None
     meshes: tuple[Mesh, ...]
     notes: tuple[str, ...]

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from katana450.arm.robot.surfaces import Shape, main_colour, shapes_of
+from katana450.arm.robot.surfaces import VisualMesh, main_colour, shapes_of
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -78,7 +78,7 @@ class Link:
         return self.T_parent_link @ self.joint.motion(value)
 
     @cached_property
-    def shapes(self) -> tuple[Shape, ...]:
+    def shapes(self) -> tuple[VisualMesh, ...]:
         """The surfaces of its visuals, read on first use.
 
         Raises RobotDescriptionError for a mesh file that cannot be read.

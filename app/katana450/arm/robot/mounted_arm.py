@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.arm import Arm
-from katana450.arm.robot.conduit import Stretch
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.robot.conduit import ConduitStretch
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.turns import in_limits_turn
@@ -18,11 +18,11 @@ READY_ROOM = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MountedArm(Arm):
+class MountedArm(ArmModel):
     """A five-axis arm as part of a robot.
 
-    The control core takes it as the ``Arm`` that it is: ``Arm`` is a class of its own because the
-    core knows neither base frames nor links nor conduits.
+    The control core takes it as the ``ArmModel`` that it is: ``ArmModel`` is a class of its own
+    because the core knows neither base frames nor links nor conduits.
 
     Attributes:
         T_base_shoulder: (4, 4) frame {S} in the root link, which stands on the table.
@@ -35,7 +35,7 @@ class MountedArm(Arm):
     T_base_shoulder: FloatArray
     fingers: Mapping[str, tuple[float, float]]
     resting: Mapping[str, float]
-    stretches: tuple[Stretch, ...] = ()
+    stretches: tuple[ConduitStretch, ...] = ()
     notes: tuple[str, ...] = ()
 
     def moves(self, joint: str) -> bool:

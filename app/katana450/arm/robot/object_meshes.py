@@ -14,10 +14,10 @@ from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
-MOST = 64
+MAX_MESHES = 64
 """Meshes kept."""
 
-MOST_BYTES = 200_000_000
+MAX_BYTES = 200_000_000
 """Of all of them together."""
 
 
@@ -28,7 +28,7 @@ class Mesh:
     Attributes:
         file, format, unit, up: The file and how it was read: the ending of its name, the sign of
             its unit, and its upward axis, None where that of the format was taken.
-        name: from the file's, fit for a thing.
+        name: from the file's, fit for an object.
         vertices: (n, 3) [m]; z = 0 is their underside, and the z axis goes through the middle of
             the box along the axes that holds them.
         faces: (m, 3) indices of them. colours: (m, 4) a face; None where the file says none.
@@ -45,7 +45,7 @@ class Mesh:
     faces: IntArray
     colours: Colours | None
     solid: Solid
-    said: str
+    text: str
 
     @property
     def key(self) -> str:
@@ -71,9 +71,9 @@ class Mesh:
 class Meshes:
     """A bounded store, for all threads. What is in use is never given up."""
 
-    def __init__(self, most: int = MOST, most_bytes: int = MOST_BYTES) -> None:
-        self._most = most
-        self._most_bytes = most_bytes
+    def __init__(self, maximum: int = MAX_MESHES, max_bytes: int = MAX_BYTES) -> None:
+        self._limit = maximum
+        self._max_bytes = max_bytes
         self._lock = threading.Lock()
         self._kept: dict[str, Mesh] = {}
 
@@ -104,11 +104,11 @@ class Meshes:
                     del kept[key]
             if not self._fits(kept):
                 raise InputError(
-                    f"There is room for {self._most} meshes of {self._most_bytes // 1_000_000} MB "
+                    f"There is room for {self._limit} meshes of {self._max_bytes // 1_000_000} MB "
                     "together: take objects away."
                 )
             self._kept = kept
 
     def _fits(self, kept: dict[str, Mesh]) -> bool:
         total = sum(mesh.bytes for mesh in kept.values())
-        return len(kept) <= self._most and total <= self._most_bytes
+        return len(kept) <= self._limit and total <= self._max_bytes

@@ -1,4 +1,4 @@
-"""Cup, basin and table: the things of the paper's second experiment, as their file tells them."""
+"""Cup, basin and table: the objects of the paper's second experiment, as their file tells them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Vessel:
 
 
 @dataclass(frozen=True)
-class Table:
+class TableProp:
     """A board whose upper face is z = 0 of the base frame; x, y: its ends [m]."""
 
     mesh: Path
@@ -51,7 +51,7 @@ class Props:
 
     cup: Vessel
     basin: Vessel
-    table: Table
+    table: TableProp
 
 
 def load_props(path: Path = PROPS_PATH) -> Props:
@@ -62,7 +62,7 @@ def load_props(path: Path = PROPS_PATH) -> Props:
         return Props(
             cup=_vessel(path, described["cup"]),
             basin=_vessel(path, described["basin"]),
-            table=Table(
+            table=TableProp(
                 _mesh(path, table),
                 _span(table["x"]),
                 _span(table["y"]),

@@ -9,19 +9,19 @@ from functools import cached_property
 
 import numpy as np
 
-from katana450.arm.control.joints import Joints
+from katana450.arm.control.joints import JointSet
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
-SLACK = 1e-9
+LIMIT_TOLERANCE = 1e-9
 """[rad, m] By which a joint may seem to be beyond its limits."""
 
 SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
 """[rad/s, m/s] Speed of a joint whose file states none."""
 
-QUARTER = math.pi / 2.0
+SEARCHED_RANGE = math.pi / 2.0
 """[rad, m] Range of a joint that is searched for the room a robot takes."""
 
 
@@ -106,7 +106,7 @@ class Robot:
     def check(self, name: str, value: float) -> None:
         """InputError when `value` [rad] or [m] is beyond the limits of the driven joint `name`."""
         joint = self.joints[name]
-        if not joint.lower - SLACK <= value <= joint.upper + SLACK:
+        if not joint.lower - LIMIT_TOLERANCE <= value <= joint.upper + LIMIT_TOLERANCE:
             unit = "m" if joint.slides else "rad"
             raise InputError(
                 f"{name} cannot be at {value:g} {unit}; "
@@ -146,7 +146,7 @@ class Robot:
         poses = [self.every({})]
         for name in self.driven:
             joint = self.joints[name]
-            ends = [max(joint.lower, -QUARTER), min(joint.upper, QUARTER)]
+            ends = [max(joint.lower, -SEARCHED_RANGE), min(joint.upper, SEARCHED_RANGE)]
             poses += [self.every({name: value}) for value in (*ends, sum(ends) / 2.0)]
         corners = [np.zeros((1, 3))]
         for frames in map(self.frames, poses):
@@ -188,7 +188,7 @@ class Robot:
         return max(math.dist(here[name][:3, 3], there[name][:3, 3]) for name in here)
 
     @cached_property
-    def joint_group(self) -> Joints:
+    def joint_group(self) -> JointSet:
         """The driven joints within limits that their followers keep too.
 
         An endless joint is given half a turn either way. Raises RobotDescriptionError where there
@@ -199,7 +199,7 @@ class Robot:
         if not driven:
             raise RobotDescriptionError(f"{self.name} has no joint that could be driven.")
         ranges = np.array([self._range(joint) for joint in driven])
-        return Joints(
+        return JointSet(
             names=self.driven,
             slides=tuple(joint.slides for joint in driven),
             lower=frozen(ranges[:, 0]),

@@ -16,9 +16,9 @@ TOOL_FRAMES = ("tcp", "grasp", "flange")
 TURNING = ("revolute", "continuous")
 """Types of joint an arm is made of; a continuous one is given half a turn either way."""
 
-FIVE = 5
+ARM_JOINTS = 5
 
-DEEP = 3
+MIN_ARM_DEPTH = 3
 """Joints in a row from which a branch of the tree is an arm, and not a finger or a wheel."""
 
 FINGER = re.compile(r"finger|gripper|jaw|claw|knuckle|grasp|clamp|pincer|rh_[lr]\d", re.IGNORECASE)
@@ -172,16 +172,16 @@ def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
         if rest:
             depth = tree.depth(deepest)
             rivals = [joint.name for joint in branches if tree.depth(joint) == depth]
-            if len(rivals) > 1 and depth >= DEEP > len(axes):
+            if len(rivals) > 1 and depth >= MIN_ARM_DEPTH > len(axes):
                 hint = ""
-                if len(axes) + depth >= FIVE:
+                if len(axes) + depth >= ARM_JOINTS:
                     hint = " Name the link that is the tool of one of them with --tool."
                 raise RobotDescriptionError(
                     f"{path.name} has {len(rivals)} arms of {len(axes) + depth} joints each, which "
                     f"begin at {', '.join(rivals)}; the closed-form kinematics need one arm of "
                     f"five turning axes.{hint}"
                 )
-            if len(rivals) > 1 or depth < DEEP or len(axes) >= FIVE:
+            if len(rivals) > 1 or depth < MIN_ARM_DEPTH or len(axes) >= ARM_JOINTS:
                 break
         axes.append(deepest)
         link = deepest.child
@@ -195,9 +195,9 @@ def _main_axes(tree: _Tree, path: Path) -> list[UrdfJoint]:
             f"{path.name} has no joints in a row that carry a tool; the closed-form kinematics "
             f"need five turning axes. Its joints are {_listed(tree.joints.values()) or 'none'}."
         )
-    if len(axes) != FIVE:
+    if len(axes) != ARM_JOINTS:
         hint = ""
-        if len(axes) == FIVE + 1 and last is not None and not WRIST.search(last.name):
+        if len(axes) == ARM_JOINTS + 1 and last is not None and not WRIST.search(last.name):
             hint = f" If {last.name} only opens a gripper, add --tool {last.parent}."
         count = "1 axis" if len(axes) == 1 else f"{len(axes)} axes"
         raise RobotDescriptionError(
@@ -236,7 +236,7 @@ def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:
     limit = joint.limit
     if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
         return True
-    return bool(number > FIVE or limit.upper - limit.lower <= JAW_RANGE)
+    return bool(number > ARM_JOINTS or limit.upper - limit.lower <= JAW_RANGE)
 
 
 def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
@@ -248,7 +248,7 @@ def _axes_to(tree: _Tree, tool: str) -> list[UrdfJoint]:
             raise RobotDescriptionError(
                 f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}."
             )
-    if len(axes) != FIVE:
+    if len(axes) != ARM_JOINTS:
         raise RobotDescriptionError(
             f"Link {tool!r} hangs on {len(axes)} turning joints "
             f"({', '.join(joint.name for joint in axes)}); "

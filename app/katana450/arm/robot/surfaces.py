@@ -36,7 +36,7 @@ class Material(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class VisualMesh:
     """Triangles of one material.
 
     vertices, normals: (n, 3), [m] and of unit length, in the frame of their link. faces: (m, 3)
@@ -65,7 +65,7 @@ PLAIN = (0.8, 0.8, 0.8)
 """The colour that VRML gives what says none."""
 
 
-def main_colour(shapes: Sequence[Shape]) -> tuple[float, float, float]:
+def main_colour(shapes: Sequence[VisualMesh]) -> tuple[float, float, float]:
     """sRGB 0..1 of most of their surface; PLAIN where there are none."""
     areas: dict[Material, float] = {}
     for shape in shapes:
@@ -73,7 +73,7 @@ def main_colour(shapes: Sequence[Shape]) -> tuple[float, float, float]:
     return max(areas, key=areas.__getitem__).colour if areas else PLAIN
 
 
-def shapes_of(visual: Visual) -> Sequence[Shape]:
+def shapes_of(visual: Visual) -> Sequence[VisualMesh]:
     """Return the surfaces of ``visual``, one per material, in the frame of its link.
 
     Raises RobotDescriptionError for a mesh file that cannot be read.
@@ -109,7 +109,7 @@ def _edged(mesh: Any) -> Any:
     return trimesh.graph.smooth_shade(mesh, angle=EDGE)
 
 
-def _shape(mesh: Any, T: FloatArray, material: Material) -> Shape:
+def _shape(mesh: Any, T: FloatArray, material: Material) -> VisualMesh:
     A = T[:3, :3]
     normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(A)
     size = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -118,7 +118,7 @@ def _shape(mesh: Any, T: FloatArray, material: Material) -> Shape:
     # A mirrored shape would show its inside.
     faces = faces[:, ::-1] if np.linalg.det(A) < 0.0 else faces
     vertices = np.asarray(mesh.vertices) @ A.T + T[:3, 3]
-    return Shape(material, frozen(vertices), frozen(normals), faces)
+    return VisualMesh(material, frozen(vertices), frozen(normals), faces)
 
 
 def _material(mesh: Any, plain: Material) -> Material:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from katana450.arm.robot.props import BASIN_AT, Point, Props, Vessel
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.environment import Basin, Cup, Table, WaterEnvironment
+from katana450.maths.water.environment import Basin, Cup, TableTop, WaterEnvironment
 
 
-def around_of(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
+def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
     """``basin_at``: where the basin stands [m], in the base frame. The floor bears the table."""
     cup, basin, table = props.cup, props.basin, props.table
     return WaterEnvironment(
@@ -20,7 +20,7 @@ def around_of(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
             _depth(basin),
             basin.outer_radius,
         ),
-        Table(table.x, table.y, -table.thickness),
+        TableTop(table.x, table.y, -table.thickness),
     )
 
 

@@ -7,10 +7,10 @@ import numpy as np
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.statics import Load
+from katana450.maths.kinematics.statics import LinkLoad
 
 
-def loads_of(robot: Robot) -> tuple[Load, ...]:
+def loads_of(robot: Robot) -> tuple[LinkLoad, ...]:
     """Return a load for each piece of the arm, its fingers at zero.
 
     Empty where the file states no mass, and without an arm.
@@ -29,7 +29,7 @@ def loads_of(robot: Robot) -> tuple[Load, ...]:
         moment = link.mass * (T @ np.append(link.center, 1.0))
         moments[count] = moments.get(count, np.zeros(4)) + moment
     return tuple(
-        Load(count, float(moment[3]), frozen(moment[:3] / moment[3]))
+        LinkLoad(count, float(moment[3]), frozen(moment[:3] / moment[3]))
         for count, moment in moments.items()
         if moment[3] > 0.0
     )

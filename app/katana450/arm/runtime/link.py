@@ -2,7 +2,7 @@
 
 What takes long over there, pictures for a crowd above all, must not make the control loop late, and
 what crashes there must not let the arm go on. So the loop has a process of its own. Commands and
-signs of life come in by a pipe, snapshots go out; when nothing comes any more the arm stops.
+heartbeats come in by a pipe, snapshots go out; when nothing comes any more the arm stops.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.event_log import Entry
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.outcome import DROPPED, refused
-from katana450.arm.control.things import same
+from katana450.arm.control.scene_objects import same
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -28,12 +28,12 @@ from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.readiness import readable, writable
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.arm.runtime.wire import Names, Plans
+from katana450.arm.runtime.wire import PlanNames, PlanStore
 from katana450.errors import InputError
 
 log = logging.getLogger(__name__)
 
-GONE = (EOFError, OSError)
+PIPE_ERRORS = (EOFError, OSError)
 """What a pipe raises when there is nobody at its other end."""
 
 PULSE_EVERY = 0.1
@@ -42,7 +42,7 @@ PULSE_EVERY = 0.1
 PULSE = b"."
 """Says only that the control loop has ticked."""
 
-UNANSWERED = 0.5
+COMMAND_TIMEOUT = 0.5
 """[s] Without a word of the arm's process, after which it is given no command but a stop."""
 
 REPORT_EVERY = 1.0
@@ -62,20 +62,20 @@ class CommandMessage:
 
 
 @dataclass(frozen=True)
-class Alive:
-    """A sign of life."""
+class Heartbeat:
+    """A heartbeat."""
 
 
 @dataclass(frozen=True, eq=False)
-class News:
-    """A snapshot, whose ticket is the front's number; what is new in the ledger; how late it is.
+class StateMessage:
+    """A snapshot, whose ticket is the front's number; what is new in the event log; how late it is.
 
     outcomes: what became of commands since the last, by the front's numbers.
     """
 
     snapshot: Snapshot
-    ledger: tuple[Entry, ...]
-    lateness: LoopTiming
+    event_log: tuple[LogEntry, ...]
+    loop_timing: LoopTiming
     outcomes: tuple[TicketOutcome, ...] = ()
 
 
@@ -95,7 +95,7 @@ class ArmEnd:
         self._refused: list[TicketOutcome] = []
         self._numbering = threading.Lock()
         self._heard = time.monotonic()
-        self._names = Names()
+        self._names = PlanNames()
         self.cut = threading.Event()
         """Set once there is nobody at the other end."""
         self._threads = [
@@ -116,7 +116,7 @@ class ArmEnd:
     def close(self) -> None:
         """Cut it: the other end hangs up, and the arm stops."""
         self.cut.set()
-        with suppress(*GONE):
+        with suppress(*PIPE_ERRORS):
             self._pipe.send(None)
 
     def join(self) -> None:
@@ -131,7 +131,7 @@ class ArmEnd:
                 self._heard = time.monotonic()
                 if isinstance(said, CommandMessage):
                     self._put(said)
-        except GONE:
+        except PIPE_ERRORS:
             self.cut.set()
             # Nobody is left who could say where to go on to.
             self._mailbox.put(cmd.Stop())
@@ -152,33 +152,37 @@ class ArmEnd:
             self._numbers.append((ticket, message.number))
 
     def _show(self) -> None:
-        board = self._loop.board
-        seen, reported, ticks = board.snapshot, time.monotonic(), self._loop.ticks
+        state_publisher = self._loop.state_publisher
+        seen, reported, ticks = state_publisher.snapshot, time.monotonic(), self._loop.ticks
         try:
-            ledger = board.ledger
-            self._send(News(self._named(seen), ledger, board.lateness))
-            last = ledger[-1] if ledger else None
+            event_log = state_publisher.event_log
+            self._send(StateMessage(self._named(seen), event_log, state_publisher.loop_timing))
+            last = event_log[-1] if event_log else None
             while not self.cut.is_set():
-                snapshot = board.wait_for_change(seen, PULSE_EVERY)
+                snapshot = state_publisher.wait_for_change(seen, PULSE_EVERY)
                 now = time.monotonic()
                 if snapshot is seen and self._loop.ticks == ticks:
-                    # A loop that does not tick gives no sign of life.
+                    # A loop that does not tick gives no heartbeat.
                     continue
                 ticks = self._loop.ticks
                 if snapshot is seen and now - reported < REPORT_EVERY:
                     self._pipe.send_bytes(PULSE)
                     continue
                 if now - reported >= REPORT_EVERY:
-                    reported, board.lateness = now, self._loop.lateness
-                fresh = _newer(board.ledger, last)
+                    reported, state_publisher.loop_timing = now, self._loop.loop_timing
+                fresh = _newer(state_publisher.event_log, last)
                 last = fresh[-1] if fresh else last
-                self._send(News(self._named(snapshot), fresh, board.lateness, self._outcomes()))
+                self._send(
+                    StateMessage(
+                        self._named(snapshot), fresh, state_publisher.loop_timing, self._outcomes()
+                    )
+                )
                 seen = snapshot
-        except GONE:
+        except PIPE_ERRORS:
             self.cut.set()
 
-    def _send(self, news: News) -> None:
-        self._pipe.send_bytes(self._names.dumped(news))
+    def _send(self, message: StateMessage) -> None:
+        self._pipe.send_bytes(self._names.dumped(message))
 
     def _named(self, snapshot: Snapshot) -> Snapshot:
         """``snapshot`` with the front's number of the last command that is in it."""
@@ -189,7 +193,7 @@ class ArmEnd:
 
     def _outcomes(self) -> tuple[TicketOutcome, ...]:
         """Return what is new of the outcomes, by the front's numbers."""
-        told = self._loop.board.take_outcomes()
+        told = self._loop.state_publisher.take_outcomes()
         with self._numbering:
             # Those of other ends, and the stops of this one, have no number here.
             new = [(self._number_of.pop(ticket, None), outcome) for ticket, outcome in told]
@@ -201,7 +205,7 @@ class ArmEnd:
     def _watch(self) -> None:
         while not self.cut.wait(self._silence / 4):
             silent = self.unheard
-            state = self._loop.board.snapshot.state
+            state = self._loop.state_publisher.snapshot.state
             if silent > self._silence and state.moving and state.stopped is None:
                 log.error("Nothing was heard from the page's server for %.2f s: STOP.", silent)
                 self._mailbox.put(cmd.Stop())
@@ -217,11 +221,11 @@ class FrontEnd:
         self._sending = threading.Lock()
         self._unsent: deque[CommandMessage] = deque()
         self._number = 0
-        self._plans = Plans()
+        self._plans = PlanStore()
         first = _loaded(pipe.recv_bytes(), self._plans)
         self._heard = time.monotonic()
-        self.board = StatePublisher(first.snapshot, first.lateness)
-        self.board.pin(first.snapshot, first.ledger)
+        self.state_publisher = StatePublisher(first.snapshot, first.loop_timing)
+        self.state_publisher.pin(first.snapshot, first.event_log)
         self.cut = threading.Event()
         """Set once there is no arm any more."""
         self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
@@ -232,7 +236,7 @@ class FrontEnd:
         Between construction and start the arm may have moved, or stopped: after this call
         ``board`` holds the newest state.
         """
-        with suppress(*GONE):
+        with suppress(*PIPE_ERRORS):
             while readable(self._pipe.fileno()):
                 self._take(self._pipe.recv_bytes())
         self._thread.start()
@@ -259,9 +263,9 @@ class FrontEnd:
             if command.traits.safety:
                 # What has not gone yet is dropped; an earlier stop is fulfilled by this one.
                 unsent = (each for each in self._unsent if not each.command.traits.safety)
-                self.board.outcomes.note((each.number, DROPPED) for each in unsent)
+                self.state_publisher.outcomes.note((each.number, DROPPED) for each in unsent)
                 self._unsent.clear()
-            elif age > UNANSWERED:
+            elif age > COMMAND_TIMEOUT:
                 raise InputError(
                     f"The arm's process has not answered for {age:.1f} s: only STOP is accepted."
                 )
@@ -282,11 +286,11 @@ class FrontEnd:
             return time.monotonic() - self._heard
         return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
 
-    def beat(self) -> None:
-        """Give a sign of life."""
+    def heartbeat(self) -> None:
+        """Give a heartbeat."""
         with self._sending:
             if self._flush():
-                self._send(Alive())
+                self._send(Heartbeat())
 
     def _flush(self) -> bool:
         """Send what waits; whether nothing waits any more. A full pipe keeps nobody waiting."""
@@ -294,12 +298,12 @@ class FrontEnd:
             self._unsent.popleft()
         return not self._unsent
 
-    def _send(self, said: CommandMessage | Alive) -> bool:
+    def _send(self, said: CommandMessage | Heartbeat) -> bool:
         try:
             if not writable(self._pipe.fileno()):
                 return False
             self._pipe.send(said)
-        except GONE:
+        except PIPE_ERRORS:
             self.cut.set()
         return True
 
@@ -307,7 +311,7 @@ class FrontEnd:
         try:
             while True:
                 self._take(self._pipe.recv_bytes())
-        except GONE:
+        except PIPE_ERRORS:
             self.cut.set()
 
     def _take(self, data: bytes) -> None:
@@ -318,36 +322,36 @@ class FrontEnd:
                 self._flush()
         if data == PULSE:
             return
-        news = _loaded(data, self._plans)
-        self.board.lateness = news.lateness
-        seen = self.board.snapshot
-        if news.snapshot.state.t != seen.state.t or news.snapshot.ticket != seen.ticket:
-            self.board.pin(_known(news.snapshot, seen), news.ledger)
+        message = _loaded(data, self._plans)
+        self.state_publisher.loop_timing = message.loop_timing
+        seen = self.state_publisher.snapshot
+        if message.snapshot.state.t != seen.state.t or message.snapshot.ticket != seen.ticket:
+            self.state_publisher.pin(_known(message.snapshot, seen), message.event_log)
         # After the state: a client that is answered finds one with its command in it.
-        self.board.outcomes.note(news.outcomes)
+        self.state_publisher.outcomes.note(message.outcomes)
 
 
-def _known(news: Snapshot, seen: Snapshot) -> Snapshot:
-    """``news`` with the things of ``seen`` where they are the same.
+def _known(message: Snapshot, seen: Snapshot) -> Snapshot:
+    """``news`` with the objects of ``seen`` where they are the same.
 
     What comes by the pipe is another object each time, which would be taken for a change.
     """
-    if not same(news.state.things, seen.state.things):
-        return news
-    return Snapshot(replace(news.state, things=seen.state.things), news.ticket)
+    if not same(message.state.objects, seen.state.objects):
+        return message
+    return Snapshot(replace(message.state, objects=seen.state.objects), message.ticket)
 
 
-def _loaded(data: bytes, plans: Plans) -> News:
+def _loaded(data: bytes, plans: PlanStore) -> StateMessage:
     """What ``data`` from the arm's end says; EOFError when that hangs up."""
-    news = plans.loaded(data)
-    if not isinstance(news, News):
+    message = plans.loaded(data)
+    if not isinstance(message, StateMessage):
         raise EOFError
-    return news
+    return message
 
 
-def _newer(ledger: tuple[Entry, ...], last: Entry | None) -> tuple[Entry, ...]:
-    """What stands in ``ledger`` behind ``last``."""
-    for index in range(len(ledger) - 1, -1, -1):
-        if ledger[index] is last:
-            return ledger[index + 1 :]
-    return ledger
+def _newer(event_log: tuple[LogEntry, ...], last: LogEntry | None) -> tuple[LogEntry, ...]:
+    """What stands in ``event_log`` behind ``last``."""
+    for index in range(len(event_log) - 1, -1, -1):
+        if event_log[index] is last:
+            return event_log[index + 1 :]
+    return event_log

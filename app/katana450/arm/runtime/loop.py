@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from katana450.arm.control.commands import Command, Stop
-from katana450.arm.control.event_log import Entry, news
+from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.outcome import DROPPED, FAILED
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
@@ -63,15 +63,15 @@ class ControlLoop:
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
         self._newest: Submission | None = None
-        self.board = StatePublisher(Snapshot(self._state, 0), self.lateness)
+        self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
         """Where it shows what it does."""
         self.ticks = 0
         """Ticks that were completed."""
 
     @property
-    def lateness(self) -> LoopTiming:
+    def loop_timing(self) -> LoopTiming:
         """How well the ticks come when they are due."""
-        return self._punctuality.lateness
+        return self._punctuality.loop_timing
 
     def tick(self) -> None:
         """One turn: take the commands, move on, tell the arm, publish what changed."""
@@ -91,16 +91,16 @@ class ControlLoop:
         self._state = state
         # An arm at rest wakes nobody: time alone is no news.
         if drained.commands or _differs(before, state):
-            self.board.note(_outcomes(drained, state))
-            self.board.pin(Snapshot(state, drained.last), self._entries(before, state))
+            self.state_publisher.note(_outcomes(drained, state))
+            self.state_publisher.pin(Snapshot(state, drained.last), self._entries(before, state))
         self.ticks += 1
 
-    def _entries(self, before: State, after: State) -> tuple[Entry, ...]:
+    def _entries(self, before: State, after: State) -> tuple[LogEntry, ...]:
         """Return what is new in the event log, attributed to the newest command."""
         if self._newest is None:
-            return news(before, after)
+            return entries_between(before, after)
         command, actor = self._newest
-        return news(before, after, actor, type(command).__name__)
+        return entries_between(before, after, actor, type(command).__name__)
 
     @property
     def running(self) -> bool:
@@ -153,7 +153,7 @@ def _differs(a: State, b: State) -> bool:
         or a.goal is not b.goal
         or a.mode is not b.mode
         or a.findings != b.findings
-        or a.things is not b.things
+        or a.objects is not b.objects
         or a.poured is not b.poured
-        or a.looks is not b.looks
+        or a.appearance is not b.appearance
     )

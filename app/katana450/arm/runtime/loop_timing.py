@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LOOKED_AT = 1000
+TIMED_TICKS = 1000
 """Ticks: the last ten seconds of a loop at 100 Hz."""
 
 
@@ -26,7 +26,7 @@ class LoopTiming:
     count: int = 0
     p50: float = 0.0
     p99: float = 0.0
-    most: float = 0.0
+    maximum: float = 0.0
     lost: int = 0
 
 
@@ -36,7 +36,7 @@ class Punctuality:
     def __init__(self, period: float) -> None:
         """``period``: of the loop [s]."""
         self._period = period
-        self._late: deque[float] = deque(maxlen=LOOKED_AT)
+        self._late: deque[float] = deque(maxlen=TIMED_TICKS)
         self._lost = 0
 
     def note(self, late: float) -> None:
@@ -45,11 +45,11 @@ class Punctuality:
         self._lost += late > self._period
 
     @property
-    def lateness(self) -> LoopTiming:
+    def loop_timing(self) -> LoopTiming:
         """Of the last ticks."""
         late = np.array(self._late.copy())
         if late.size == 0:
             return LoopTiming(self._period)
         p50, p99 = np.quantile(late, (0.5, 0.99)).tolist()
-        most = float(late.max())
-        return LoopTiming(self._period, late.size, p50, p99, most, self._lost)
+        maximum = float(late.max())
+        return LoopTiming(self._period, late.size, p50, p99, maximum, self._lost)

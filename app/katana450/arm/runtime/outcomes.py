@@ -10,7 +10,7 @@ from contextlib import suppress
 
 from katana450.arm.control.state import Outcome
 
-KEPT = 1024
+MAX_KEPT_OUTCOMES = 1024
 """Outcomes that are remembered, and tickets that are waited for: many seconds of a quick stream."""
 
 TicketOutcome = tuple[int, Outcome]
@@ -33,7 +33,7 @@ class Outcomes:
                 self._known[ticket] = outcome
                 if ticket in self._awaited:
                     ready.append((self._awaited.pop(ticket), outcome))
-            while len(self._known) > KEPT:
+            while len(self._known) > MAX_KEPT_OUTCOMES:
                 self._known.popitem(last=False)
         for future, outcome in ready:
             # Cancelled meanwhile: nobody waits any more.
@@ -47,7 +47,7 @@ class Outcomes:
             known = self._known.get(ticket)
             if known is None:
                 self._awaited[ticket] = future
-                while len(self._awaited) > KEPT:
+                while len(self._awaited) > MAX_KEPT_OUTCOMES:
                     self._awaited.popitem(last=False)
         if known is not None:
             future.set_result(known)

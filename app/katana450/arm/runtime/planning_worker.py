@@ -27,9 +27,9 @@ class PlanningWorker:
     """Between whoever commands and the arm: a branch is taken on a planned way, clear from end to
     end; all else goes on at once, and ends the work on a way."""
 
-    def __init__(self, session: Session, board: StatePublisher, arm: CommandSink) -> None:
+    def __init__(self, session: Session, state_publisher: StatePublisher, arm: CommandSink) -> None:
         self._session = session
-        self._board = board
+        self._state_publisher = state_publisher
         self._arm = arm
         self._lock = threading.Lock()
         self._work: threading.Event | None = None
@@ -46,7 +46,7 @@ class PlanningWorker:
     @property
     def busy(self) -> bool:
         """Whether a way is under work, or found and not begun yet."""
-        return self._work is not None or self._board.snapshot.ticket < self.last_ticket
+        return self._work is not None or self._state_publisher.snapshot.ticket < self.last_ticket
 
     def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
         """Implement ``CommandSink``; a command that follows a path found later has no ticket."""
@@ -98,14 +98,14 @@ class PlanningWorker:
 
     def _at_rest(self, actor: Actor | None, cancelled: threading.Event) -> State:
         """The state of an arm that stands, which it is made to."""
-        if self._board.snapshot.state.moving:
+        if self._state_publisher.snapshot.state.moving:
             self._unless(cancelled, cmd.Hold(), actor)
         end = time.monotonic() + REST_SECONDS
-        snapshot = self._board.snapshot
+        snapshot = self._state_publisher.snapshot
         while snapshot.state.moving or snapshot.ticket < self._arm.last_ticket:
             if time.monotonic() > end or cancelled.is_set():
                 break
-            snapshot = self._board.wait_for_change(snapshot, 0.1)
+            snapshot = self._state_publisher.wait_for_change(snapshot, 0.1)
         return snapshot.state
 
     def _unless(

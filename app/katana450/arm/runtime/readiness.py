@@ -11,7 +11,7 @@ LAST_DATA_RECEIVED = 52
 """Bytes before ``tcpi_last_data_recv`` [ms] in Linux's ``struct tcp_info``."""
 
 
-class Line(Protocol):
+class SocketChannel(Protocol):
     """A socket, or what asyncio gives of one."""
 
     def fileno(self) -> int: ...
@@ -29,7 +29,7 @@ def writable(fd: int) -> bool:
     return _polled(fd, getattr(select, "POLLOUT", 0), unknown=True)
 
 
-def data_age(line: Line) -> float:
+def data_age(line: SocketChannel) -> float:
     """Return how long ago the kernel received the newest data of a TCP connection [s].
 
     0 where the system does not tell: data that is being read then counts as new.

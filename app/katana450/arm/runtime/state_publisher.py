@@ -7,13 +7,13 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from katana450.arm.control.event_log import Entry
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.state import State
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.outcomes import Outcomes, TicketOutcome
 
-KEPT = 500
-"""Entries of the ledger that are kept."""
+MAX_KEPT_ENTRIES = 500
+"""Entries of the event log that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +27,14 @@ class Snapshot:
 class StatePublisher:
     """One thread pins up, any look."""
 
-    def __init__(self, first: Snapshot, lateness: LoopTiming) -> None:
+    def __init__(self, first: Snapshot, loop_timing: LoopTiming) -> None:
         self._snapshot = first
-        self._ledger: deque[Entry] = deque(maxlen=KEPT)
+        self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._pinned = threading.Condition()
-        self._untold: deque[TicketOutcome] = deque(maxlen=KEPT)
+        self._untold: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_ENTRIES)
         self.outcomes = Outcomes()
         """What became of commands, by their tickets."""
-        self.lateness = lateness
+        self.loop_timing = loop_timing
         """How well the loop keeps its period."""
 
     @property
@@ -43,14 +43,14 @@ class StatePublisher:
         return self._snapshot
 
     @property
-    def ledger(self) -> tuple[Entry, ...]:
+    def event_log(self) -> tuple[LogEntry, ...]:
         """The last reasons why the arm did not do what was wished, oldest first."""
-        return tuple(self._ledger)
+        return tuple(self._event_log)
 
-    def pin(self, snapshot: Snapshot, news: Sequence[Entry] = ()) -> None:
-        """Show ``snapshot`` from now on, and ``news`` in the ledger."""
+    def pin(self, snapshot: Snapshot, news: Sequence[LogEntry] = ()) -> None:
+        """Show ``snapshot`` from now on, and ``news`` in the event log."""
         with self._pinned:
-            self._ledger.extend(news)
+            self._event_log.extend(news)
             self._snapshot = snapshot
             self._pinned.notify_all()
 

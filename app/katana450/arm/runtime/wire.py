@@ -18,7 +18,7 @@ KEPT_HERE, KEPT_THERE = 8, 32
 """Plans remembered: fewer where they are named than where the names are understood."""
 
 
-class Names:
+class PlanNames:
     """At the end that follows plans: numbers of the newest that came in, and what was last sent."""
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class Names:
         return file.getvalue()
 
 
-class Plans:
+class PlanStore:
     """At the end that makes plans: the newest that went out by their numbers; what last came."""
 
     def __init__(self) -> None:

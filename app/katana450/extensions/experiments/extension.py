@@ -81,7 +81,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "--report", type=Path, metavar="DIR", help="figures, measures and a table of the run"
     )
     parser.add_argument(
-        "--speed", type=_share, default=1.0, help="share of its own speed (default: 1)"
+        "--speed", type=_fraction, default=1.0, help="fraction of its own speed (default: 1)"
     )
     parser.add_argument(
         "--seed", type=int, default=0, help="of the ways round what is in between (default: 0)"
@@ -105,13 +105,13 @@ def _spot(text: str) -> tuple[float, float]:
     return _number(parts[0]), _number(parts[1])
 
 
-def _share(text: str) -> float:
+def _fraction(text: str) -> float:
     # Loads numpy, so only where a speed is given.
-    from katana450.arm.control.commands import LEAST_SPEED
+    from katana450.arm.control.commands import MIN_SPEED
 
     value = _number(text)
-    if not LEAST_SPEED <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"a share from {LEAST_SPEED} to 1, not {text!r}")
+    if not MIN_SPEED <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"a fraction from {MIN_SPEED} to 1, not {text!r}")
     return value
 
 

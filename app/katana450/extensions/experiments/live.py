@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from katana450.client import Client, RefusedError, connect
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, KatanaError
-from katana450.extensions.programs.requests import Order, Program, Steer
+from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
 from katana450.server.api import answers
@@ -38,12 +38,12 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
     with _server(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             _send(arm, text, options.speed)
-            arm.ask(Steer(order=Order.RUN))
+            arm.ask(Steer(order=ProgramOrder.RUN))
             return _follow(arm)
         except KeyboardInterrupt:
             # Before all of the script is sent there is nothing to end.
             with suppress(RefusedError):
-                arm.ask(Steer(order=Order.END))
+                arm.ask(Steer(order=ProgramOrder.END))
             print("\nkatana450: the program is ended; the arm holds.", file=sys.stderr)
             return 130
 
@@ -56,7 +56,7 @@ def _send(arm: Client, text: str, speed: float) -> None:
     arm.ask(Program(text=parts[-1], speed=speed))
     while (now := arm.query(answers.State).program) is not None and now.status == "planning":
         if now.steps and sys.stderr.isatty():
-            line = f"{now.task}, step {now.step} of {now.steps}, {now.share:4.0%}"
+            line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
         time.sleep(1.0 / HZ)
     if now is None or now.status != "ready":
@@ -72,7 +72,7 @@ def _follow(arm: Client) -> int:
         now = state.program
         if now is None:
             raise LostError("The server has forgotten the program.")
-        line = f"step {now.step} of {now.steps}, line {now.line}: {now.task} {now.share:4.0%}"
+        line = f"step {now.step} of {now.steps}, line {now.line}: {now.task} {now.fraction:4.0%}"
         if now.status != "running":
             line += f" ({now.status})"
         if terminal:

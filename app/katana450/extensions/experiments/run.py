@@ -51,5 +51,5 @@ def _run(text: str, source: str, options: Namespace) -> int:
         return run_live(text, script, options)
     except ScriptError as error:
         for problem in error.problems:
-            print(f"{source}:{problem.line}:{problem.column}: {problem.said}", file=sys.stderr)
+            print(f"{source}:{problem.line}:{problem.column}: {problem.text}", file=sys.stderr)
         return 1

@@ -10,8 +10,8 @@ from katana450.arm.control.messages import part
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
 from katana450.extensions.media.report import Report
-from katana450.extensions.programs.clocked_run import planned, played
-from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
 from katana450.settings import Settings
@@ -21,7 +21,7 @@ BARE = "The arm is without its gripper: its fingers would reach into the table."
 
 def simulate(script: Script, options: Namespace) -> int:
     """Plan it, and unless that is all run it on a clock of its own and report."""
-    plan = planned(script, options.urdf, options.seed, options.speed)
+    plan = plan_script(script, options.urdf, options.seed, options.speed)
     program, robot = plan.program, plan.robot
     notes = (BARE,) if script.bare else ()
     for note in notes:
@@ -29,7 +29,7 @@ def simulate(script: Script, options: Namespace) -> int:
     if options.dry_run:
         _tell(program)
         return 0
-    rehearsal = played(plan)
+    simulation = run_by_clock(plan)
     facts = {
         "version": version(),
         "arm": robot.name,
@@ -38,7 +38,7 @@ def simulate(script: Script, options: Namespace) -> int:
         "ticks_per_s": Settings().rate,
         "seed": options.seed,
     }
-    report = Report.of(script, program, robot.require_arm(), rehearsal.trace, facts, notes)
+    report = Report.of(script, program, robot.require_arm(), simulation.trace, facts, notes)
     print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
     if options.report is not None:
@@ -46,7 +46,7 @@ def simulate(script: Script, options: Namespace) -> int:
         from katana450.extensions.media.report_pictures import stage_pictures
 
         pictures = stage_pictures(
-            program, robot, plan.session, load_props(), rehearsal.states, report.trace
+            program, robot, plan.session, load_props(), simulation.states, report.trace
         )
         report.write(options.report, datetime.now().astimezone(), pictures)
         print(f"Report: {options.report / 'report.html'}")
@@ -60,7 +60,7 @@ def _tell(program: Program) -> None:
     """Each task with its line, its time and the nearest it comes to anything."""
     for task in program.tasks:
         said = ""
-        if isinstance(task.order, Go):
+        if isinstance(task.order, FollowPlan):
             plan = task.order.plan
             said = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
             if plan.nearest is not None:

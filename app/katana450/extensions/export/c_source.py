@@ -12,7 +12,7 @@ from importlib import resources
 
 import numpy as np
 
-from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.names import distinct

@@ -13,7 +13,7 @@ from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.trajectory_file import Motion, load_motion
+from katana450.extensions.export.trajectory_file import RecordedMotion, load_motion
 from katana450.extensions.export.urdf_package import (
     UNSTATED_LICENSE,
     UNSTATED_MAINTAINER,
@@ -23,25 +23,25 @@ from katana450.extensions.export.urdf_package import (
 from katana450.extensions.export.vrml import vrml_files
 from katana450.resources import URDF_PATH
 
-MOVES = ("vrml", "glb")
+ANIMATED_FORMATS = ("vrml", "glb")
 """Formats a motion survives in."""
 
 OWN_LICENSE = "MIT"
 """Licence of the Katana450's description, as of this project."""
 
-POSED = ("vrml", "c", "glb")
+POSED_FORMATS = ("vrml", "c", "glb")
 """Formats that stand in a pose."""
 
 
 def export(options: argparse.Namespace) -> int:
     """Write the files of one format; tell their names and sizes."""
     kind: str = options.format
-    if options.trajectory is not None and kind not in MOVES:
-        raise InputError(f"A file of {kind} holds no motion; {' and '.join(MOVES)} do.")
+    if options.trajectory is not None and kind not in ANIMATED_FORMATS:
+        raise InputError(f"A file of {kind} holds no motion; {' and '.join(ANIMATED_FORMATS)} do.")
     if options.run is not None:
         raise InputError(f"A file of {kind} holds no run; html does.")
-    if options.pose and kind not in POSED:
-        raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED)} do.")
+    if options.pose and kind not in POSED_FORMATS:
+        raise InputError(f"A file of {kind} stands in no pose; {', '.join(POSED_FORMATS)} do.")
     robot = load(options.urdf)
     robot.check_complete()
     robot.read_shapes()
@@ -66,7 +66,7 @@ def _made(
     kind: str,
     robot: Robot,
     values: Mapping[str, float],
-    motion: Motion | None,
+    motion: RecordedMotion | None,
 ) -> Mapping[str, bytes]:
     match kind:
         case "vrml":

@@ -12,7 +12,7 @@ from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.resources import URDF_PATH
 
 if TYPE_CHECKING:
-    from katana450.arm.control.things import Environment
+    from katana450.arm.control.scene_objects import Environment
     from katana450.arm.robot.robot import Robot
     from katana450.server.service.nodes import Nodes
 

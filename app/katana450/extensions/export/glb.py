@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
-from katana450.extensions.export.trajectory_file import Motion
+from katana450.extensions.export.trajectory_file import RecordedMotion
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.srgb import to_light
@@ -29,7 +29,7 @@ Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 
 
 def glb_files(
-    robot: Robot, values: Mapping[str, float], motion: Motion | None = None
+    robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
 ) -> dict[str, bytes]:
     """Name and content of the one file, at the joint `values` [rad, m] or where a motion begins."""
     (name,) = distinct([robot.name])
@@ -39,7 +39,9 @@ def glb_files(
 class _Document:
     """The JSON chunk and the binary one as they grow."""
 
-    def __init__(self, robot: Robot, values: Mapping[str, float], motion: Motion | None) -> None:
+    def __init__(
+        self, robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None
+    ) -> None:
         values = values if motion is None else motion.start
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []
@@ -102,7 +104,7 @@ class _Document:
             self._meshes.append({"name": link.name, "primitives": primitives})
         return node
 
-    def _primitive(self, shape: Shape) -> dict[str, Any]:
+    def _primitive(self, shape: VisualMesh) -> dict[str, Any]:
         index = shape.faces.reshape(-1, 1)
         wide = len(shape.vertices) >= 1 << 16
         return {
@@ -116,7 +118,9 @@ class _Document:
             "material": self._materials.setdefault(shape.material, len(self._materials)),
         }
 
-    def _animation(self, robot: Robot, motion: Motion, number: Mapping[str, int]) -> dict[str, Any]:
+    def _animation(
+        self, robot: Robot, motion: RecordedMotion, number: Mapping[str, int]
+    ) -> dict[str, Any]:
         samplers: list[dict[str, Any]] = []
         channels: list[dict[str, Any]] = []
         for link in robot.links:

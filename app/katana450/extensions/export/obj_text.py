@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.export.rows import distinct_rows
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
@@ -22,7 +22,7 @@ SHARPEST = 250.0
 """Exponent of the highlight on a surface without roughness; MTL allows up to 1000."""
 
 
-def obj_text(shapes: Sequence[Shape], material: str | None) -> str:
+def obj_text(shapes: Sequence[VisualMesh], material: str | None) -> str:
     """Return ``shapes`` [m] as one object, in ``material`` of `LIBRARY` where one is named."""
     points, point = distinct_rows([shape.vertices for shape in shapes], DIGITS)
     normals, normal = distinct_rows([shape.normals for shape in shapes], NORMAL_DIGITS)

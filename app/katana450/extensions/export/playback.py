@@ -12,7 +12,7 @@ import numpy as np
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.settings import Settings
@@ -53,7 +53,7 @@ def of_script(name: str, urdf: Path) -> Playback:
     """
     # A pose or a table can be shown without the extension ``programs``.
     from katana450.extensions.programs.circle import CircleDemo
-    from katana450.extensions.programs.clocked_run import planned, played
+    from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
     from katana450.extensions.programs.pour import PourDemo
     from katana450.extensions.programs.script import parse
     from katana450.extensions.programs.script_files import text_of
@@ -62,11 +62,11 @@ def of_script(name: str, urdf: Path) -> Playback:
     demos = {"circle": CircleDemo, "pour": PourDemo}
     text = demos[name]().text if name in demos else text_of(Path(name))
     try:
-        plan = planned(parse(text), urdf)
+        plan = plan_script(parse(text), urdf)
     except ScriptError as error:
         found = error.problems[0]
-        raise InputError(f"{name}:{found.line}:{found.column}: {found.said}") from error
-    states = played(plan).states
+        raise InputError(f"{name}:{found.line}:{found.column}: {found.text}") from error
+    states = run_by_clock(plan).states
     return Playback(plan.robot, plan.session, states, Settings().rate, plan.script.bare)
 
 
@@ -92,7 +92,7 @@ def of_trajectory(path: Path, urdf: Path) -> Playback:
 
 
 def _described(urdf: Path) -> tuple[Robot, Session, tuple[str, ...]]:
-    robot, session, notes = described(Settings(), urdf, None)
+    robot, session, notes = describe_robot(Settings(), urdf, None)
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)
     return robot, session, notes

@@ -30,7 +30,7 @@ THETA = re.compile(r"theta([1-9][0-9]?)")
 GRIPPER = 6
 """Number of the driven joint that `gripper` names."""
 
-MOST = 100_000
+MAX_ROWS = 100_000
 """Rows of a file; a longer one is no animation."""
 
 
@@ -39,7 +39,7 @@ WIDEST_TURN = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RecordedMotion:
     """t: (n,) [s], from 0 on, rising. values: (n,) [rad, m] of every joint of a robot."""
 
     t: FloatArray
@@ -60,7 +60,7 @@ class Motion:
         return np.interp(place, rows, self.t), np.interp(place, rows, values)
 
 
-def load_motion(path: Path, robot: Robot) -> Motion:
+def load_motion(path: Path, robot: Robot) -> RecordedMotion:
     """Return the motion of ``robot`` in a .csv or .json file.
 
     Raises InputError for a file that cannot be read, is no such table, names what is no joint, or
@@ -108,12 +108,12 @@ def _json_columns(path: Path, text: str) -> dict[str, list[object]]:
     return columns
 
 
-def _motion(path: Path, columns: Mapping[str, list[object]], robot: Robot) -> Motion:
+def _motion(path: Path, columns: Mapping[str, list[object]], robot: Robot) -> RecordedMotion:
     if "t" not in columns:
         raise InputError(f"{path} has no column t; it has {', '.join(columns)}.")
     count = len(columns["t"])
-    if not 2 <= count <= MOST:
-        raise InputError(f"{path} has {count} rows; a motion has from 2 to {MOST}.")
+    if not 2 <= count <= MAX_ROWS:
+        raise InputError(f"{path} has {count} rows; a motion has from 2 to {MAX_ROWS}.")
     table = {
         name: finite_array(column, (count,), f"The column {name} of {path}")  # type: ignore[arg-type]
         for name, column in columns.items()
@@ -135,7 +135,7 @@ def _motion(path: Path, columns: Mapping[str, list[object]], robot: Robot) -> Mo
         for row in range(count)
     ]
     every = {name: frozen([row[name] for row in rows]) for name in robot.joints}
-    return Motion(frozen(t - t[0]), every)
+    return RecordedMotion(frozen(t - t[0]), every)
 
 
 def _joint(path: Path, column: str, robot: Robot) -> str:

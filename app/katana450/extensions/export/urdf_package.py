@@ -18,7 +18,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from katana450.arm.robot.surfaces import Material, Shape, shapes_of
+from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.names import distinct
@@ -133,7 +133,7 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
     ]
     if not used:
         return {}
-    shapes: dict[Path, Sequence[Shape]] = {}
+    shapes: dict[Path, Sequence[VisualMesh]] = {}
     for _, _, source in used:
         if not source.is_file():
             raise RobotDescriptionError(f"There is no mesh at {source}.")
@@ -177,7 +177,7 @@ def _names(root: ET.Element, materials: Sequence[Material]) -> dict[Material, st
 
 
 def _parts(
-    source: Path, shapes: Sequence[Shape] | None, names: Mapping[Material, str] | None
+    source: Path, shapes: Sequence[VisualMesh] | None, names: Mapping[Material, str] | None
 ) -> list[_Part]:
     """Return the files of a mesh: as it is, as one OBJ, or with ``names`` as one a material."""
     stem = f"{source.parent.name}_{source.stem}"

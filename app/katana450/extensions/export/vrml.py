@@ -15,14 +15,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.robot.camera import FIELD_OF_VIEW, camera
+from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
-from katana450.extensions.export.trajectory_file import Motion
-from katana450.extensions.export.vrml_names import Names
+from katana450.extensions.export.trajectory_file import RecordedMotion
+from katana450.extensions.export.vrml_names import VrmlNames
 from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
 from katana450.extensions.export.vrml_text import world_text
 from katana450.maths.geometry import so3
@@ -41,13 +41,15 @@ Z_UP = (1.0, 0.0, 0.0, -math.pi / 2.0)
 _TURN = so3.rotation_x(-math.pi / 2.0)
 
 
-def world_of(robot: Robot, values: Mapping[str, float], motion: Motion | None = None) -> World:
+def world_of(
+    robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
+) -> World:
     """Return the whole robot at the joint `values` [rad, m]; with a motion it plays it by itself.
 
     A motion also sets the static pose to its first sample, for programs that play none.
     """
     values = values if motion is None else motion.start
-    names = Names(robot)
+    names = VrmlNames(robot)
     root = _link(robot, robot.links[0], values, names, set())
     nodes = [
         *_surroundings(robot),
@@ -67,7 +69,7 @@ def world_of(robot: Robot, values: Mapping[str, float], motion: Motion | None = 
 
 
 def vrml_files(
-    robot: Robot, values: Mapping[str, float], motion: Motion | None = None
+    robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
 ) -> dict[str, bytes]:
     """Name and content of the file of the whole, and of one for each link with a shape."""
     (whole,) = distinct([robot.name])
@@ -80,7 +82,7 @@ def vrml_files(
 
 def part_world(robot: Robot, link: Link) -> World:
     """One link alone where it is at zero, z up, so that all of them loaded make the robot."""
-    names = Names(robot)
+    names = VrmlNames(robot)
     shapes = _shapes(robot, link, names, set())
     part = Node("Group", (("children", tuple(shapes)),), names.links[link.name])
     title = Node("WorldInfo", (("title", f"{robot.name} {link.name}"),))
@@ -125,7 +127,7 @@ def _link(
     robot: Robot,
     link: Link,
     values: Mapping[str, float],
-    names: Names,
+    names: VrmlNames,
     told: set[Material],
 ) -> Node:
     """The node of a link with all that hangs on it."""
@@ -140,7 +142,7 @@ def _link(
     return Node("Transform", (center, moved, ("children", (group,))), names.joints[link.joint.name])
 
 
-def _switch(robot: Robot, link: Link, names: Names, told: set[Material]) -> tuple[Node, ...]:
+def _switch(robot: Robot, link: Link, names: VrmlNames, told: set[Material]) -> tuple[Node, ...]:
     """The shapes of a link as they are made, and once more to be painted."""
     if not link.shapes:
         return ()
@@ -158,7 +160,7 @@ def _switch(robot: Robot, link: Link, names: Names, told: set[Material]) -> tupl
         painted.append(Node("Shape", (("appearance", one), (field, Use(name)))))
         paint = Use(dressed.paint)
     choices = tuple(Node("Group", (("children", tuple(each)),)) for each in (made, painted))
-    return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.look),)
+    return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.appearance),)
 
 
 def _moved(robot: Robot, joint: Joint, value: float) -> tuple[str, Value]:
@@ -168,12 +170,12 @@ def _moved(robot: Robot, joint: Joint, value: float) -> tuple[str, Value]:
     return "rotation", (*_rounded(axis, 9), value)
 
 
-def _shapes(robot: Robot, link: Link, names: Names, told: set[Material]) -> list[Node]:
+def _shapes(robot: Robot, link: Link, names: VrmlNames, told: set[Material]) -> list[Node]:
     T = robot.home[link.name]
     return [_shape(shape, T, names, told) for shape in link.shapes]
 
 
-def _shape(shape: Shape, T: FloatArray, names: Names, told: set[Material]) -> Node:
+def _shape(shape: VisualMesh, T: FloatArray, names: VrmlNames, told: set[Material]) -> Node:
     name = names.appearance(shape.material)
     appearance: Node | Use
     if shape.material in told:
@@ -206,7 +208,7 @@ def _material(material: Material) -> Node:
     )
 
 
-def _interpolator(joint: Joint, robot: Robot, motion: Motion, names: Names) -> Node:
+def _interpolator(joint: Joint, robot: Robot, motion: RecordedMotion, names: VrmlNames) -> Node:
     name = f"{names.joints[joint.name]}{names.way}"
     axis = robot.axis(joint)
     t, values = motion.keys(joint.name)

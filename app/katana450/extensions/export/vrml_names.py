@@ -18,14 +18,14 @@ Material of that colour."""
 
 
 @dataclass(frozen=True)
-class Dressed:
-    """The nodes that say how a link or a thing is shown."""
+class NodeNames:
+    """The nodes that say how a link or an object is shown."""
 
-    look: str
+    appearance: str
     paint: str
 
 
-class Names:
+class VrmlNames:
     """No two alike, however the URDF calls them.
 
     Attributes:
@@ -51,8 +51,8 @@ class Names:
         made = iter(self._made)
         self.links: Mapping[str, str] = {name: next(made) for name in links}
         self.joints: Mapping[str, str] = {name: next(made) for name in robot.joints}
-        self.dressed: Mapping[str, Dressed] = {
-            name: Dressed(next(made), next(made)) for name in shown
+        self.dressed: Mapping[str, NodeNames] = {
+            name: NodeNames(next(made), next(made)) for name in shown
         }
         self._appearances = {material: next(made) for material in ordered}
         self.clock = next(made)
@@ -68,11 +68,11 @@ class Names:
         """Of its Appearance."""
         return self._appearances[material]
 
-    def things(self, names: Sequence[str]) -> Mapping[str, tuple[str, Dressed]]:
+    def objects(self, names: Sequence[str]) -> Mapping[str, tuple[str, NodeNames]]:
         """Of what stands around, by its own name: its Transform, and how it is shown.
 
         They come after all that is in the files.
         """
         wanted = [part for name in names for part in (name, f"{name}_{LOOK}", f"{name}_{PAINT}")]
         made = iter(distinct([*self._made, *wanted], KEYWORDS)[len(self._made) :])
-        return {name: (next(made), Dressed(next(made), next(made))) for name in names}
+        return {name: (next(made), NodeNames(next(made), next(made))) for name in names}

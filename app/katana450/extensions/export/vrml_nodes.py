@@ -1,6 +1,6 @@
 """The VRML world of a running arm, by its DEF names: what can be read of it, and what can be set.
 
-A joint's rotation is an order to go there, never a place it is put at; what things and paints are
+A joint's rotation is an order to go there, never a place it is put at; what objects and paints are
 set to goes through the same door. The names are those of the exported files.
 """
 
@@ -14,23 +14,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.arrangement import look_of, shifted
-from katana450.arm.control.looks import Colour, Trait
+from katana450.arm.control.appearance import AppearanceTrait, Colour
+from katana450.arm.control.scene_changes import appearance_of, with_moved_object
+from katana450.arm.control.scene_objects import Environment, SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
-from katana450.arm.control.things import Environment, Thing
 from katana450.arm.robot.link import Joint
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_names import Dressed, Names
+from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import WIDTHS, Type
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 from katana450.server.service.nodes import Nodes
 
-ASIDE = 1e-6
+AXIS_TOLERANCE = 1e-6
 """[rad] By which the axis of a rotation may be beside that of the joint."""
 
 FieldValue = float | list[float]
@@ -68,7 +68,7 @@ class _Node:
 class VrmlNodes(Nodes):
     """Everything that has a DEF name. Changes nothing by itself."""
 
-    def __init__(self, robot: Robot, surroundings: Environment) -> None:
+    def __init__(self, robot: Robot, environment: Environment) -> None:
         super().__init__(robot)
         arm = robot.arm
         axes = robot.driven if arm is None else arm.chain.names
@@ -76,10 +76,10 @@ class VrmlNodes(Nodes):
         self._fingers = () if arm is None else tuple(arm.fingers)
         # A finger that follows another is set by it alone.
         self._gripper = next((f for f in self._fingers if robot.joints[f].leader == f), None)
-        self._surroundings = surroundings
-        self._names = Names(robot)
+        self._surroundings = environment
+        self._names = VrmlNames(robot)
         self._fixed = self._of_the_robot()
-        # Of the things there are at present, by the names they had.
+        # Of the objects there are at present, by the names they had.
         self._known: tuple[tuple[str, ...], Mapping[str, _Node]] = ((), self._fixed)
 
     def world(self, state: State) -> answers.World:
@@ -104,7 +104,7 @@ class VrmlNodes(Nodes):
             ]
         )
 
-    def read(self, state: State, asked: Iterable[requests.Named]) -> tuple[answers.Value, ...]:
+    def read(self, state: State, asked: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:
         """What the fields are now. Raises InputError for a name there is none of."""
         return tuple(
             answers.Value(
@@ -115,7 +115,7 @@ class VrmlNodes(Nodes):
             for each in asked
         )
 
-    def command(self, state: State, settings: Iterable[requests.Setting]) -> cmd.Command:
+    def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:
         """What sets all of these. Raises InputError when one cannot be set, which and why."""
         orders = _Orders(state)
         for each in settings:
@@ -129,12 +129,12 @@ class VrmlNodes(Nodes):
 
     def _check_carried(self, orders: _Orders) -> None:
         """Raise InputError for an object that would stand on nothing once all is moved."""
-        moves = [each for each in orders.others if isinstance(each, cmd.Shift)]
-        things = functools.reduce(shifted, moves, orders.state).things
+        moves = [each for each in orders.others if isinstance(each, cmd.MoveObject)]
+        objects = functools.reduce(with_moved_object, moves, orders.state).objects
         for name in {each.name for each in moves}:
-            thing = next(each for each in things if each.name == name)
-            if is_loose(thing):
-                check_carried(self._surroundings.table, things, thing)
+            scene_object = next(each for each in objects if each.name == name)
+            if is_loose(scene_object):
+                check_carried(self._surroundings.table, objects, scene_object)
 
     def _field(self, state: State, node: str, field: str) -> _Field:
         found = self._nodes(state).get(node)
@@ -146,12 +146,12 @@ class VrmlNodes(Nodes):
         return found.fields[field]
 
     def _nodes(self, state: State) -> Mapping[str, _Node]:
-        names = tuple(thing.name for thing in state.things)
+        names = tuple(scene_object.name for scene_object in state.objects)
         if names != self._known[0]:
             nodes = dict(self._fixed)
-            for name, (put, dressed) in self._names.things(names).items():
-                nodes[put] = self._thing(name)
-                nodes |= _dress(name, f"thing {name}", dressed, PLAIN)
+            for name, (put, dressed) in self._names.objects(names).items():
+                nodes[put] = self._object(name)
+                nodes |= _dress(name, f"object {name}", dressed, PLAIN)
             self._known = (names, nodes)
         return self._known[1]
 
@@ -195,10 +195,10 @@ class VrmlNodes(Nodes):
         fields = {moved: _Field(kind, read, put), "center": _Field(Type.VECTOR, lambda _: center)}
         return _Node("Transform", f"joint {name}", fields)
 
-    def _thing(self, name: str) -> _Node:
+    def _object(self, name: str) -> _Node:
         def pose(state: State) -> FloatArray:
-            thing = _known_thing(state, name)
-            return self._surroundings.pose(thing, state.x)
+            scene_object = _known_object(state, name)
+            return self._surroundings.pose(scene_object, state.x)
 
         def rotation(state: State) -> FieldValue:
             return _axis_angle(pose(state)[:3, :3])
@@ -208,15 +208,15 @@ class VrmlNodes(Nodes):
 
         def move(orders: _Orders, value: FieldValue | None) -> None:
             position = np.array(_out_of_the_hand(orders, name, value))
-            orders.others.append(cmd.Shift(name, position=position))
+            orders.others.append(cmd.MoveObject(name, position=position))
 
         def turn(orders: _Orders, value: FieldValue | None) -> None:
             R = _rotation(name, _out_of_the_hand(orders, name, value))
-            orders.others.append(cmd.Shift(name, R=R))
+            orders.others.append(cmd.MoveObject(name, R=R))
 
         return _Node(
             "Transform",
-            f"thing {name}",
+            f"object {name}",
             {
                 "translation": _Field(Type.VECTOR, translation, move),
                 "rotation": _Field(Type.ROTATION, rotation, turn),
@@ -224,25 +224,25 @@ class VrmlNodes(Nodes):
         )
 
 
-def _dress(name: str, of: str, dressed: Dressed, colour: Colour) -> dict[str, _Node]:
-    """The Switch of a link or thing, and the Material of its paint."""
+def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, _Node]:
+    """The Switch of a link or object, and the Material of its paint."""
 
-    def put(trait: Trait) -> Callable[[_Orders, FieldValue | None], None]:
+    def put(trait: AppearanceTrait) -> Callable[[_Orders, FieldValue | None], None]:
         def changed(orders: _Orders, value: FieldValue | None) -> None:
             said = tuple(value) if isinstance(value, list) else value
-            orders.others.append(cmd.Dress(name, trait, said))
+            orders.others.append(cmd.SetAppearance(name, trait, said))
 
         return changed
 
     return {
-        dressed.look: _Node(
+        dressed.appearance: _Node(
             "Switch",
             of,
             {
                 "whichChoice": _Field(
                     Type.INT,
-                    lambda state: float(look_of(state, name).choice.value),
-                    put(Trait.CHOICE),
+                    lambda state: float(appearance_of(state, name).choice.value),
+                    put(AppearanceTrait.CHOICE),
                 )
             },
         ),
@@ -252,13 +252,13 @@ def _dress(name: str, of: str, dressed: Dressed, colour: Colour) -> dict[str, _N
             {
                 "diffuseColor": _Field(
                     Type.COLOR,
-                    lambda state: list(look_of(state, name).colour or colour),
-                    put(Trait.COLOUR),
+                    lambda state: list(appearance_of(state, name).colour or colour),
+                    put(AppearanceTrait.COLOUR),
                 ),
                 "transparency": _Field(
                     Type.FLOAT,
-                    lambda state: look_of(state, name).transparency,
-                    put(Trait.TRANSPARENCY),
+                    lambda state: appearance_of(state, name).transparency,
+                    put(AppearanceTrait.TRANSPARENCY),
                 ),
             },
         ),
@@ -277,8 +277,8 @@ def _fitting(name: str, field: _Field, value: FieldValue) -> FieldValue:
 
 
 def _out_of_the_hand(orders: _Orders, name: str, value: FieldValue | None) -> list[float]:
-    """``value``, where the thing of that name can be moved."""
-    if _known_thing(orders.state, name).held:
+    """``value``, where the object of that name can be moved."""
+    if _known_object(orders.state, name).held:
         raise InputError(f"{name!r} is held: open the gripper first.")
     if not isinstance(value, list):
         raise InputError(f"{name} has no place of its own to go back to; say where it is to be.")
@@ -291,7 +291,7 @@ def _about(name: str, axis: FloatArray, rotation: list[float]) -> float:
     if angle == 0.0:
         return 0.0
     given = _unit(rotation[:3])
-    if given is None or float(np.linalg.norm(np.cross(axis, given))) > ASIDE:
+    if given is None or float(np.linalg.norm(np.cross(axis, given))) > AXIS_TOLERANCE:
         about = _shown(np.array(rotation[:3]))
         raise InputError(f"{name} turns about {_shown(axis)}, and cannot turn about {about}.")
     return angle if float(axis @ given) > 0.0 else -angle
@@ -301,7 +301,7 @@ def _along(name: str, axis: FloatArray, translation: list[float]) -> float:
     """How far [m] along ``axis`` a translation is, which must be along that alone."""
     given = np.array(translation)
     amount = float(axis @ given)
-    if float(np.linalg.norm(given - amount * axis)) > ASIDE * max(abs(amount), 1.0):
+    if float(np.linalg.norm(given - amount * axis)) > AXIS_TOLERANCE * max(abs(amount), 1.0):
         raise InputError(f"{name} slides along {_shown(axis)}, and cannot go to {_shown(given)}.")
     return amount
 
@@ -336,5 +336,5 @@ def _axis_angle(R: FloatArray) -> list[float]:
     return [*(w / angle).tolist(), angle] if angle else [0.0, 0.0, 1.0, 0.0]
 
 
-def _known_thing(state: State, name: str) -> Thing:
-    return next(thing for thing in state.things if thing.name == name)
+def _known_object(state: State, name: str) -> SceneObject:
+    return next(scene_object for scene_object in state.objects if scene_object.name == name)

@@ -31,10 +31,10 @@ HEADER = "#VRML V2.0 utf8"
 LINE = 16
 """Rows of numbers a line: long enough to be small, short enough for old readers."""
 
-LONGEST = 160
+MAX_QUOTED_CHARACTERS = 160
 """Characters of what an error tells of a file."""
 
-DEEPEST = 200
+MAX_DEPTH = 200
 """Nodes in nodes; a file that goes deeper is refused before Python's stack ends."""
 
 # Possessive, so that what does not match fails at once, whatever a stranger wrote.
@@ -159,7 +159,7 @@ class Reader:
 
     def _error(self, what: str) -> InputError:
         line = self._text.count("\n", 0, self._at) + 1
-        short = what if len(what) <= LONGEST else f"{what[:LONGEST]}…"
+        short = what if len(what) <= MAX_QUOTED_CHARACTERS else f"{what[:MAX_QUOTED_CHARACTERS]}…"
         return InputError(f"{self._name}, line {line}: {short}.")
 
     def _take(self) -> str:
@@ -181,8 +181,8 @@ class Reader:
         return name
 
     def _node(self, depth: int) -> Node | Use:
-        if depth > DEEPEST:
-            raise self._error(f"nodes lie more than {DEEPEST} deep in each other")
+        if depth > MAX_DEPTH:
+            raise self._error(f"nodes lie more than {MAX_DEPTH} deep in each other")
         name: str | None = None
         token = self._take()
         if token == "USE":

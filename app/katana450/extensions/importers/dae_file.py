@@ -20,10 +20,10 @@ from lxml import etree
 from katana450.errors import InputError
 from katana450.extensions.importers.library_errors import failures_in_words
 from katana450.extensions.importers.surface import (
-    MOST_COPIES,
+    MAX_COPIES,
     MeshBuilder,
-    Reading,
-    Surface,
+    MeshReading,
+    MeshSurface,
     doubles,
     of_polygons,
 )
@@ -45,10 +45,10 @@ X_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Rotation from x up to y up."""
 
 
-def read_dae(data: bytes, name: str) -> Reading:
+def read_dae(data: bytes, name: str) -> MeshReading:
     """Return all polygons of the scene. Raises InputError if the file has none."""
     root = _document(data, name)
-    pile = MeshBuilder(name)
+    builder = MeshBuilder(name)
     with failures_in_words(name):
         document = Collada(
             io.BytesIO(etree.tostring(root)), ignore=[DaeError], aux_file_loader=_no_file
@@ -56,20 +56,20 @@ def read_dae(data: bytes, name: str) -> Reading:
         if document.scene is None:
             raise InputError(f"{name} has no scene that is shown.")
         for number, part in enumerate(document.scene.objects("geometry")):
-            if number >= MOST_COPIES:
-                raise InputError(f"{name} shows more than {MOST_COPIES} nodes.")
+            if number >= MAX_COPIES:
+                raise InputError(f"{name} shows more than {MAX_COPIES} nodes.")
             for primitive in part.primitives():
                 if isinstance(primitive, SURFACES) and primitive.vertex is not None:
-                    pile.add(_surface(primitive, np.linalg.det(part.matrix[:3, :3]) < 0.0, name))
-        surface = pile.surface()
+                    builder.add(_surface(primitive, np.linalg.det(part.matrix[:3, :3]) < 0.0, name))
+        surface = builder.surface()
         unit = document.assetInfo.unitmeter
         up = str(document.assetInfo.upaxis)
     left_out = [said for tag, said in LEFT_OUT.items() if root.find(f".//{{*}}{tag}") is not None]
     if document.errors:
         left_out.append(f"{len(document.errors)} parts that are broken")
     if up == "X_UP":
-        surface = Surface(surface.vertices @ X_UP.T, surface.faces, surface.colours)
-    return Reading(
+        surface = MeshSurface(surface.vertices @ X_UP.T, surface.faces, surface.colours)
+    return MeshReading(
         surface,
         tuple(dict.fromkeys(left_out)),
         unit=1.0 if unit is None else float(unit),
@@ -96,7 +96,7 @@ def _no_file(_path: str) -> None:
     """Find no other file, whatever the file names."""
 
 
-def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> Surface:
+def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> MeshSurface:
     corners = np.asarray(primitive.vertex_index, dtype=np.int64)
     sizes = np.full(len(corners), 3)
     if isinstance(primitive, BoundPolylist):
@@ -112,7 +112,7 @@ def _surface(primitive: BoundPrimitive, is_mirrored: bool, name: str) -> Surface
         corner_colours=_colours(primitive, len(corners), name),
     )
     if is_mirrored:
-        return Surface(surface.vertices, surface.faces[:, ::-1], surface.colours)
+        return MeshSurface(surface.vertices, surface.faces[:, ::-1], surface.colours)
     return surface
 
 

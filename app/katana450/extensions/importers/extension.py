@@ -47,7 +47,7 @@ def _initial_scene(options: Namespace, session: Callable[[], Session]) -> Initia
 def _routes(context: RouteContext) -> list[BaseRoute]:
     from katana450.extensions.importers.uploads import Uploads
 
-    return Uploads(context.hub, context.door, context.visitor).routes()
+    return Uploads(context.hub, context.authenticator, context.identity).routes()
 
 
 EXTENSION = Extension(

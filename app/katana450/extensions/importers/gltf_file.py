@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.extensions.importers.surface import (
-    MOST_COPIES,
+    MAX_COPIES,
     MeshBuilder,
-    Reading,
-    Surface,
+    MeshReading,
+    MeshSurface,
     check_triangles,
     doubles,
     of_polygons,
@@ -39,7 +39,13 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """Modes of a primitive."""
 
-HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_mesh_quantization", "KHR_lights_", "EXT_texture")
+IGNORED_EXTENSIONS = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "KHR_mesh_quantization",
+    "KHR_lights_",
+    "EXT_texture",
+)
 """Beginnings of extensions that a file may require although only surfaces are read."""
 
 
@@ -48,7 +54,7 @@ class Buffer(msgspec.Struct, rename="camel"):
     uri: str | None = None
 
 
-class View(msgspec.Struct, rename="camel"):
+class BufferView(msgspec.Struct, rename="camel"):
     buffer: Natural
     byte_length: Natural
     byte_offset: Natural = 0
@@ -119,7 +125,7 @@ class Document(msgspec.Struct, rename="camel"):
     asset: Asset
     extensions_required: list[str] = []
     buffers: list[Buffer] = []
-    buffer_views: list[View] = []
+    buffer_views: list[BufferView] = []
     accessors: list[Accessor] = []
     meshes: list[Mesh] = []
     materials: list[Material] = []
@@ -129,7 +135,7 @@ class Document(msgspec.Struct, rename="camel"):
     animations: list[Any] = []
 
 
-def read_gltf(data: bytes, name: str) -> Reading:
+def read_gltf(data: bytes, name: str) -> MeshReading:
     """All triangles of the scene; metres, y up. Raises InputError for what is none."""
     told, binary = _chunks(data, name) if data.startswith(b"glTF") else (data, None)
     try:
@@ -140,7 +146,7 @@ def read_gltf(data: bytes, name: str) -> Reading:
         version = document.asset.version[:20]
         raise InputError(f"{name} is glTF {version}; only glTF 2.0 is read.")
     for wanted in document.extensions_required:
-        if not wanted.startswith(HARMLESS):
+        if not wanted.startswith(IGNORED_EXTENSIONS):
             raise InputError(
                 f"{name} needs the extension {wanted[:60]}, which is not read; "
                 "save it without compression."
@@ -176,18 +182,18 @@ class _File:
             for number, each in enumerate(document.buffers)
         ]
         self._left_out: Counter[str] = Counter()
-        self._meshes: dict[int, Surface] = {}
+        self._meshes: dict[int, MeshSurface] = {}
 
-    def reading(self) -> Reading:
+    def reading(self) -> MeshReading:
         """Of the scene that is shown first."""
-        pile = MeshBuilder(self._name)
+        builder = MeshBuilder(self._name)
         waiting = [(root, np.eye(4)) for root in self._roots()]
         seen: set[int] = set()
         while waiting:
             number, T_parent = waiting.pop()
-            if number in seen or len(seen) > MOST_COPIES:
+            if number in seen or len(seen) > MAX_COPIES:
                 raise self._broken(
-                    f"node {number} hangs in two places, or there are over {MOST_COPIES}"
+                    f"node {number} hangs in two places, or there are over {MAX_COPIES}"
                 )
             seen.add(number)
             node = self._document.nodes[number]
@@ -199,10 +205,10 @@ class _File:
             if node.skin is not None:
                 self._left_out["bones"] += 1
             if node.mesh is not None:
-                pile.add(self._mesh(node.mesh).moved(T))
+                builder.add(self._mesh(node.mesh).moved(T))
         if self._document.animations:
             self._left_out["motion"] += 1
-        return Reading(pile.surface(), tuple(self._left_out))
+        return MeshReading(builder.surface(), tuple(self._left_out))
 
     def _roots(self) -> list[int]:
         document = self._document
@@ -228,20 +234,20 @@ class _File:
             raise self._broken("a buffer is shorter than it says, or is not there")
         return data
 
-    def _mesh(self, number: int) -> Surface:
+    def _mesh(self, number: int) -> MeshSurface:
         if number not in self._meshes:
-            pile = MeshBuilder(self._name)
+            builder = MeshBuilder(self._name)
             for primitive in self._document.meshes[number].primitives:
                 if primitive.mode in (TRIANGLES, STRIP, FAN):
-                    pile.add(self._surface(primitive))
+                    builder.add(self._surface(primitive))
                 else:
                     self._left_out["lines and points"] += 1
-            self._meshes[number] = pile.surface()
+            self._meshes[number] = builder.surface()
         return self._meshes[number]
 
-    def _surface(self, primitive: Primitive) -> Surface:
+    def _surface(self, primitive: Primitive) -> MeshSurface:
         if "POSITION" not in primitive.attributes:
-            return Surface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+            return MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
         points = self._numbers(primitive.attributes["POSITION"], 3)
         if primitive.indices is None:
             index = np.arange(len(points))

@@ -12,14 +12,14 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import CUP
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
-from katana450.arm.control.things import Form, Thing
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
-from katana450.extensions.importers.shape_file import MOST_BYTES
+from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
 from katana450.extensions.scene.scene import Scene
 from katana450.maths.geometry import se3
 from katana450.server.service.scenes import free_name
@@ -28,59 +28,61 @@ PLACED = re.compile(r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?")
 """FILE, or FILE@x,y,z."""
 
 
-def initial_scene(session: Session, scene: Path | None, objects: Sequence[str]) -> InitialScene:
-    """Return the scene to start with. Raises InputError; see ``furnished``."""
-    stored, notes = furnished(session, scene, objects)
-    command = cmd.Furnish(stored.scene.things, stored.scene.water)
+def initial_scene(
+    session: Session, scene: Path | None, object_files: Sequence[str]
+) -> InitialScene:
+    """Return the scene to start with. Raises InputError; see ``load_initial_scene``."""
+    stored, notes = load_initial_scene(session, scene, object_files)
+    command = cmd.ReplaceScene(stored.scene.objects, stored.scene.water)
     return InitialScene(command, stored.scene.joints, stored.meshes, notes)
 
 
-def furnished(
-    session: Session, scene: Path | None, objects: Sequence[str]
+def load_initial_scene(
+    session: Session, scene: Path | None, object_files: Sequence[str]
 ) -> tuple[StoredScene, tuple[str, ...]]:
     """The scene of the file ``scene`` and the ``objects`` besides, FILE[@x,y,z] each, in mm.
 
     Without a scene what there is of the robot's own; and sentences on what was read. Raises
     InputError for what cannot be read, or cannot stand there.
     """
-    hand = session.surroundings.hand
-    stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).things))
+    hand = session.environment.hand
+    stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).objects))
     if scene is not None:
         stored = read_scene_folder(scene, None if hand is None else hand.T_palm_tool)
     if stored.scene.joints is not None:
         q = session.require_arm().chain.check_q(stored.scene.joints)
         if not session.require_arm().chain.within_limits(q):
             raise InputError(f"{scene}: the joints lie outside the limits of this arm.")
-    if stored.scene.water is not None and all(t.name != CUP for t in stored.scene.things):
+    if stored.scene.water is not None and all(t.name != CUP for t in stored.scene.objects):
         raise InputError(f"{scene}: there is water, and no cup for it.")
-    things, meshes, said = list(stored.scene.things), list(stored.meshes), []
-    for told in objects:
-        mesh, thing = _object(told, things)
-        things.append(thing)
+    objects, meshes, said = list(stored.scene.objects), list(stored.meshes), []
+    for told in object_files:
+        mesh, scene_object = _object(told, objects)
+        objects.append(scene_object)
         meshes.append(mesh)
-        said.append(f"{thing.name}: {mesh.said}")
-    session.check(cmd.Furnish(tuple(things), stored.scene.water))
+        said.append(f"{scene_object.name}: {mesh.text}")
+    session.check(cmd.ReplaceScene(tuple(objects), stored.scene.water))
     kept = {mesh.key: mesh for mesh in meshes}
-    whole = StoredScene(replace(stored.scene, things=tuple(things)), tuple(kept.values()))
+    whole = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(kept.values()))
     return whole, tuple(said)
 
 
-def _object(told: str, things: Sequence[Thing]) -> tuple[Mesh, Thing]:
+def _object(told: str, objects: Sequence[SceneObject]) -> tuple[Mesh, SceneObject]:
     match = PLACED.fullmatch(told)
     assert match is not None
     path = Path(match["file"])
     try:
         with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
+            data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
     mesh = read_mesh(data, path.name)
-    name = free_name(mesh.name, {thing.name for thing in things})
-    thing = Thing(name, Form.MESH, (), np.eye(4), solid=mesh.solid)
+    name = free_name(mesh.name, {scene_object.name for scene_object in objects})
+    scene_object = SceneObject(name, Shape.MESH, (), np.eye(4), solid=mesh.solid)
     if match["at"] is None:
-        return mesh, replace(thing, T=free_place(thing, things))
+        return mesh, replace(scene_object, T=free_place(scene_object, objects))
     try:
         at = [1e-3 * float(each) for each in match["at"].split(",")]
     except ValueError:
         raise InputError(f"{told!r}: where it stands is x,y,z in mm, as in @300,0,0.") from None
-    return mesh, replace(thing, T=se3.from_rotation_translation(np.eye(3), at))
+    return mesh, replace(scene_object, T=se3.from_rotation_translation(np.eye(3), at))

@@ -16,12 +16,12 @@ from katana450.extensions.importers.shape_file import (
     Up,
     read_shape_guarded,
 )
-from katana450.maths.collision.outer import Outer
+from katana450.maths.collision.convex_body import ConvexBody
 
-FAR_OFF = 2e-3
+HULL_DISTANCE_TO_REPORT = 2e-3
 """[m] That a hull stands off is worth a word from here on."""
 
-HOLLOW = 1.2
+HULL_VOLUME_RATIO_TO_REPORT = 1.2
 """[1] Likewise how many times as large it is."""
 
 
@@ -50,7 +50,7 @@ def read_mesh(data: bytes, file: str, unit: str | None = None, up: Up | None = N
         shape.faces,
         shape.colours,
         Solid(key, (x, y, z), found.corners - foot),
-        f"{shape.said} {_counted(shape, found)}",
+        f"{shape.text} {_counted(shape, found)}",
     )
 
 
@@ -61,15 +61,15 @@ def unit_of(sign: str) -> float:
     return UNITS[sign]
 
 
-def _counted(shape: ShapeFile, found: Outer) -> str:
+def _counted(shape: ShapeFile, found: ConvexBody) -> str:
     """What it counts as where contacts are looked for."""
     said = ["Contacts are looked for with its convex hull"]
     if found.thickened:
         said.append("it is flat, and counts as a little thick")
-    if found.off > FAR_OFF:
+    if found.off > HULL_DISTANCE_TO_REPORT:
         said.append(f"that is simplified, and reaches up to {1e3 * found.off:.1f} mm over it")
     volume = _volume(shape)
-    if volume is not None and found.volume > HOLLOW * volume:
+    if volume is not None and found.volume > HULL_VOLUME_RATIO_TO_REPORT * volume:
         said.append(f"its hollows count as filled: {found.volume / volume:.1f} times what it is")
     return "; ".join(said) + "."
 

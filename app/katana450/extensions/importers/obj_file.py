@@ -12,9 +12,9 @@ from collections import Counter
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.surface import Reading, check_triangles, of_polygons
+from katana450.extensions.importers.surface import MeshReading, check_triangles, of_polygons
 
-SILENT = frozenset(
+IGNORED_STATEMENTS = frozenset(
     [
         *("vt", "vn", "vp", "g", "o", "s", "mg", "usemap", "maplib", "bevel", "c_interp"),
         *("d_interp", "lod", "shadow_obj", "trace_obj"),
@@ -40,7 +40,7 @@ LEFT_OUT = {
 """Statements that say what is not read, and the words for it."""
 
 
-def read_obj(data: bytes, name: str) -> Reading:
+def read_obj(data: bytes, name: str) -> MeshReading:
     """All polygons. Raises InputError, with the line, for what is none."""
     found = _Lines(name)
     text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", " ")
@@ -70,10 +70,10 @@ class _Lines:
             self._face(words[1:], line)
         elif kind in LEFT_OUT:
             self._left_out[LEFT_OUT[kind]] += 1
-        elif kind not in SILENT:
+        elif kind not in IGNORED_STATEMENTS:
             raise self._wrong(line, f"{kind[:20]!r} is no statement of OBJ")
 
-    def reading(self) -> Reading:
+    def reading(self) -> MeshReading:
         """Of all lines."""
         vertex_colours = None
         if self._colours:
@@ -87,7 +87,7 @@ class _Lines:
             self._name,
             vertex_colours=vertex_colours,
         )
-        return Reading(surface, tuple(self._left_out))
+        return MeshReading(surface, tuple(self._left_out))
 
     def _vertex(self, words: list[str], line: int) -> None:
         try:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.importers.surface import Reading, of_polygons
+from katana450.extensions.importers.surface import MeshReading, of_polygons
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 HEADERS = ("OFF", "COFF", "NOFF", "CNOFF")
@@ -26,7 +26,7 @@ LONGEST_ROW = 400
 """Characters of a line up to which rows become one array."""
 
 
-def read_off(data: bytes, name: str) -> Reading:
+def read_off(data: bytes, name: str) -> MeshReading:
     """Return all polygons. Raises InputError with the line of what is none."""
     lines = enumerate(data.decode("utf-8", "replace").splitlines(), 1)
     rows = [(number, row) for number, line in lines if (row := line.partition("#")[0].strip())]
@@ -50,10 +50,10 @@ def read_off(data: bytes, name: str) -> Reading:
     colours = None
     if header.startswith("C") and table.shape[1] >= width + 3:
         colours = table[:, width : width + 4]
-        most = 255.0 if (colours > 1.0).any() else 1.0
-        colours = np.column_stack((colours / most, np.ones(count)))[:, :4]
+        maximum = 255.0 if (colours > 1.0).any() else 1.0
+        colours = np.column_stack((colours / maximum, np.ones(count)))[:, :4]
     surface = of_polygons(table[:, :3], corners, sizes, name, vertex_colours=colours)
-    return Reading(surface)
+    return MeshReading(surface)
 
 
 def _numbers(rows: Rows, name: str) -> FloatArray:

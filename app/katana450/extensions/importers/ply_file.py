@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.importers.surface import Reading, as_bytes, doubles, of_polygons
+from katana450.extensions.importers.surface import MeshReading, as_bytes, doubles, of_polygons
 from katana450.maths.geometry.arrays import FloatArray
 
 TYPES = {
@@ -23,7 +23,7 @@ TYPES = {
 
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
-LONGEST_HEADER = 64 * 1024
+MAX_HEADER_BYTES = 64 * 1024
 """[bytes]"""
 
 CORNERS = ("vertex_indices", "vertex_index")
@@ -58,7 +58,7 @@ class Column:
     numbers: str
 
 
-def read_ply(data: bytes, name: str) -> Reading:
+def read_ply(data: bytes, name: str) -> MeshReading:
     """All faces. Raises InputError for what is none."""
     order, elements, body = _header(data, name)
     source = _Binary(body, order, name) if order else _Text(body, name)
@@ -86,14 +86,14 @@ def read_ply(data: bytes, name: str) -> Reading:
         vertex_colours=of_vertices if colours is None else None,
     )
     others = [f"{e.rows} {e.name}" for e in elements if e.name not in ("vertex", "face") and e.rows]
-    return Reading(surface, tuple(others))
+    return MeshReading(surface, tuple(others))
 
 
 def _header(data: bytes, name: str) -> tuple[str, list[Element], bytes]:
     """The byte order, the elements, and what follows."""
     if not data.startswith((b"ply\n", b"ply\r")):
         raise InputError(f"{name} does not begin with 'ply', so it is no PLY file.")
-    ends = data.find(b"end_header", 0, LONGEST_HEADER)
+    ends = data.find(b"end_header", 0, MAX_HEADER_BYTES)
     line_end = data.find(b"\n", ends)
     if ends < 0 or line_end < 0:
         raise InputError(f"{name} is broken: its header does not end.")

@@ -14,8 +14,14 @@ import sys
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.shape_file import MEMORY, SECONDS, Format, Up, read_shape
-from katana450.maths.collision.outer import outer
+from katana450.extensions.importers.shape_file import (
+    MAX_MEMORY_BYTES,
+    SECONDS,
+    Format,
+    Up,
+    read_shape,
+)
+from katana450.maths.collision.convex_body import convex_body
 from katana450.platform_support import limit_resources
 
 
@@ -33,12 +39,12 @@ def main(words: list[str]) -> None:
             float(unit) if unit else None,
             Up(up) if up else None,
         )
-        body = outer(shape.vertices)
+        body = convex_body(shape.vertices)
     except InputError as error:
         found["error"] = str(error)
     else:
         found = {
-            key: getattr(shape, key) for key in ("vertices", "faces", "colours", "unit", "said")
+            key: getattr(shape, key) for key in ("vertices", "faces", "colours", "unit", "text")
         } | vars(body)
     made = io.BytesIO()
     arrays = {key: np.array(value) for key, value in found.items() if value is not None}
@@ -48,7 +54,7 @@ def main(words: list[str]) -> None:
 
 def bind() -> None:
     """Bound the memory and time of this process, as far as the system does."""
-    limit_resources(MEMORY, round(SECONDS))
+    limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
 
 
 if __name__ == "__main__":

@@ -16,8 +16,8 @@ from pathlib import Path, PurePosixPath
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.shape_file import MOST_BYTES, Up
-from katana450.extensions.programs.source import LARGEST, Problem, ScriptError
+from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Up
+from katana450.extensions.programs.source import MAX_BYTES, Problem, ScriptError
 from katana450.extensions.scene.scene import MeshFile, Scene
 from katana450.extensions.scene.text import parsed, written
 from katana450.maths.geometry.arrays import FloatArray
@@ -27,7 +27,7 @@ SCENE = "scene.yaml"
 
 FOLDER = "meshes"
 
-LARGEST_ZIP = 60_000_000
+MAX_ZIP_BYTES = 60_000_000
 """Bytes of one, and of what is in it."""
 
 MOST_FILES = 64
@@ -38,7 +38,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True, eq=False)
 class StoredScene:
-    """A scene, and the meshes its things are of."""
+    """A scene, and the meshes its objects are of."""
 
     scene: Scene
     meshes: tuple[Mesh, ...] = ()
@@ -49,8 +49,8 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
 
     ``T_palm_tool``: see ``Hand``; None for an arm without.
     """
-    if len(data) > LARGEST_ZIP:
-        raise InputError(f"A scene has at most {LARGEST_ZIP // 1_000_000} MB.")
+    if len(data) > MAX_ZIP_BYTES:
+        raise InputError(f"A scene has at most {MAX_ZIP_BYTES // 1_000_000} MB.")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             names = archive.namelist()
@@ -60,21 +60,21 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
                 raise InputError("Two files of the scene have the same name.")
             if SCENE not in names:
                 raise InputError(f"There is no {SCENE} in the .zip.")
-            left = LARGEST_ZIP
+            left = MAX_ZIP_BYTES
 
-            def opened(path: str, most: int) -> bytes:
+            def opened(path: str, maximum: int) -> bytes:
                 nonlocal left
                 if path not in names:
                     raise InputError(f"There is no file {path} in the .zip.")
                 # What a .zip says of its sizes need not be so.
                 with archive.open(path) as file:
-                    content = file.read(min(most, left) + 1)
+                    content = file.read(min(maximum, left) + 1)
                 left -= len(content)
                 if left < 0:
-                    raise InputError(f"Unpacked it has more than {LARGEST_ZIP // 1_000_000} MB.")
+                    raise InputError(f"Unpacked it has more than {MAX_ZIP_BYTES // 1_000_000} MB.")
                 return content
 
-            return _read(_text(opened(SCENE, LARGEST), SCENE), opened, T_palm_tool)
+            return _read(_text(opened(SCENE, MAX_BYTES), SCENE), opened, T_palm_tool)
     except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError) as error:
         raise InputError(f"This is no .zip that can be read: {error}.") from error
     except (OSError, EOFError, ValueError, zlib.error) as error:
@@ -86,17 +86,17 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
 def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene:
     """The scene whose text is the file ``path``, its meshes beside or below it; or a .zip."""
     if path.suffix.lower() == ".zip":
-        return read_scene_zip(_content(path, LARGEST_ZIP), T_palm_tool)
+        return read_scene_zip(_content(path, MAX_ZIP_BYTES), T_palm_tool)
     folder = path.resolve().parent
 
-    def opened(name: str, most: int) -> bytes:
+    def opened(name: str, maximum: int) -> bytes:
         found = (folder / name).resolve()
         if not found.is_relative_to(folder):
             raise InputError(f"{name} is not in the folder of the scene.")
-        return _content(found, most)
+        return _content(found, maximum)
 
     try:
-        return _read(_text(_content(path, LARGEST), path.name), opened, T_palm_tool)
+        return _read(_text(_content(path, MAX_BYTES), path.name), opened, T_palm_tool)
     except ScriptError as error:
         raise InputError(f"{path}:\n{error}") from error
 
@@ -153,7 +153,7 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
         or not file.path.isprintable()
     ):
         raise InputError(f"{file.path!r} is no relative path within the scene.")
-    content = opened(file.path, MOST_BYTES)
+    content = opened(file.path, MAX_FILE_BYTES)
     mesh = read_mesh(content, file.path, file.unit, None if file.up is None else Up(file.up))
     if file.sha256 is not None and mesh.sha256 != file.sha256:
         raise InputError(
@@ -163,10 +163,10 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
     return mesh
 
 
-def _content(path: Path, most: int) -> bytes:
+def _content(path: Path, maximum: int) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(most + 1)
+            return file.read(maximum + 1)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
 

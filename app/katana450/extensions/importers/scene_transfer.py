@@ -12,7 +12,7 @@ from katana450.extensions.scene.scene import Scene
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import Arm
+from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.scenes import free_name, used_in
 
 
@@ -20,38 +20,38 @@ def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
     """Keep ``mesh``, so that it can be placed. Raises InputError if there is no room for it."""
     state = None if hub.arm is None else hub.arm.state
     hub.meshes.put([mesh], used_in(state))
-    names = {thing.name for thing in state.things} if state is not None else set()
+    names = {scene_object.name for scene_object in state.objects} if state is not None else set()
     return answers.Mesh(
         key=mesh.key,
         name=free_name(mesh.name, names),
-        said=mesh.said,
+        text=mesh.text,
         size=list(mesh.solid.size),
         triangles=len(mesh.faces),
     )
 
 
-def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: Arm) -> answers.Scene:
+def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmInterface) -> answers.Scene:
     """Keep ``stored``, which came as ``data``, so that it can be loaded.
 
     Raises InputError where that cannot be.
     """
     key = hashlib.sha256(data).hexdigest()[:32]
     scene = stored.scene
-    hub.scenes.keep(key, cmd.Furnish(scene.things, scene.water), stored.meshes, arm)
-    names = [thing.name for thing in scene.things]
-    said = f"{len(names)} thing{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
+    hub.scenes.keep(key, cmd.ReplaceScene(scene.objects, scene.water), stored.meshes, arm)
+    names = [scene_object.name for scene_object in scene.objects]
+    said = f"{len(names)} object{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
     if scene.joints is not None:
         said += " The arm stays where it is."
-    return answers.Scene(key=key, things=names, said=said)
+    return answers.Scene(key=key, objects=names, text=said)
 
 
-def zipped(hub: Hub, arm: Arm) -> bytes:
+def zipped(hub: Hub, arm: ArmInterface) -> bytes:
     """Return the present scene as a .zip. Raises InputError, LeaseError if it cannot be saved."""
-    hand = arm.surroundings.hand
+    hand = arm.environment.hand
     return scene_zip(_stored(hub, arm), None if hand is None else hand.T_palm_tool)
 
 
-def _stored(hub: Hub, arm: Arm) -> StoredScene:
+def _stored(hub: Hub, arm: ArmInterface) -> StoredScene:
     state = arm.state
     held = state.held
     if held is not None:
@@ -59,6 +59,6 @@ def _stored(hub: Hub, arm: Arm) -> StoredScene:
     water = None
     if state.poured is not None:
         water = ML * state.poured.water.cup / MILLILITRE
-    keys = dict.fromkeys(t.solid.key for t in state.things if t.solid is not None)
+    keys = dict.fromkeys(t.solid.key for t in state.objects if t.solid is not None)
     meshes = tuple(hub.meshes.need(key) for key in keys)
-    return StoredScene(Scene(state.things, water, state.q), meshes)
+    return StoredScene(Scene(state.objects, water, state.q), meshes)

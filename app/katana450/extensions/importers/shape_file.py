@@ -25,26 +25,27 @@ from katana450.extensions.importers.obj_file import read_obj
 from katana450.extensions.importers.off_file import read_off
 from katana450.extensions.importers.ply_file import read_ply
 from katana450.extensions.importers.stl_file import read_stl
-from katana450.extensions.importers.surface import Reading, Surface
+from katana450.extensions.importers.surface import MeshReading, MeshSurface
 from katana450.extensions.importers.vrml_file import read_wrl
-from katana450.maths.collision.outer import Outer
+from katana450.maths.collision.convex_body import ConvexBody
 from katana450.maths.geometry.arrays import FloatArray, IntArray, frozen
 
-MOST_BYTES = 20_000_000
+MAX_FILE_BYTES = 20_000_000
 
-LARGEST, SMALLEST = 2.0, 1e-3
-"""[m] Bounds of the longest side, the same as in arm/control/things, which takes long to load."""
+MAX_SIZE, MIN_SIZE = 2.0, 1e-3
+"""[m] Bounds of the longest side, the same as in arm/control/scene_objects, which takes long to
+load."""
 
 ROUNDING = 1e-6
 """[1] Of a bound: what single precision makes of a length that is on it."""
 
 LONGEST_NAME = 40
-"""Characters; of things too."""
+"""Characters; of objects too."""
 
 SECONDS = 5.0
 """Until a file has to be read."""
 
-MEMORY = 1 << 30
+MAX_MEMORY_BYTES = 1 << 30
 """[bytes] That reading it may take."""
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m": 1.0}
@@ -93,7 +94,7 @@ class ShapeFile:
     """What was read, in metres, z up.
 
     Attributes:
-        name: from the file's, fit for a thing.
+        name: from the file's, fit for an object.
         vertices: (n, 3) [m], each of a face and no two alike.
         faces: (m, 3) indices of them, counter-clockwise seen from outside.
         colours: (m, 4) sRGB and opacity a face; None where the file says none.
@@ -106,7 +107,7 @@ class ShapeFile:
     faces: IntArray
     colours: Colours | None
     unit: float
-    said: str
+    text: str
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.colours):
@@ -150,16 +151,16 @@ def read_shape(
     said = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
     if reading.left_out:
         said += f" Left out: {_listed(reading.left_out)}."
-    return ShapeFile(thing_name(name), vertices, surface.faces, surface.colours, told, said)
+    return ShapeFile(object_name(name), vertices, surface.faces, surface.colours, told, said)
 
 
 def read_shape_guarded(
     data: bytes, format: Format, name: str, unit: float | None = None, up: Up | None = None
-) -> tuple[ShapeFile, Outer]:
+) -> tuple[ShapeFile, ConvexBody]:
     """As `read_shape`, with the convex body round it, both worked out in a process of its own.
 
-    It has `SECONDS` and, where the system counts it, `MEMORY`; InputError beyond that too, and
-    when it crashes.
+    It has `SECONDS` and, where the system counts it, `MAX_MEMORY_BYTES`; InputError beyond that
+    too, and when it crashes.
     """
     file = label(name)
     _check(data, file, unit)
@@ -188,21 +189,22 @@ def read_shape_guarded(
         ) from error
     if done.returncode:
         raise InputError(
-            f"{file} cannot be read: it wants more than {SECONDS:g} s or {MEMORY >> 20} MiB, or is "
+            f"{file} cannot be read: it wants more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
+            f"MiB, or is "
             "broken in a new way; save it simpler."
         )
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as found:
         if "error" in found:
             raise InputError(str(found["error"]))
         shape = ShapeFile(
-            thing_name(name),
+            object_name(name),
             found["vertices"],
             found["faces"],
             found.get("colours"),
             float(found["unit"]),
-            str(found["said"]),
+            str(found["text"]),
         )
-        body = Outer(
+        body = ConvexBody(
             frozen(found["corners"]),
             float(found["off"]),
             bool(found["thickened"]),
@@ -220,26 +222,26 @@ def label(name: str) -> str:
     return printed or "The file"
 
 
-def thing_name(name: str) -> str:
-    """What a thing of that file is called."""
+def object_name(name: str) -> str:
+    """What an object of that file is called."""
     stem = label(name).rpartition(".")[0].strip()
     return stem or "shape"
 
 
 def _check(data: bytes, file: str, unit: float | None) -> None:
-    if len(data) > MOST_BYTES:
+    if len(data) > MAX_FILE_BYTES:
         raise InputError(
-            f"{file} has {len(data) / 1e6:.1f} MB; at most {MOST_BYTES // 1_000_000} are read; "
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {MAX_FILE_BYTES // 1_000_000} are read; "
             "save it coarser, or as a binary file."
         )
     if unit is not None and not (math.isfinite(unit) and unit > 0.0):
         raise InputError(f"The unit has to be a length in metres above 0, not {unit}.")
 
 
-def _read(data: bytes, format: Format, file: str) -> Reading:
+def _read(data: bytes, format: Format, file: str) -> MeshReading:
     match format:
         case Format.WRL:
-            return read_wrl(data, file, MOST_BYTES)
+            return read_wrl(data, file, MAX_FILE_BYTES)
         case Format.STL:
             return read_stl(data, file)
         case Format.OBJ:
@@ -256,11 +258,11 @@ def _read(data: bytes, format: Format, file: str) -> Reading:
         case Format.THREEMF:
             from katana450.extensions.importers.threemf_file import read_3mf
 
-            return read_3mf(data, file, MOST_BYTES)
+            return read_3mf(data, file, MAX_FILE_BYTES)
     return read_gltf(data, file)
 
 
-def _in_known_unit(reading: Reading, file: str) -> Reading:
+def _in_known_unit(reading: MeshReading, file: str) -> MeshReading:
     """Return the reading in metres if its file tells a unit that is none of UNITS."""
     if reading.unit is None or reading.unit in UNITS.values():
         return reading
@@ -281,7 +283,7 @@ def _unit(
         return of_file, f"the unit is {_sign(of_file)}, as the file tells"
     if format in (Format.GLB, Format.GLTF):
         return 1.0, "the unit is m, as glTF has it"
-    if longest > LARGEST * (1.0 + ROUNDING):
+    if longest > MAX_SIZE * (1.0 + ROUNDING):
         return 1e-3, f"the unit is taken as mm, since {longest:.4g} m would be too large"
     return 1.0, f"the unit is taken as m, since {longest:.4g} mm would be small"
 
@@ -292,18 +294,18 @@ def _sign(unit: float) -> str:
 
 def _check_size(longest: float, unit: float, file: str) -> None:
     length = longest * unit
-    if SMALLEST * (1.0 - ROUNDING) <= length <= LARGEST * (1.0 + ROUNDING):
+    if MIN_SIZE * (1.0 - ROUNDING) <= length <= MAX_SIZE * (1.0 + ROUNDING):
         return
-    fitting = [s for s, metres in UNITS.items() if SMALLEST <= longest * metres <= LARGEST]
+    fitting = [s for s, metres in UNITS.items() if MIN_SIZE <= longest * metres <= MAX_SIZE]
     hint = f"it would fit with the unit {' or '.join(fitting)}" if fitting else "no unit would fit"
-    said = digits_beyond(1e3 * length, 1e3 * SMALLEST, 1e3 * LARGEST)
+    said = digits_beyond(1e3 * length, 1e3 * MIN_SIZE, 1e3 * MAX_SIZE)
     raise InputError(
         f"{file} would be {said} mm long, with {_sign(unit)} as its unit; "
-        f"from {SMALLEST * 1e3:g} to {LARGEST * 1e3:g} mm can be shown, and {hint}."
+        f"from {MIN_SIZE * 1e3:g} to {MAX_SIZE * 1e3:g} mm can be shown, and {hint}."
     )
 
 
-def _size(vertices: FloatArray, surface: Surface) -> str:
+def _size(vertices: FloatArray, surface: MeshSurface) -> str:
     x, y, z = (f"{side * 1e3:.4g}" for side in np.ptp(vertices, axis=0))
     count = len(surface.faces)
     return f"{count} triangle{'s' if count > 1 else ''}, {x} × {y} × {z} mm"

@@ -9,7 +9,7 @@ import numpy as np
 from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
 from katana450.extensions.importers.surface import (
-    Reading,
+    MeshReading,
     check_triangles,
     doubles,
     of_polygons,
@@ -31,7 +31,7 @@ _FACET = re.compile(
 _SOLID = re.compile(rb"\s*(end)?solid\b[^\r\n]*", re.IGNORECASE)
 
 
-def read_stl(data: bytes, name: str) -> Reading:
+def read_stl(data: bytes, name: str) -> MeshReading:
     """All triangles of all solids. Raises InputError for what is none."""
     count = int.from_bytes(data[80:84], "little")
     # Text begins with "solid", but so do some binary files.
@@ -83,10 +83,10 @@ def _broken(data: bytes, at: int, name: str, what: str) -> InputError:
     return InputError(f"{name} is broken at line {line}: {what}.")
 
 
-def _reading(corners: FloatArray, name: str, left_out: tuple[str, ...] = ()) -> Reading:
+def _reading(corners: FloatArray, name: str, left_out: tuple[str, ...] = ()) -> MeshReading:
     places = np.arange(3 * len(corners))
     no_colours: Colours | None = None
     surface = of_polygons(
         corners.reshape(-1, 3), places, np.full(len(corners), 3), name, no_colours
     )
-    return Reading(surface, left_out)
+    return MeshReading(surface, left_out)

@@ -19,12 +19,12 @@ GREY = (204, 204, 204, 255)
 
 MOST_TRIANGLES = 200_000
 
-MOST_COPIES = 20_000
+MAX_COPIES = 20_000
 """Nodes of a scene, each counted as often as it is used."""
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class MeshSurface:
     """vertices: (n, 3). faces: (m, 3) indices of them, counter-clockwise seen from outside.
 
     colours: (m, 4) sRGB and opacity a face; None where the file says none.
@@ -34,20 +34,22 @@ class Surface:
     faces: IntArray
     colours: Colours | None = None
 
-    def moved(self, T: FloatArray) -> Surface:
+    def moved(self, T: FloatArray) -> MeshSurface:
         """Under the affine map `T` (4, 4); a mirrored surface keeps its outside."""
         with np.errstate(over="ignore", invalid="ignore"):
             vertices = self.vertices @ T[:3, :3].T + T[:3, 3]
             mirrored = float(np.linalg.det(T[:3, :3])) < 0.0
-        return Surface(vertices, self.faces[:, ::-1] if mirrored else self.faces, self.colours)
+        return MeshSurface(vertices, self.faces[:, ::-1] if mirrored else self.faces, self.colours)
 
-    def painted(self, colour: Sequence[float] | None) -> Surface:
+    def painted(self, colour: Sequence[float] | None) -> MeshSurface:
         """In one colour (4,) 0..1, where it has none of its own."""
         if colour is None or self.colours is not None:
             return self
-        return Surface(self.vertices, self.faces, np.tile(as_bytes([colour]), (len(self.faces), 1)))
+        return MeshSurface(
+            self.vertices, self.faces, np.tile(as_bytes([colour]), (len(self.faces), 1))
+        )
 
-    def tidy(self) -> Surface:
+    def tidy(self) -> MeshSurface:
         """With equal vertices made one, and without what is of no face or spans no triangle."""
         rows, faces = _used(self.vertices, self.faces)
         # Adding zero makes 0 of -0.
@@ -61,7 +63,7 @@ class Surface:
         a, b, c = faces.T
         kept = (a != b) & (b != c) & (c != a)
         vertices, faces = _used(rows[order][first], faces[kept])
-        return Surface(vertices, faces, None if self.colours is None else self.colours[kept])
+        return MeshSurface(vertices, faces, None if self.colours is None else self.colours[kept])
 
 
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
@@ -72,14 +74,14 @@ def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class MeshReading:
     """What a reader found: the surface in the file's own units and axes.
 
     left_out: in words what was not read. unit: metres a unit of the file, if it tells. up: its axis
     that points up, y or z, if it tells.
     """
 
-    surface: Surface
+    surface: MeshSurface
     left_out: tuple[str, ...] = ()
     unit: float | None = None
     up: str | None = None
@@ -91,23 +93,23 @@ class MeshBuilder:
     def __init__(self, name: str) -> None:
         """`name` says in errors which file it is."""
         self._name = name
-        self._parts: list[Surface] = []
+        self._parts: list[MeshSurface] = []
         self._triangles = 0
 
-    def add(self, part: Surface) -> None:
+    def add(self, part: MeshSurface) -> None:
         """Raises InputError for more triangles than may be, and for places that are not finite."""
         self._triangles += len(part.faces)
         check_triangles(self._triangles, self._name)
         check_finite(part.vertices, self._name)
         self._parts.append(part)
 
-    def surface(self) -> Surface:
+    def surface(self) -> MeshSurface:
         """All of them; in colour if one of them is."""
         coloured = any(part.colours is not None for part in self._parts)
         offsets = np.cumsum([0, *(len(part.vertices) for part in self._parts)])
         paint = [value / 255.0 for value in GREY]
         parts = [part.painted(paint if coloured else None) for part in self._parts]
-        return Surface(
+        return MeshSurface(
             np.concatenate([np.zeros((0, 3)), *(part.vertices for part in parts)]),
             np.concatenate(
                 [np.zeros((0, 3), dtype=np.int64)]
@@ -136,7 +138,7 @@ def of_polygons(
     colours: Colours | None = None,
     corner_colours: FloatArray | None = None,
     vertex_colours: FloatArray | None = None,
-) -> Surface:
+) -> MeshSurface:
     """The surface of polygons, concave ones too.
 
     Args:
@@ -166,7 +168,7 @@ def of_polygons(
         colours = as_bytes(corner_colours[triangles].mean(axis=1))
     elif colours is not None:
         colours = colours[polygon]
-    return Surface(vertices, corners[triangles], colours)
+    return MeshSurface(vertices, corners[triangles], colours)
 
 
 def doubles(values: npt.NDArray[Any]) -> FloatArray:

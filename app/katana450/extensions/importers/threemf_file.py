@@ -16,10 +16,10 @@ from trimesh.exchange.threemf import load_3MF
 from katana450.errors import InputError
 from katana450.extensions.importers.library_errors import failures_in_words
 from katana450.extensions.importers.surface import (
-    MOST_COPIES,
+    MAX_COPIES,
     MeshBuilder,
-    Reading,
-    Surface,
+    MeshReading,
+    MeshSurface,
     of_polygons,
 )
 
@@ -35,44 +35,45 @@ UNITS = {
 """[m] Units of the specification, and trimesh's word where a file tells none."""
 
 
-def read_3mf(data: bytes, name: str, most: int) -> Reading:
+def read_3mf(data: bytes, name: str, maximum: int) -> MeshReading:
     """Return the triangles of all items of the build. Raises InputError if there are none.
 
     most: [bytes] that the files of the archive have together.
     """
-    _check_archive(data, name, most)
-    pile = MeshBuilder(name)
+    _check_archive(data, name, maximum)
+    builder = MeshBuilder(name)
     with failures_in_words(name):
         found = load_3MF(io.BytesIO(data))  # type: ignore[no-untyped-call]
         surfaces = {key: _surface(mesh, name) for key, mesh in found["geometry"].items()}
         for number, item in enumerate(found["graph"]):
-            if number >= MOST_COPIES:
-                raise InputError(f"{name} shows more than {MOST_COPIES} objects.")
+            if number >= MAX_COPIES:
+                raise InputError(f"{name} shows more than {MAX_COPIES} objects.")
             if item["geometry"] in surfaces:
-                pile.add(surfaces[item["geometry"]].moved(np.asarray(item["matrix"])))
+                builder.add(surfaces[item["geometry"]].moved(np.asarray(item["matrix"])))
         unit = found["metadata"]["units"]
     if unit not in UNITS:
         raise InputError(f"{name} is broken: {str(unit)[:20]!r} is no unit of 3MF.")
-    return Reading(pile.surface(), _left_out(data), unit=UNITS[unit], up="z")
+    return MeshReading(builder.surface(), _left_out(data), unit=UNITS[unit], up="z")
 
 
-def _check_archive(data: bytes, name: str, most: int) -> None:
+def _check_archive(data: bytes, name: str, maximum: int) -> None:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             files = archive.infolist()
     except (zipfile.BadZipFile, zipfile.LargeZipFile, ValueError, OSError) as error:
         raise InputError(f"{name} is no 3MF file: it is no .zip that can be read.") from error
     # A .zip unpacks to no more than is declared here.
-    if len(files) > MAX_FILES or sum(file.file_size for file in files) > most:
+    if len(files) > MAX_FILES or sum(file.file_size for file in files) > maximum:
         raise InputError(
-            f"{name} holds more than {MAX_FILES} files, or more than {most // 1_000_000} MB when "
+            f"{name} holds more than {MAX_FILES} files, or more than {maximum // 1_000_000} MB "
+            f"when "
             "unpacked; save it coarser."
         )
     if all(MODEL not in file.filename.lower() for file in files):
         raise InputError(f"{name} is no 3MF file: there is no 3D/3dmodel.model in it.")
 
 
-def _surface(mesh: dict[str, Any], name: str) -> Surface:
+def _surface(mesh: dict[str, Any], name: str) -> MeshSurface:
     faces = np.asarray(mesh["faces"], dtype=np.int64).reshape(-1, 3)
     return of_polygons(mesh["vertices"], faces.ravel(), np.full(len(faces), 3), name)
 

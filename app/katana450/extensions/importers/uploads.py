@@ -13,9 +13,9 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.scene_file import LARGEST_ZIP, read_scene_zip
+from katana450.extensions.importers.scene_file import MAX_ZIP_BYTES, read_scene_zip
 from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
-from katana450.extensions.importers.shape_file import LONGEST_NAME, MOST_BYTES
+from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
@@ -30,16 +30,16 @@ from katana450.server.web.bodies import (
     as_json,
     body_of,
 )
-from katana450.server.web.places import Places
+from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.token_bucket import TokenBucket
 
-RATE, AT_ONCE = 0.5, 10.0
+RATE, UPLOAD_BURST = 0.5, 10.0
 """Files a second, and at once, of everybody together."""
 
 WAITING, WAITING_EACH = 4, 2
 """Files that are read or wait for it, of everybody together and of one identity."""
 
-PATIENCE = 60.0
+UPLOAD_TIMEOUT = 60.0
 """[s] Until a file is here and read, whoever sends it slowly."""
 
 NOT_ALLOWED = 403
@@ -51,15 +51,15 @@ class Uploads:
     """The routes. What comes is kept for a while, and used by a request that names its key."""
 
     def __init__(
-        self, hub: Hub, door: Authenticator, visitor: Callable[[Request], Identity]
+        self, hub: Hub, authenticator: Authenticator, identity: Callable[[Request], Identity]
     ) -> None:
         """``visitor``: who asks, or the HTTPException that turns them away."""
         self._hub = hub
-        self._door = door
-        self._visitor = visitor
-        self._often = TokenBucket(RATE, AT_ONCE, hub.clock())
+        self._authenticator = authenticator
+        self._identity = identity
+        self._often = TokenBucket(RATE, UPLOAD_BURST, hub.clock())
         self._reading = asyncio.Lock()
-        self._places = Places(WAITING, WAITING_EACH)
+        self._places = ConnectionLimit(WAITING, WAITING_EACH)
 
     def routes(self) -> list[BaseRoute]:
         """All of them."""
@@ -78,7 +78,7 @@ class Uploads:
         async def keep() -> answers.Answer:
             if len(name) > 4 * LONGEST_NAME:
                 raise InputError("The name of the file is too long.")
-            data = await body_of(request, MOST_BYTES, PATIENCE)
+            data = await body_of(request, MAX_FILE_BYTES, UPLOAD_TIMEOUT)
             mesh = await self._off(lambda: read_mesh(data, name, unit or None))
             return keep_mesh(self._hub, mesh)
 
@@ -87,8 +87,8 @@ class Uploads:
     async def _load(self, request: Request) -> Response:
         async def keep() -> answers.Answer:
             arm = self._hub.present()
-            data = await body_of(request, LARGEST_ZIP, PATIENCE)
-            hand = arm.surroundings.hand
+            data = await body_of(request, MAX_ZIP_BYTES, UPLOAD_TIMEOUT)
+            hand = arm.environment.hand
             T_palm_tool = None if hand is None else hand.T_palm_tool
             stored = await self._off(lambda: read_scene_zip(data, T_palm_tool))
             return keep_scene(self._hub, data, stored, arm)
@@ -96,7 +96,7 @@ class Uploads:
         return await self._answered(request, keep)
 
     async def _save(self, request: Request) -> Response:
-        self._visitor(request)
+        self._identity(request)
         try:
             arm = self._hub.present()
             content = await asyncio.to_thread(zipped, self._hub, arm)
@@ -109,17 +109,17 @@ class Uploads:
         self, request: Request, keep: Callable[[], Awaitable[answers.Answer]]
     ) -> Response:
         """What ``keep`` answers, for somebody who may drive, and not too often."""
-        if not self._visitor(request).role.may_drive:
+        if not self._identity(request).role.may_drive:
             raise HTTPException(NOT_ALLOWED, "You may watch, not bring anything.")
-        with self._places.taken(identity(self._door, request) or "") as free:
+        with self._places.taken(identity(self._authenticator, request) or "") as free:
             if not free or not self._often.take(self._hub.clock()):
                 why = "Too many files at once. Wait a moment."
                 return as_json(answers.Refused(why=why), TOO_MANY)
             try:
-                async with asyncio.timeout(PATIENCE):
+                async with asyncio.timeout(UPLOAD_TIMEOUT):
                     return as_json(await keep())
             except TimeoutError:
-                why = f"That took more than {PATIENCE:g} s."
+                why = f"That took more than {UPLOAD_TIMEOUT:g} s."
                 return as_json(answers.Refused(why=why), TOO_SLOW)
             except InputError as error:
                 return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)

@@ -15,7 +15,7 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node, Route, Value
 from katana450.extensions.export.vrml_text import HEADER, Reader
-from katana450.extensions.importers.surface import MOST_COPIES, MeshBuilder, Reading, Surface
+from katana450.extensions.importers.surface import MAX_COPIES, MeshBuilder, MeshReading, MeshSurface
 from katana450.extensions.importers.vrml_solids import (
     MAKERS,
     number,
@@ -24,7 +24,7 @@ from katana450.extensions.importers.vrml_solids import (
     surface_of,
     unit,
 )
-from katana450.extensions.importers.vrml_standard import SILENT, STANDARD
+from katana450.extensions.importers.vrml_standard import IGNORED_NODES, STANDARD
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -35,14 +35,14 @@ CLOSERS = {"{": "}", "[": "]"}
 TEXTURES = ("ImageTexture", "PixelTexture", "MovieTexture")
 
 
-def read_wrl(data: bytes, name: str, most: int) -> Reading:
+def read_wrl(data: bytes, name: str, maximum: int) -> MeshReading:
     """Everything that is shown at first, in the world's frame: y up.
 
     `most` [bytes] bounds what a compressed file becomes. Raises InputError, with the line, for what
     is no VRML97.
     """
     if data.startswith(GZIP):
-        data = _unpacked(data, name, most)
+        data = _unpacked(data, name, maximum)
     text = data.decode("utf-8", "replace").removeprefix("\ufeff")
     if re.match("#VRML V1.0", text):
         raise InputError(
@@ -55,14 +55,14 @@ def read_wrl(data: bytes, name: str, most: int) -> Reading:
     return _Flattening(name, reader.left_out).reading(world.nodes)
 
 
-def _unpacked(data: bytes, name: str, most: int) -> bytes:
+def _unpacked(data: bytes, name: str, maximum: int) -> bytes:
     unpacker = zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
     try:
-        found = unpacker.decompress(data, most + 1)
+        found = unpacker.decompress(data, maximum + 1)
     except zlib.error as error:
         raise InputError(f"{name} is broken: {error}.") from error
-    if len(found) > most:
-        raise InputError(f"{name} holds more than {most // 1_000_000} MB when unpacked.")
+    if len(found) > maximum:
+        raise InputError(f"{name} holds more than {maximum // 1_000_000} MB when unpacked.")
     if not unpacker.eof:
         raise InputError(f"{name} is broken: it ends too early.")
     return found
@@ -134,25 +134,25 @@ class _Flattening:
     def __init__(self, name: str, left_out: Counter[str]) -> None:
         self._name, self._left_out = name, left_out
         self._pile = MeshBuilder(name)
-        self._surfaces: dict[int, Surface | None] = {}
+        self._surfaces: dict[int, MeshSurface | None] = {}
         self._visits = 0
 
-    def reading(self, nodes: tuple[Node, ...]) -> Reading:
+    def reading(self, nodes: tuple[Node, ...]) -> MeshReading:
         """Of all nodes of a file."""
         # By hand and not by recursion: nodes that use others can be deeper than their text is.
         waiting = [(node, np.eye(4)) for node in reversed(nodes)]
         while waiting:
             node, T = waiting.pop()
             self._visits += 1
-            if self._visits > MOST_COPIES:
+            if self._visits > MAX_COPIES:
                 raise InputError(
-                    f"{self._name} shows more than {MOST_COPIES} nodes, each counted as often as "
+                    f"{self._name} shows more than {MAX_COPIES} nodes, each counted as often as "
                     "it is used."
                 )
             if node.kind == "Shape":
                 self._shape(node, T)
             waiting += [(child, T_child) for child, T_child in reversed(self._shown(node, T))]
-        return Reading(self._pile.surface(), tuple(self._left_out))
+        return MeshReading(self._pile.surface(), tuple(self._left_out))
 
     def _shown(self, node: Node, T: FloatArray) -> list[tuple[Node, FloatArray]]:
         """What stands in a node, and where."""
@@ -173,7 +173,7 @@ class _Flattening:
                 self._left_out["other files that it shows"] += 1
             case "Shape":
                 pass
-            case kind if kind not in SILENT and kind not in MAKERS and kind not in TEXTURES:
+            case kind if kind not in IGNORED_NODES and kind not in MAKERS and kind not in TEXTURES:
                 self._left_out[kind] += 1
         return []
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node
-from katana450.extensions.importers.surface import Surface, check_triangles, of_polygons
+from katana450.extensions.importers.surface import MeshSurface, check_triangles, of_polygons
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
@@ -20,7 +20,7 @@ ROUND = 32
 """Sides of what is round."""
 
 
-def surface_of(node: Node, name: str) -> Surface | None:
+def surface_of(node: Node, name: str) -> MeshSurface | None:
     """Of a geometry node; None where it has none, as of lines.
 
     `name` is the file's. Raises InputError for a node that contradicts itself.
@@ -60,7 +60,7 @@ def _positive(node: Node, name: str, **fields: float) -> list[float]:
     return values
 
 
-def _box(node: Node, name: str) -> Surface:
+def _box(node: Node, name: str) -> MeshSurface:
     half = numbers(node, "size", (2.0, 2.0, 2.0))[:, 0] / 2.0
     if half.min() <= 0.0:
         raise InputError(f"{name} has a Box of no size.")
@@ -69,19 +69,19 @@ def _box(node: Node, name: str) -> Surface:
     return of_polygons(signs * half, np.array(sides), np.full(6, 4), name)
 
 
-def _cone(node: Node, name: str) -> Surface:
+def _cone(node: Node, name: str) -> MeshSurface:
     radius, height = _positive(node, name, bottomRadius=1.0, height=2.0)
     ring = [(radius, -height / 2.0), (0.0, height / 2.0)]
     return _turned(ring, flag(node, "bottom"), flag(node, "side"), False, name)
 
 
-def _cylinder(node: Node, name: str) -> Surface:
+def _cylinder(node: Node, name: str) -> MeshSurface:
     radius, height = _positive(node, name, radius=1.0, height=2.0)
     ring = [(radius, -height / 2.0), (radius, height / 2.0)]
     return _turned(ring, flag(node, "bottom"), flag(node, "side"), flag(node, "top"), name)
 
 
-def _sphere(node: Node, name: str) -> Surface:
+def _sphere(node: Node, name: str) -> MeshSurface:
     (radius,) = _positive(node, name, radius=1.0)
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, ROUND // 2 + 1)
     profile = np.column_stack((np.cos(angles), np.sin(angles))) * radius
@@ -95,7 +95,7 @@ def _turned(
     side: bool,
     top: bool,
     name: str,
-) -> Surface:
+) -> MeshSurface:
     """A profile (k, 2) of radius and y, from the bottom up, turned about y."""
     rows = np.asarray(profile, dtype=np.float64)
     turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
@@ -120,7 +120,7 @@ def _turned(
     return of_polygons(points, flat, np.array(sizes, dtype=np.int64), name)
 
 
-def _face_set(node: Node, name: str) -> Surface:
+def _face_set(node: Node, name: str) -> MeshSurface:
     coord, color = part(node, "coord"), part(node, "color")
     points = np.zeros((0, 3)) if coord is None else numbers(coord, "point", (), 3)
     index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
@@ -158,13 +158,13 @@ def _chosen(paint: FloatArray, places: IntArray, fits: bool, name: str) -> Float
     return np.column_stack((paint[places], np.ones(len(places))))
 
 
-def _facing(surface: Surface, turned: bool) -> Surface:
+def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
     if not turned:
         return surface
-    return Surface(surface.vertices, surface.faces[:, ::-1], surface.colours)
+    return MeshSurface(surface.vertices, surface.faces[:, ::-1], surface.colours)
 
 
-def _grid(node: Node, name: str) -> Surface:
+def _grid(node: Node, name: str) -> MeshSurface:
     columns, rows = (int(number(node, f"{axis}Dimension", 0.0)) for axis in "xz")
     height = numbers(node, "height", ())[:, 0]
     if min(columns, rows) < 0 or columns * rows != len(height):
@@ -189,7 +189,7 @@ def _grid(node: Node, name: str) -> Surface:
     return _facing(surface, not flag(node, "ccw"))
 
 
-def _extrusion(node: Node, name: str) -> Surface:
+def _extrusion(node: Node, name: str) -> MeshSurface:
     square = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
     section = numbers(node, "crossSection", square, 2)
     spine = numbers(node, "spine", (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), 3)
@@ -272,7 +272,7 @@ def unit(v: FloatArray) -> FloatArray:
     return np.asarray(v / np.linalg.norm(v))
 
 
-MAKERS: dict[str, Callable[[Node, str], Surface]] = {
+MAKERS: dict[str, Callable[[Node, str], MeshSurface]] = {
     "Box": _box,
     "Cone": _cone,
     "Cylinder": _cylinder,

@@ -116,7 +116,7 @@ STANDARD: Mapping[str, Mapping[str, Type]] = MappingProxyType(
 )
 """With the types of their fields, as far as a file can set them."""
 
-SILENT = frozenset(
+IGNORED_NODES = frozenset(
     [
         *("NULL", "WorldInfo", "NavigationInfo", "Viewpoint", "Background", "Fog"),
         *("DirectionalLight", "PointLight", "SpotLight", "Sound", "AudioClip", "FontStyle"),

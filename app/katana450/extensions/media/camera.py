@@ -28,12 +28,12 @@ class Camera:
     def __post_init__(self) -> None:
         eye = finite_array(self.position, (3,), "The position of the camera")
         to = finite_array(self.target, (3,), "The target of the camera") - eye
-        if math.hypot(to[0], to[1]) < STEEPEST * float(np.linalg.norm(to)) or not to.any():
+        if math.hypot(to[0], to[1]) < MIN_SLOPE_SINE * float(np.linalg.norm(to)) or not to.any():
             raise InputError("The camera would look straight up or down, or at itself.")
         if not 0.0 < self.fov < math.pi:
             raise InputError(f"The camera's field of view is {self.fov} rad; give 0 to pi.")
-        if not all(1 <= side <= LARGEST for side in self.size):
-            raise InputError(f"A picture has 1 to {LARGEST} pixels a side, not {self.size}.")
+        if not all(1 <= side <= MAX_PIXELS for side in self.size):
+            raise InputError(f"A picture has 1 to {MAX_PIXELS} pixels a side, not {self.size}.")
 
     @cached_property
     def frame(self) -> Floats:
@@ -44,7 +44,7 @@ class Camera:
 
     @property
     def pixel(self) -> float:
-        """What a pixel in the middle is across, as a share of the distance."""
+        """What a pixel in the middle is across, as a fraction of the distance."""
         return 2.0 * math.tan(0.5 * self.fov) / self.size[1]
 
     def directions(self, x: Floats, y: Floats) -> Floats:
@@ -55,7 +55,7 @@ class Camera:
         return unit(np.stack((across, up, np.ones_like(across)), axis=1) @ self.frame)
 
 
-STEEPEST = 1e-3
+MIN_SLOPE_SINE = 1e-3
 """Sine of the least angle from straight up or down."""
 
-LARGEST = 8192
+MAX_PIXELS = 8192

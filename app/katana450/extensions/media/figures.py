@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.arm import Arm
-from katana450.extensions.media.measures import Along
+from katana450.arm.control.arm import ArmModel
+from katana450.extensions.media.measures import PathTrace
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import tool_speed
@@ -50,7 +50,7 @@ PARTS = 200
 TIME = "time (s)"
 
 
-def path_figure(paths: Sequence[Along]) -> bytes:
+def path_figure(paths: Sequence[PathTrace]) -> bytes:
     """PNG: desired and traced path in 3D, and the error along it (as the paper's Fig. 7)."""
     plt = _plt()
     with plt.rc_context(STYLE):
@@ -60,12 +60,12 @@ def path_figure(paths: Sequence[Along]) -> bytes:
         worst = 1e3 * max(float(path.error.max()) for path in paths)
         power = math.floor(math.log10(worst)) if worst > 0.0 else 0
         for number, path in enumerate(paths):
-            wished, traced = 1e3 * path.desired, 1e3 * path.traced
+            desired, traced = 1e3 * path.desired, 1e3 * path.traced
             label = {"label": "desired"} if number == 0 else {}
-            space.plot(*wished.T, color=DESIRED, linewidth=4.0, alpha=0.7, **label)
+            space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, **label)
             label = {"label": "traced"} if number == 0 else {}
             space.plot(*traced.T, color=AXES[0], linewidth=1.1, **label)
-            space.scatter(*wished[0], color=INK, s=14)
+            space.scatter(*desired[0], color=INK, s=14)
         sigma, errors = largest(paths)
         errors = 1e3 * errors / 10.0**power
         panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
@@ -92,20 +92,20 @@ def path_figure(paths: Sequence[Along]) -> bytes:
         return _png(plt, figure)
 
 
-def largest(paths: Sequence[Along]) -> tuple[FloatArray, FloatArray]:
+def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
     """sigma (m,) in the middle of PARTS parts of every path, and the largest error there [m].
 
     Rounding errors jump from place to place: all of them on each other would be a block of colour.
     """
     edges = np.linspace(0.0, 1.0, PARTS + 1)
-    most = np.zeros(PARTS)
+    maximum = np.zeros(PARTS)
     for path in paths:
         part = np.minimum((PARTS * path.sigma).astype(int), PARTS - 1)
-        np.maximum.at(most, part, path.error)
-    return 0.5 * (edges[:-1] + edges[1:]), most
+        np.maximum.at(maximum, part, path.error)
+    return 0.5 * (edges[:-1] + edges[1:]), maximum
 
 
-def joints_figure(arm: Arm, trace: Trace) -> bytes:
+def joints_figure(arm: ArmModel, trace: Trace) -> bytes:
     """PNG: the joint variables over time (as the paper's Fig. 8)."""
     plt = _plt()
     with plt.rc_context(STYLE):
@@ -121,24 +121,26 @@ def joints_figure(arm: Arm, trace: Trace) -> bytes:
         return _png(plt, figure)
 
 
-def speeds_figure(arm: Arm, trace: Trace) -> bytes:
+def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
     """PNG: joint speeds as shares of their limits, and the speed of the tool."""
     plt = _plt()
     with plt.rc_context(STYLE):
         figure, (upper, lower) = plt.subplots(
             2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained", height_ratios=(3, 2)
         )
-        shares = 100.0 * trace.qd / arm.chain.speed
-        for axis in range(shares.shape[1]):
+        fractions = 100.0 * trace.qd / arm.chain.speed
+        for axis in range(fractions.shape[1]):
             colour = AXES[axis % len(AXES)]
-            upper.plot(trace.t, shares[:, axis], color=colour, linewidth=1.2, label=f"θ{axis + 1}")
+            upper.plot(
+                trace.t, fractions[:, axis], color=colour, linewidth=1.2, label=f"θ{axis + 1}"
+            )
         for limit in (-100.0, 100.0):
             upper.axhline(limit, color=ERROR, linewidth=0.8, linestyle=(0, (4, 3)))
         upper.set_ylim(-115.0, 115.0)
         upper.set_title("Joint speeds, of their limits")
         upper.set_ylabel("speed (% of limit)")
         above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
-        upper.legend(**above, ncols=shares.shape[1], fontsize=8.0)
+        upper.legend(**above, ncols=fractions.shape[1], fontsize=8.0)
         chains = [arm.chain_to(tool) for tool in trace.tools]
         rows = zip(chains, trace.q, trace.qd, strict=True)
         speeds = 1e3 * np.array([tool_speed(chain, q, qd) for chain, q, qd in rows])

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from katana450.extensions.media.hits import NOWHERE, Hits
 from katana450.extensions.media.scene import Floats, unit
-from katana450.extensions.media.sight import NOWHERE, Sight
 from katana450.extensions.media.tracer import Tracer
 
 TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
@@ -20,19 +20,19 @@ TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
 KEY_SIZE = 0.045
 """[rad] Radius of the key light as it is seen: how soft its shadows are."""
 
-REACH = 2.5
+MAX_SHADOW_LENGTH = 2.5
 """[m] No shadow is longer."""
 
-NEAR = 0.3
+SKY_RANGE = 0.3
 """[m] What is farther off hides no sky: the room is bright all round."""
 
-OFF = 2e-4
+RAY_OFFSET = 2e-4
 """[m] Off the surface that rays to the light start, so that it does not meet them itself."""
 
-LEAF = 2e-3
+PLANE_TOLERANCE = 2e-3
 """[m] By which two pixels may be off one plane and still be of one surface."""
 
-ALIKE = 0.9
+SAME_NORMAL_COSINE = 0.9
 """Cosine between normals of one surface."""
 
 
@@ -44,7 +44,7 @@ class Light(NamedTuple):
 
 
 def reaching(
-    sight: Sight, tracer: Tracer, towards: Floats, size: tuple[int, int], rays: int
+    hits: Hits, tracer: Tracer, towards: Floats, size: tuple[int, int], rays: int
 ) -> Light:
     """For each pixel of a picture of width and height ``size``, row by row.
 
@@ -53,25 +53,27 @@ def reaching(
     width, height = size
     rows, columns = np.divmod(np.arange(width * height), width)
     place = TILE[rows % 4, columns % 4]
-    seen = np.flatnonzero(sight.item != NOWHERE)
-    faces_key = np.einsum("ni,i->n", sight.flat[seen], towards) > 0.0
+    seen = np.flatnonzero(hits.item != NOWHERE)
+    faces_key = np.einsum("ni,i->n", hits.flat[seen], towards) > 0.0
     lit = seen[faces_key]
     key, sky = (np.zeros(width * height, dtype=np.float32) for _ in range(2))
     disc, dome = _disc(rays), _dome(rays)
-    side, upright = _across(sight.normals[seen])
+    side, upright = _across(hits.normals[seen])
     aside, above = _across(towards[None])
     for ray in range(rays):
         number = place + 16 * ray
         spot = disc[number[lit]]
         key[lit] += ~tracer.blocked(
-            _start(sight, lit), unit(towards + spot[:, :1] * aside + spot[:, 1:] * above), REACH
+            _start(hits, lit),
+            unit(towards + spot[:, :1] * aside + spot[:, 1:] * above),
+            MAX_SHADOW_LENGTH,
         )
         way = dome[number[seen]]
-        out = way[:, :1] * side + way[:, 1:2] * upright + way[:, 2:] * sight.normals[seen]
-        sky[seen] += ~tracer.blocked(_start(sight, seen), out.astype(np.float32), NEAR)
+        out = way[:, :1] * side + way[:, 1:2] * upright + way[:, 2:] * hits.normals[seen]
+        sky[seen] += ~tracer.blocked(_start(hits, seen), out.astype(np.float32), SKY_RANGE)
     found = np.stack((key, sky), axis=-1).reshape(height, width, 2) / np.float32(rays)
-    points = sight.points.reshape(height, width, 3)
-    normals = sight.normals.reshape(height, width, 3)
+    points = hits.points.reshape(height, width, 3)
+    normals = hits.normals.reshape(height, width, 3)
     for axis in (0, 1):
         found = _spread(found, points, normals, axis, 1)
     # The sky's shade has no edges, so it bears a wider mean.
@@ -81,8 +83,8 @@ def reaching(
     return Light(found[..., 0].ravel(), soft.ravel())
 
 
-def _start(sight: Sight, which: np.typing.NDArray[np.intp]) -> Floats:
-    return (sight.points[which] + OFF * sight.flat[which]).astype(np.float32)
+def _start(hits: Hits, which: np.typing.NDArray[np.intp]) -> Floats:
+    return (hits.points[which] + RAY_OFFSET * hits.flat[which]).astype(np.float32)
 
 
 def _spread(values: Floats, points: Floats, normals: Floats, axis: int, stride: int) -> Floats:
@@ -96,14 +98,14 @@ def _spread(values: Floats, points: Floats, normals: Floats, axis: int, stride: 
         here[axis], there[axis] = slice(None, -step), slice(step, None)
         one, other = tuple(here), tuple(there)
         apart = points[other] - points[one]
-        same = np.abs(np.einsum("hwi,hwi->hw", apart, normals[one])) < LEAF
-        same &= np.abs(np.einsum("hwi,hwi->hw", apart, normals[other])) < LEAF
-        same &= np.einsum("hwi,hwi->hw", normals[one], normals[other]) > ALIKE
-        share = weight * same.astype(np.float32)
-        total[one] += share[..., None] * values[other]
-        total[other] += share[..., None] * values[one]
-        weights[one] += share
-        weights[other] += share
+        same = np.abs(np.einsum("hwi,hwi->hw", apart, normals[one])) < PLANE_TOLERANCE
+        same &= np.abs(np.einsum("hwi,hwi->hw", apart, normals[other])) < PLANE_TOLERANCE
+        same &= np.einsum("hwi,hwi->hw", normals[one], normals[other]) > SAME_NORMAL_COSINE
+        fraction = weight * same.astype(np.float32)
+        total[one] += fraction[..., None] * values[other]
+        total[other] += fraction[..., None] * values[one]
+        weights[one] += fraction
+        weights[other] += fraction
     return total / weights[..., None]
 
 

@@ -6,19 +6,19 @@ import math
 
 import numpy as np
 
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.scene import Item, unit
 from katana450.maths.geometry.arrays import FloatArray
 
 SIDES = 8
 
-APART = 1e-5
+MIN_POINT_DISTANCE = 1e-5
 """[m] Points nearer to each other are one."""
 
 
 def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]) -> Item | None:
     """Along ``points`` (n, 3) [m] in the base frame; None where these are one. rgb: of 255."""
-    far = np.linalg.norm(np.diff(points, axis=0), axis=1) > APART
+    far = np.linalg.norm(np.diff(points, axis=0), axis=1) > MIN_POINT_DISTANCE
     points = points[np.concatenate(([True], far))]
     if len(points) < 2:
         return None
@@ -41,4 +41,6 @@ def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]
     faces = (quad + SIDES * np.arange(len(points) - 1)[:, None, None]).reshape(-1, 3)
     corners = (points[:, None] + radius * out).reshape(-1, 3)
     colour = rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0
-    return Item(name, Shape(Material(name, colour), corners, out.reshape(-1, 3), faces), np.eye(4))
+    return Item(
+        name, VisualMesh(Material(name, colour), corners, out.reshape(-1, 3), faces), np.eye(4)
+    )

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from katana450.arm.control.arm import Arm
-from katana450.extensions.programs.order import Go
+from katana450.arm.control.arm import ArmModel
+from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
@@ -23,18 +23,18 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import singular_values, tool_speed
-from katana450.maths.planning.curve import Tool
+from katana450.maths.planning.curve import ToolCoordinates
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.tool_path import ToolPath
 from katana450.maths.water.score import score
 
-PLACES = 2000
+PATH_SAMPLES = 2000
 """Of each path at which the kinematics are held against it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
+class PathTrace:
     """One path of the tool: sigma (N,), desired and traced points (N, 3) in {S} [m].
 
     turned: (N,) how far off pitch and roll are [rad].
@@ -78,11 +78,11 @@ class Bound:
         return f"{self.name} {is_now}; expected is {self.wanted}."
 
 
-def alongs(program: Program) -> tuple[Along, ...]:
+def alongs(program: Program) -> tuple[PathTrace, ...]:
     """The paths of the tool, repetitions once."""
-    found: dict[int, Along] = {}
+    found: dict[int, PathTrace] = {}
     for task in program.tasks:
-        if not isinstance(task.order, Go):
+        if not isinstance(task.order, FollowPlan):
             continue
         for segment in task.order.plan.segments:
             if isinstance(segment.path, ToolPath) and id(segment.path) not in found:
@@ -90,7 +90,7 @@ def alongs(program: Program) -> tuple[Along, ...]:
     return tuple(found.values())
 
 
-def measured(program: Program, arm: Arm, trace: Trace) -> dict[str, float | None]:
+def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, float | None]:
     """Each of MEASURES by its name; None where there is nothing to measure it on."""
     paths = alongs(program)
     errors = np.concatenate([path.error for path in paths]) if paths else np.empty(0)
@@ -108,24 +108,24 @@ def measured(program: Program, arm: Arm, trace: Trace) -> dict[str, float | None
     nearest = [
         task.order.plan.nearest.contact.distance
         for task in program.tasks
-        if isinstance(task.order, Go)
+        if isinstance(task.order, FollowPlan)
         and task.order.plan.nearest is not None
         # What is lifted touches the table before.
         and task.order.plan.nearest.contact.distance >= STOP
     ]
     return {
-        "max_position_error_mm": _most(1e3 * errors),
+        "max_position_error_mm": _maximum(1e3 * errors),
         "rms_position_error_mm": 1e3 * float(np.sqrt(np.mean(errors**2))) if paths else None,
-        "max_orientation_error_deg": _most(np.degrees(turned)),
-        "executed_position_error_mm": _most(1e3 * at_ticks),
-        "between_ticks_error_mm": _most(1e3 * between),
+        "max_orientation_error_deg": _maximum(np.degrees(turned)),
+        "executed_position_error_mm": _maximum(1e3 * at_ticks),
+        "between_ticks_error_mm": _maximum(1e3 * between),
         "path_length_mm": 1e3 * sum(_length(path.desired) for path in paths) if paths else None,
         "smallest_singular_value": min(singular),
         "margin_to_limits_deg": float(np.degrees(room.min())),
         "nearest_clearance_mm": 1e3 * min(nearest) if nearest else None,
         "greatest_speed_share": float((np.abs(trace.qd) / limits.speed).max()),
-        "greatest_acceleration_share": _share(trace, arm.limits.acceleration, 2),
-        "greatest_jerk_share": _share(trace, arm.limits.jerk, 3),
+        "greatest_acceleration_share": _fraction(trace, arm.limits.acceleration, 2),
+        "greatest_jerk_share": _fraction(trace, arm.limits.jerk, 3),
         "greatest_tool_speed_mm_s": 1e3 * max(speeds),
         "duration_s": float(trace.t[-1]),
         **_of_water(program, trace),
@@ -163,8 +163,8 @@ def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]
     )
 
 
-def _along(name: str, path: ToolPath) -> Along:
-    sigma = np.linspace(0.0, 1.0, PLACES + 1)
+def _along(name: str, path: ToolPath) -> PathTrace:
+    sigma = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
     tool = path.curve.at(Jet.variable(sigma))
     columns = [np.broadcast_to(jet.c0, sigma.shape) for jet in tool]
     desired = np.stack(columns[:3], axis=1)
@@ -175,12 +175,12 @@ def _along(name: str, path: ToolPath) -> Along:
         found = ToolTarget.at(path.chain, q)
         off = (found.pitch - columns[3][number], found.roll - columns[4][number])
         turned[number] = max(abs(math.remainder(each, math.tau)) for each in off)
-    return Along(name, sigma, desired, traced, turned)
+    return PathTrace(name, sigma, desired, traced, turned)
 
 
 def _path_at(program: Program, trace: Trace, tick: int) -> ToolPath | None:
     order, segment = program.tasks[int(trace.task[tick])].order, int(trace.segment[tick])
-    if segment < 0 or not isinstance(order, Go):
+    if segment < 0 or not isinstance(order, FollowPlan):
         return None
     path = order.plan.segments[segment].path
     return path if isinstance(path, ToolPath) else None
@@ -193,7 +193,7 @@ def _point(path: ToolPath, q: FloatArray) -> FloatArray:
 
 def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
     """Point (3,) [m] and unit tangent (3,) at ``sigma``; no tangent where the tool only turns."""
-    tool: Tool = path.curve.at(Jet.variable(sigma))
+    tool: ToolCoordinates = path.curve.at(Jet.variable(sigma))
     p, rate = (
         np.array([each.derivatives()[order] for each in tool[:3]], dtype=float) for order in (0, 1)
     )
@@ -201,10 +201,12 @@ def _curve(path: ToolPath, sigma: float) -> tuple[FloatArray, FloatArray]:
     return p, rate / length if length > 0.0 else rate
 
 
-def _share(trace: Trace, most: FloatArray, order: int) -> float:
+def _fraction(trace: Trace, maximum: FloatArray, order: int) -> float:
     """The greatest derivative of the setpoints of that order, of the most a joint has."""
     period = float(trace.t[-1]) / (len(trace.t) - 1)
-    return float((np.abs(np.diff(trace.q, order, axis=0)) / period**order / most).max(initial=0.0))
+    return float(
+        (np.abs(np.diff(trace.q, order, axis=0)) / period**order / maximum).max(initial=0.0)
+    )
 
 
 def _length(points: FloatArray) -> float:
@@ -227,5 +229,5 @@ def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
     }
 
 
-def _most(values: FloatArray) -> float | None:
+def _maximum(values: FloatArray) -> float | None:
     return float(values.max()) if values.size else None

@@ -21,17 +21,17 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.playback import Playback, chosen
 from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.film import check_filmable, write_film
 from katana450.extensions.media.picture import MOVING, STILL, Picture, picture
-from katana450.extensions.media.stage import Stage
+from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.media.tracer import check_traceable
 from katana450.extensions.progress import progress
-from katana450.server.view.cameras import look_from
+from katana450.server.view.cameras import camera_pose
 from katana450.server.viser_bridge.presets import FOV, Preset
 from katana450.server.viser_bridge.themes import THEMES, Theme
 from katana450.settings import Settings
@@ -60,7 +60,7 @@ def render(options: argparse.Namespace) -> int:
     shown = chosen(options.run, options.trajectory, options.pose, options.urdf)
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
-        stage = Stage(shown.robot, shown.session, load_props())
+        stage = RenderStage(shown.robot, shown.session, load_props())
         taken = shot.taken(stage, shown.robot, state, STILL)
         write_files({path: writer_of(taken.png)})
     else:
@@ -76,8 +76,8 @@ class _Shot(NamedTuple):
     size: tuple[int, int]
     theme: str
 
-    def taken(self, stage: Stage, robot: Robot, state: State, rays: int) -> Picture:
-        look = look_from(self.preset, robot.require_arm(), state)
+    def taken(self, stage: RenderStage, robot: Robot, state: State, rays: int) -> Picture:
+        look = camera_pose(self.preset, robot.require_arm(), state)
         camera = Camera(look.position, look.target, float(FOV), self.size)
         theme: Theme = THEMES[self.theme]
         return picture(stage.items(state), stage.water(state), camera, theme, rays)
@@ -108,7 +108,7 @@ def _bare(state: State) -> State:
 class _Studio(NamedTuple):
     shot: _Shot
     robot: Robot
-    stage: Stage
+    stage: RenderStage
 
 
 _studios: list[_Studio] = []
@@ -119,8 +119,8 @@ def _begin(shot: _Shot, urdf: Path, bare: bool) -> None:
     # Ctrl-C is for the process that writes the file.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     session: Session
-    robot, session, _ = described(replace(Settings(), bare=bare), urdf, None)
-    _studios.append(_Studio(shot, robot, Stage(robot, session, load_props())))
+    robot, session, _ = describe_robot(replace(Settings(), bare=bare), urdf, None)
+    _studios.append(_Studio(shot, robot, RenderStage(robot, session, load_props())))
 
 
 def _take(state: State) -> Pixels:

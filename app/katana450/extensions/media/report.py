@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.arm import Arm
+from katana450.arm.control.arm import ArmModel
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.media import figures
-from katana450.extensions.media.measures import Bound, alongs, bounds, measured
+from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
@@ -49,7 +49,7 @@ class Report:
 
     script: Script
     program: Program
-    arm: Arm
+    arm: ArmModel
     trace: Trace
     values: dict[str, float | None]
     bounds: tuple[Bound, ...]
@@ -60,13 +60,13 @@ class Report:
     def of(
         script: Script,
         program: Program,
-        arm: Arm,
+        arm: ArmModel,
         trace: Trace,
         facts: dict[str, Any],
         notes: tuple[str, ...] = (),
     ) -> Report:
         """With everything measured."""
-        values = measured(program, arm, trace)
+        values = measurements(program, arm, trace)
         return Report(script, program, arm, trace, values, bounds(script, values), facts, notes)
 
     @property
@@ -224,7 +224,7 @@ CAPTIONS = {
     "joints.png": ("Joint angles over time", "What the arm was told, a hundred times a second."),
     "speeds.png": (
         "Joint speeds against their limits, and speed of the tool",
-        "Above: each joint's speed as a share of its most; dashed: the limits. Below: the tool.",
+        "Above: each joint's speed as a fraction of its most; dashed: the limits. Below: the tool.",
     ),
 }
 """Of each figure what it shows, for who cannot see it and for who can."""

@@ -1,4 +1,4 @@
-"""Pictures of a run at the moments a paper would show: its Figs. 9 to 12 for a thing that is
+"""Pictures of a run at the moments a paper would show: its Figs. 9 to 12 for an object that is
 carried and poured, and for a path the arm on it with what it has traced."""
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.line import tube
 from katana450.extensions.media.picture import picture
 from katana450.extensions.media.scene import Item
-from katana450.extensions.media.stage import Stage
-from katana450.extensions.programs.order import Go
+from katana450.extensions.media.stage import RenderStage
+from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.simulation import Trace
@@ -24,7 +24,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
 from katana450.maths.planning.tool_path import ToolPath
-from katana450.server.view.traces import DESIRED, PLACES, coloured
+from katana450.server.view.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.server.viser_bridge.themes import LIGHT
 
 SIZE = 880, 550
@@ -40,7 +40,7 @@ ON_PATH = (0.88, -0.95, 0.66), (0.13, -0.02, 0.185)
 """[m] The same for a path before the arm."""
 
 CLOSING = ": close"
-"""How the task ends its name that takes a thing."""
+"""How the task ends its name that takes an object."""
 
 EMPTYING = 0.45
 """Of the time that the cup is turned over: by then it pours."""
@@ -84,7 +84,7 @@ def stage_pictures(
     trace: Trace,
 ) -> Mapping[str, bytes]:
     """PNG files by their names."""
-    stage = Stage(robot, session, props)
+    stage = RenderStage(robot, session, props)
     found: dict[str, bytes] = {}
     for name, tick in moments(program, trace).items():
         state, items = states[tick], stage.items(states[tick])
@@ -108,7 +108,7 @@ def _ticks(trace: Trace, task: int) -> list[int]:
 
 def _path(program: Program, trace: Trace, tick: int) -> ToolPath | None:
     order = program.tasks[int(trace.task[tick])].order
-    if not isinstance(order, Go):
+    if not isinstance(order, FollowPlan):
         return None
     path = order.plan.segments[int(trace.segment[tick])].path
     return path if isinstance(path, ToolPath) else None
@@ -123,11 +123,11 @@ def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item
     def seen(points: FloatArray) -> FloatArray:
         return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
-    whole = point_derivatives(path, np.linspace(0.0, 1.0, PLACES + 1))[0]
+    whole = point_derivatives(path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
     before = [each for each in range(tick + 1) if _is_on(program, trace, each, path)]
     traced = np.array([forward(path.chain, trace.sent[each])[:3, 3] for each in before])
-    wished = point_derivatives(path, trace.sigma[before])[0]
-    worst = np.linalg.norm(traced - wished, axis=1).max()
+    desired = point_derivatives(path, trace.sigma[before])[0]
+    worst = np.linalg.norm(traced - desired, axis=1).max()
     red, green, blue = coloured(np.array([worst]))[0].tolist()
     tubes = (
         tube("desired path", seen(whole), DESIRED_RADIUS, DESIRED),

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.hits import Hits
 from katana450.extensions.media.light import Light
 from katana450.extensions.media.scene import Floats, light_of
 from katana450.extensions.media.shading import Lamp, lamp
-from katana450.extensions.media.sight import Sight
 from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM
 from katana450.server.viser_bridge.themes import Theme
 
@@ -24,27 +24,27 @@ HEIGHT = FLOOR_AT
 CELLS = ((0.05, 0.6), (0.25, 1.0))
 """[m] Between the lines of the floor, and pixels that they are wide: the fine ones, the others."""
 
-FADES = 5.0
+FADE_DISTANCE = 5.0
 """[m] At which the floor has become background."""
 
 
 def background(theme: Theme, camera: Camera, y: Floats) -> Floats:
     """(n, 3) light behind everything, at heights ``y`` (n,) of the picture in pixels."""
-    share = np.clip(y / camera.size[1], 0.0, 1.0)[:, None]
+    fraction = np.clip(y / camera.size[1], 0.0, 1.0)[:, None]
     top, bottom = (np.array(c, dtype=np.float32) / 255.0 for c in (theme.sky, theme.floor))
-    return light_of(top + share * (bottom - top))
+    return light_of(top + fraction * (bottom - top))
 
 
-def floor(theme: Theme, camera: Camera, sight: Sight, light: Light, behind: Floats) -> Floats:
+def floor(theme: Theme, camera: Camera, hits: Hits, light: Light, behind: Floats) -> Floats:
     """(n, 3) light of points on the floor. behind: (n, 3) the background there."""
-    colour = np.tile(np.array(theme.floor, dtype=np.float32) / 255.0, (len(sight.points), 1))
+    colour = np.tile(np.array(theme.floor, dtype=np.float32) / 255.0, (len(hits.points), 1))
     for (apart, wide), line in zip(CELLS, (theme.cell, theme.section), strict=True):
-        share = _lines(camera, sight, apart, wide)[:, None]
-        colour += share * (np.array(line, dtype=np.float32) / 255.0 - colour)
+        fraction = _lines(camera, hits, apart, wide)[:, None]
+        colour += fraction * (np.array(line, dtype=np.float32) / 255.0 - colour)
     dark = (1.0 - theme.shadow * (1.0 - light.key)) * (1.0 - CORNERS * (1.0 - light.sky))
     shown = light_of(colour * dark[:, None])
-    east, north = (sight.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
-    left = np.clip(1.0 - np.hypot(east, north) / FADES, 0.0, 1.0)[:, None]
+    east, north = (hits.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
+    left = np.clip(1.0 - np.hypot(east, north) / FADE_DISTANCE, 0.0, 1.0)[:, None]
     return np.asarray(behind + left * (shown - behind), dtype=np.float32)
 
 
@@ -52,17 +52,17 @@ CORNERS = 0.45
 """How much darker the floor is where no sky reaches it."""
 
 
-def _lines(camera: Camera, sight: Sight, apart: float, wide: float) -> Floats:
+def _lines(camera: Camera, hits: Hits, apart: float, wide: float) -> Floats:
     """(n,) how much of each pixel lines ``apart`` [m] and ``wide`` [pixels] cover."""
     right, up, _ = camera.frame
-    step = camera.pixel * sight.distance
-    down = sight.directions[:, 2]
+    step = camera.pixel * hits.distance
+    down = hits.directions[:, 2]
     covered = np.zeros(len(down), dtype=np.float32)
     for axis in (0, 1):
         # How far the spot on the floor moves along the axis, to the next pixel aside and above.
-        slope = sight.directions[:, axis] / down
+        slope = hits.directions[:, axis] / down
         moved = step * np.hypot(right[axis] - slope * right[2], up[axis] - slope * up[2])
-        at = sight.points[:, axis] / apart
+        at = hits.points[:, axis] / apart
         off = np.abs(at - np.round(at)) * apart / moved
         line = np.clip(0.5 * wide + 0.5 - off, 0.0, min(wide, 1.0))
         # Lines nearer together than pixels are a tone.

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.maths.geometry.arrays import FloatArray
 
 Floats = npt.NDArray[np.float32]
@@ -19,15 +19,15 @@ Bools = npt.NDArray[np.bool_]
 
 
 class Item(NamedTuple):
-    """name: of the link or thing. T: (4, 4) of the frame of its shape in the base frame [m]."""
+    """name: of the link or object. T: (4, 4) of the frame of its shape in the base frame [m]."""
 
     name: str
-    shape: Shape
+    shape: VisualMesh
     T: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class RenderScene:
     """Every triangle.
 
     Attributes:
@@ -48,7 +48,7 @@ class Scene:
     rough: Floats
 
     @classmethod
-    def of(cls, items: Sequence[Item]) -> Scene:
+    def of(cls, items: Sequence[Item]) -> RenderScene:
         """All of ``items``."""
         shapes = [item.shape for item in items]
         starts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])

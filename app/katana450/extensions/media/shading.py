@@ -28,7 +28,7 @@ def lamp(position: tuple[float, float, float], rgb: tuple[int, int, int], power:
     return Lamp(unit(np.array(position)), power * light_of(np.array(rgb, dtype=np.float32) / 255.0))
 
 
-class Stuff(NamedTuple):
+class SurfaceMaterial(NamedTuple):
     """Of n points: colour (n, 3) of light, metallic and rough (n,), glTF's factors."""
 
     colour: Floats
@@ -53,15 +53,19 @@ BOXES = (
 
 
 def shaded(
-    stuff: Stuff, normals: Floats, directions: Floats, light: Light, lamps: tuple[Lamp, ...]
+    material: SurfaceMaterial,
+    normals: Floats,
+    directions: Floats,
+    light: Light,
+    lamps: tuple[Lamp, ...],
 ) -> Floats:
     """(n, 3) light. directions: (n, 3) of the rays that see it. The first lamp has shadows."""
     view = -directions
     facing = np.maximum(_dot(normals, view), 1e-3)
-    metal = stuff.metallic[:, None]
-    f0 = DIELECTRIC * (1.0 - metal) + stuff.colour * metal
-    flat = stuff.colour * (1.0 - metal)
-    alpha = np.maximum(stuff.rough, 0.05) ** 2
+    metal = material.metallic[:, None]
+    f0 = DIELECTRIC * (1.0 - metal) + material.colour * metal
+    flat = material.colour * (1.0 - metal)
+    alpha = np.maximum(material.rough, 0.05) ** 2
     total = np.zeros_like(normals)
     for number, each in enumerate(lamps):
         towards = np.maximum(normals @ each.towards, 0.0)
@@ -75,9 +79,9 @@ def shaded(
     sky, up = light.sky, 0.5 + 0.5 * normals[:, 2]
     dome = sky * (BOUNCED + (0.92 - BOUNCED) * up) + (1.0 - sky) * 0.5 * BOUNCED
     mirrored = np.asarray(2.0 * facing[:, None] * normals - view, dtype=np.float32)
-    seen = _room(mirrored, stuff.rough) * (0.25 + 0.75 * sky)
-    share, rest = _karis(stuff.rough, facing)
-    total += SKY * (flat * dome[:, None] + (f0 * share[:, None] + rest[:, None]) * seen[:, None])
+    seen = _room(mirrored, material.rough) * (0.25 + 0.75 * sky)
+    fraction, rest = _karis(material.rough, facing)
+    total += SKY * (flat * dome[:, None] + (f0 * fraction[:, None] + rest[:, None]) * seen[:, None])
     return total.astype(np.float32)
 
 
@@ -90,11 +94,11 @@ def _microfacets(half: Floats, facing: Floats, towards: Floats, alpha: Floats) -
     square = alpha * alpha
     spread = square / (half * half * (square - 1.0) + 1.0) ** 2
     hidden = (1.0 - alpha) * 2.0 * towards * facing + alpha * (towards + facing)
-    found = np.minimum(spread * 0.5 / np.maximum(hidden, 1e-3), BRIGHTEST)
+    found = np.minimum(spread * 0.5 / np.maximum(hidden, 1e-3), MAX_GLINT)
     return np.asarray(found, dtype=np.float32)
 
 
-BRIGHTEST = 6.0
+MAX_GLINT = 6.0
 """Of a glint: more would only make edges rough."""
 
 

@@ -8,31 +8,31 @@ from pathlib import Path
 
 import numpy as np
 
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Thing
-from katana450.arm.robot.conduit import Stretch
+from katana450.arm.robot.conduit import ConduitStretch
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, Shape, shapes_of
+from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item, smooth
-from katana450.extensions.media.water import veils_of
+from katana450.extensions.media.water import translucents_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.conduit import PITCH, poses, ring
-from katana450.server.view.things import COLOUR, form
+from katana450.server.view.scene_objects import COLOUR, form
 
 CONDUIT, TABLE = "conduit", "table"
-"""Names of their items; those of links and things are their own."""
+"""Names of their items; those of links and objects are their own."""
 
 
-class Stage:
+class RenderStage:
     """Shapes that are read once, and put where a state has them."""
 
     def __init__(self, robot: Robot, session: Session, props: Props) -> None:
-        """``session``: knows where things and water are."""
+        """``session``: knows where objects and water are."""
         self._robot, arm = robot, robot.require_arm()
         self._session = session
         self._links = {link.name: link.shapes for link in robot.links}
@@ -42,7 +42,7 @@ class Stage:
 
     def items(self, state: State) -> list[Item]:
         """All that hides what is behind it."""
-        return [*self.arm(state), *self.conduit(state), *self.around(state)]
+        return [*self.arm(state), *self.conduit(state), *self.surrounding_items(state)]
 
     def arm(self, state: State) -> list[Item]:
         """Its links."""
@@ -65,16 +65,16 @@ class Stage:
             for hung in self._hung
         ]
 
-    def around(self, state: State) -> list[Item]:
-        """The table, and the things."""
+    def surrounding_items(self, state: State) -> list[Item]:
+        """The table, and the objects."""
         x = state.x
         found = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
-        for thing in state.things:
-            if thing.look.hidden:
+        for scene_object in state.objects:
+            if scene_object.appearance.hidden:
                 continue
-            T = self._session.surroundings.pose(thing, x)
-            shapes = self._known.get(thing.name) or (_plain(thing),)
-            found += [Item(thing.name, shape, T) for shape in shapes]
+            T = self._session.environment.pose(scene_object, x)
+            shapes = self._known.get(scene_object.name) or (_plain(scene_object),)
+            found += [Item(scene_object.name, shape, T) for shape in shapes]
         return found
 
     def water(self, state: State) -> list[Translucent]:
@@ -82,7 +82,7 @@ class Stage:
         pouring = self._session.pouring
         if pouring is None or state.poured is None:
             return []
-        return veils_of(state.poured.water, pouring.around(state.things))
+        return translucents_of(state.poured.water, pouring.water_environment(state.objects))
 
     def _angles(self, state: State) -> Mapping[str, float]:
         return self._robot.joint_values(state.q, state.gripper)
@@ -95,7 +95,7 @@ class Stage:
 class _Hung:
     """A stretch of conduit: its rings, as the page has them."""
 
-    def __init__(self, stretch: Stretch) -> None:
+    def __init__(self, stretch: ConduitStretch) -> None:
         self.stretch = stretch
         self._vertices, self._faces = ring(stretch.radius)
         self._normals = smooth(self._vertices, self._faces)
@@ -105,15 +105,15 @@ class _Hung:
         """(A, count, 7) wxyz and position [m] of the rings."""
         return np.asarray(poses(self.stretch, round(self.stretch.length / PITCH)), dtype=float)
 
-    def bent(self, angle: float) -> Shape:
+    def bent(self, angle: float) -> VisualMesh:
         """With its joint at ``angle`` [rad], in the frame of the link it starts from."""
-        low, share = self.stretch.between(angle)
-        rings = self._poses[low] + share * (self._poses[low + 1] - self._poses[low])
+        low, fraction = self.stretch.between(angle)
+        rings = self._poses[low] + fraction * (self._poses[low + 1] - self._poses[low])
         R = np.array([so3.from_quaternion(pose) for pose in rings[:, :4]])
         vertices = np.einsum("rij,vj->rvi", R, self._vertices) + rings[:, None, 4:]
         normals = np.einsum("rij,vj->rvi", R, self._normals)
         faces = self._faces + len(self._vertices) * np.arange(len(rings))[:, None, None]
-        return Shape(
+        return VisualMesh(
             HOSE,
             frozen(vertices.reshape(-1, 3)),
             frozen(normals.reshape(-1, 3)),
@@ -124,13 +124,13 @@ class _Hung:
 HOSE = Material("rubber", (0.035, 0.035, 0.04), rough=0.6)
 
 
-def _in_file(path: Path) -> Sequence[Shape]:
+def _in_file(path: Path) -> Sequence[VisualMesh]:
     return tuple(shapes_of(Visual(frozen(np.eye(4)), frozen(np.ones(3)), path)))
 
 
-def _plain(thing: Thing) -> Shape:
-    red, green, blue = thing.look.colour or COLOUR
+def _plain(scene_object: SceneObject) -> VisualMesh:
+    red, green, blue = scene_object.appearance.colour or COLOUR
     colour = red / 255.0, green / 255.0, blue / 255.0
-    made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(thing), COLOUR)
+    made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(scene_object), COLOUR)
     (shape,) = shapes_of(made)
-    return Shape(Material("plain", colour), shape.vertices, shape.normals, shape.faces)
+    return VisualMesh(Material("plain", colour), shape.vertices, shape.normals, shape.faces)

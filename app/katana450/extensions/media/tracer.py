@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from katana450.errors import ConfigurationError
-from katana450.extensions.media.scene import Bools, Floats, Ints, Scene
+from katana450.extensions.media.scene import Bools, Floats, Ints, RenderScene
 
 NOTHING = -1
 """Number of the triangle of a ray that meets none."""
@@ -40,7 +40,7 @@ class Meeting(NamedTuple):
 class Tracer:
     """A scene made ready for rays."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: RenderScene) -> None:
         check_traceable()
         rtcore: Any = importlib.import_module("embreex.rtcore_scene")
         meshes: Any = importlib.import_module("embreex.mesh_construction")

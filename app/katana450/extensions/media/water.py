@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.arm.robot.surfaces import Material, Shape
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item, smooth
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.flow import Water, WaterFlow
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
 from katana450.maths.water.units import FEMTOLITRE
@@ -38,18 +38,20 @@ CUP, STREAM, BASIN, PUDDLE = (
 """Names of its items."""
 
 
-def veils_of(water: Water, around: WaterEnvironment) -> list[Translucent]:
+def translucents_of(water: Water, water_environment: WaterEnvironment) -> list[Translucent]:
     """All of it that can be seen."""
     found: list[Translucent] = []
-    basin, level = around.basin, around.basin.level(water.basin * FEMTOLITRE)
+    basin, level = water_environment.basin, water_environment.basin.level(water.basin * FEMTOLITRE)
     if water.cup >= WORTH_SHOWING:
-        up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, around.cup.floor))
-        corners = body(around.cup.inside, Flow(around).surface(water)) * INSET
+        up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, water_environment.cup.floor))
+        corners = (
+            body(water_environment.cup.inside, WaterFlow(water_environment).surface(water)) * INSET
+        )
         shape = _shape(corners, BODY_FACES)
         found.append(Translucent(Item(CUP, shape, water.T_base_cup @ up), IN_VESSEL))
     if water.parcels:
-        end = landing(water.parcels[0], around, level).age
-        corners = stream(water.parcels, around.cup.inside.radius, end)
+        end = landing(water.parcels[0], water_environment, level).age
+        corners = stream(water.parcels, water_environment.cup.inside.radius, end)
         found.append(Translucent(Item(STREAM, _shape(corners, STREAM_FACES), np.eye(4)), IN_AIR))
     if water.basin >= WORTH_SHOWING:
         level = max(level, CLEAR)
@@ -66,6 +68,6 @@ def veils_of(water: Water, around: WaterEnvironment) -> list[Translucent]:
     return found
 
 
-def _shape(corners: FloatArray, faces: Faces) -> Shape:
+def _shape(corners: FloatArray, faces: Faces) -> VisualMesh:
     whole = faces.astype(np.int64)
-    return Shape(WATER, corners, smooth(corners, whole), whole)
+    return VisualMesh(WATER, corners, smooth(corners, whole), whole)

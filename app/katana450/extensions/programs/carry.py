@@ -1,4 +1,4 @@
-"""How a hand comes up to a thing, and takes what it holds elsewhere."""
+"""How a hand comes up to an object, and takes what it holds elsewhere."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.extensions.programs.bench import Bench
+from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.curve import Curve, Linear, ToolArc, ToolLine
-from katana450.maths.planning.plan import JOINED
+from katana450.maths.planning.plan import JOIN_TOLERANCE
 
 APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
 """[m] From how far the open fingers come, and how far they draw back, the farthest first."""
@@ -26,12 +26,12 @@ def before(middle: FloatArray, pitch: float, back: float) -> ToolTarget:
     return ToolTarget(middle - back * along, pitch, 0.0)
 
 
-def carry(bench: Bench, to: ToolTarget, name: str) -> None:
+def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
     """To ``to``: up or down and round axis 1 as the tool is turned now, then out or in.
 
     So what is held upright stays so, unless ``to`` has it otherwise.
     """
-    at = bench.at
+    at = builder.at
     here = math.atan2(at.position[1], at.position[0])
     there = math.atan2(to.position[1], to.position[0])
     radius = math.hypot(at.position[0], at.position[1])
@@ -52,10 +52,10 @@ def carry(bench: Bench, to: ToolTarget, name: str) -> None:
     curves: list[Curve] = []
     if (raised.position != at.position).any():
         curves.append(ToolLine(at, raised))
-    if abs(there - here) > JOINED:
+    if abs(there - here) > JOIN_TOLERANCE:
         curves.append(turned)
     turns = abs(to.pitch - over.pitch), abs(to.roll - over.roll)
-    if max(float(np.abs(over.position - to.position).max()), *turns) > JOINED:
+    if max(float(np.abs(over.position - to.position).max()), *turns) > JOIN_TOLERANCE:
         curves.append(ToolLine(over, to))
     if curves:
-        bench.lead(curves, name)
+        builder.lead(curves, name)

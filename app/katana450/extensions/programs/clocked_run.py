@@ -9,9 +9,9 @@ from typing import NamedTuple
 from katana450.arm.control.session import Session
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import described
+from katana450.assembly.robot_session import describe_robot
 from katana450.errors import KatanaError
-from katana450.extensions.programs.bench import PlanContext
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import Script
@@ -29,29 +29,29 @@ class Planned(NamedTuple):
     session: Session
 
 
-def planned(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
+def plan_script(script: Script, urdf: Path, seed: int = 0, speed: float = 1.0) -> Planned:
     """Return ``script`` with everything planned for the arm of ``urdf``, at its ready posture.
 
     ``seed``: of the paths round obstacles. ``speed``: fraction of the script's own speed, up to 1.
     Raises ScriptError.
     """
     settings = replace(Settings(), bare=script.bare)
-    robot, session, _ = described(settings, urdf, None)
-    rig = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
+    robot, session, _ = describe_robot(settings, urdf, None)
+    plan_context = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
     start = session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
-    program = compiled(script, rig, start, speed)
+    program = compiled(script, plan_context, start, speed)
     return Planned(script, program, robot, session)
 
 
-def played(plan: Planned) -> Simulation:
+def run_by_clock(plan: Planned) -> Simulation:
     """Run ``plan`` to its end, with a progress bar. Raises KatanaError if it does not get there."""
     session = plan.session
     driver = SimulatedDriver(plan.robot.require_arm(), session.ready, gripper=0.0)
     simulation = Simulation(plan.program, session, driver, Settings().rate)
     done, total = 0, 1000
     ticks = progress(range(total), total, plan.script.name)
-    for share in simulation.ticks():
-        while done < int(share * total):
+    for fraction in simulation.ticks():
+        while done < int(fraction * total):
             done += 1
             next(ticks, None)
     for _ in ticks:

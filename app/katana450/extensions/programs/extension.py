@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.cli.serve_options import SHORTEST_SILENCE, heartbeat_timeout
+from katana450.cli.serve_options import MIN_SILENCE, heartbeat_timeout
 from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def add_serve_options(parser: ArgumentParser) -> None:
         default=OWNER_SILENCE,
         metavar="SECONDS",
         help="heartbeat timeout of a program's owner, after which the program ends "
-        f"({SHORTEST_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
+        f"({MIN_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
     )
     parser.add_argument(
         "--programs",

@@ -10,16 +10,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.programs.source import Problem, ScriptError, Value
+from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 T = TypeVar("T")
 D = TypeVar("D")
 
-FARTHEST = 2000.0
+MAX_COORDINATE = 2000.0
 """[mm] No coordinate is larger."""
 
-MOST_TURN = 3600.0
+MAX_ANGLE = 3600.0
 """[deg] Nor angle."""
 
 XYZ = ("x", "y", "z")
@@ -28,13 +28,13 @@ XYZ = ("x", "y", "z")
 class Fields:
     """The fields of one value. What is wrong is gathered, so that all of it is told at once."""
 
-    def __init__(self, value: Value, what: str) -> None:
+    def __init__(self, value: YamlValue, what: str) -> None:
         """``what``: how a person calls it, as in "a circle"."""
         self.value = value
         self.what = what
         self.problems: list[Problem] = []
         self._asked: list[str] = []
-        self._held: dict[str, Value] = {}
+        self._held: dict[str, YamlValue] = {}
         if value.kind != "mapping":
             raise value.wrong(f"{what.capitalize()} is names with values, not {value}.")
         for name, held in value.fields:
@@ -52,7 +52,7 @@ class Fields:
         self._asked.append(name)
         return name in self._held
 
-    def take(self, name: str, read: Callable[[Value], T], default: D) -> T | D:
+    def take(self, name: str, read: Callable[[YamlValue], T], default: D) -> T | D:
         """What ``read`` makes of the field, or the default where it is not given."""
         self._asked.append(name)
         if name not in self._held:
@@ -65,7 +65,7 @@ class Fields:
             self.problems += self._held[name].wrong(str(error)).problems
         return default
 
-    def need(self, name: str, read: Callable[[Value], T], instead: D) -> T | D:
+    def need(self, name: str, read: Callable[[YamlValue], T], instead: D) -> T | D:
         """The same of one that has to be there; ``instead`` goes on where it is not."""
         if name not in self._held:
             said = f"{self.what.capitalize()} needs {name!r}."
@@ -89,11 +89,11 @@ def or_known(name: str, known: Sequence[str]) -> str:
     return f"; it may have {', '.join(known)}." if known else "; it has nothing."
 
 
-def number(low: float, high: float, unit: str = "") -> Callable[[Value], float]:
+def number(low: float, high: float, unit: str = "") -> Callable[[YamlValue], float]:
     """Reads a finite number from ``low`` to ``high``."""
     of = f" {unit}" if unit else ""
 
-    def read(value: Value) -> float:
+    def read(value: YamlValue) -> float:
         found = value.number if value.kind in ("whole", "number") else _plain(value)
         if found is None or not math.isfinite(found):
             raise value.wrong(f"A number from {low:g} to {high:g}{of} goes here, not {value}.")
@@ -104,10 +104,10 @@ def number(low: float, high: float, unit: str = "") -> Callable[[Value], float]:
     return read
 
 
-def whole(low: int, high: int) -> Callable[[Value], int]:
+def whole(low: int, high: int) -> Callable[[YamlValue], int]:
     """Reads a whole number from ``low`` to ``high``."""
 
-    def read(value: Value) -> int:
+    def read(value: YamlValue) -> int:
         found = number(low, high)(value)
         if found != int(found):
             raise value.wrong(f"A whole number from {low} to {high} goes here, not {value}.")
@@ -116,17 +116,17 @@ def whole(low: int, high: int) -> Callable[[Value], int]:
     return read
 
 
-def text(value: Value) -> str:
+def text(value: YamlValue) -> str:
     """A text; a number is none."""
     if value.kind != "text" or not isinstance(value.held, str) or not value.held.strip():
         raise value.wrong(f"A text goes here, not {value}.")
     return value.held
 
 
-def choice(*names: str) -> Callable[[Value], str]:
+def choice(*names: str) -> Callable[[YamlValue], str]:
     """Reads one of ``names``."""
 
-    def read(value: Value) -> str:
+    def read(value: YamlValue) -> str:
         if value.held not in names:
             raise value.wrong(f"One of {', '.join(names)} goes here, not {value}.")
         return str(value.held)
@@ -134,22 +134,26 @@ def choice(*names: str) -> Callable[[Value], str]:
     return read
 
 
-def degrees(low: float = -MOST_TURN, high: float = MOST_TURN) -> Callable[[Value], float]:
+def degrees(low: float = -MAX_ANGLE, high: float = MAX_ANGLE) -> Callable[[YamlValue], float]:
     """Reads an angle that is given in degrees, as [rad]."""
     read = number(low, high, "deg")
     return lambda value: math.radians(read(value))
 
 
-def millimetres(low: float = -FARTHEST, high: float = FARTHEST) -> Callable[[Value], float]:
+def millimetres(
+    low: float = -MAX_COORDINATE, high: float = MAX_COORDINATE
+) -> Callable[[YamlValue], float]:
     """Reads a length that is given in mm, as [m]."""
     read = number(low, high, "mm")
     return lambda value: 1e-3 * read(value)
 
 
-def listed(read: Callable[[Value], T], low: int, high: int) -> Callable[[Value], tuple[T, ...]]:
+def listed(
+    read: Callable[[YamlValue], T], low: int, high: int
+) -> Callable[[YamlValue], tuple[T, ...]]:
     """Reads a list of ``low`` to ``high`` such values."""
 
-    def all_of(value: Value) -> tuple[T, ...]:
+    def all_of(value: YamlValue) -> tuple[T, ...]:
         if value.kind != "list":
             raise value.wrong(f"A list goes here, not {value}.")
         if not low <= len(value.items) <= high:
@@ -169,10 +173,12 @@ def listed(read: Callable[[Value], T], low: int, high: int) -> Callable[[Value],
     return all_of
 
 
-def vector(each: Callable[[Value], float], *, partly: bool = False) -> Callable[[Value], Any]:
+def vector(
+    each: Callable[[YamlValue], float], *, partly: bool = False
+) -> Callable[[YamlValue], Any]:
     """Reads {x, y, z} or [x, y, z]; (3,). ``partly``: what is not named is 0."""
 
-    def read(value: Value) -> FloatArray:
+    def read(value: YamlValue) -> FloatArray:
         if value.kind == "list":
             return frozen(listed(each, 3, 3)(value))
         fields = Fields(value, "a vector")
@@ -184,20 +190,20 @@ def vector(each: Callable[[Value], float], *, partly: bool = False) -> Callable[
     return read
 
 
-def direction(value: Value) -> FloatArray:
+def direction(value: YamlValue) -> FloatArray:
     """A unit vector (3,); x, y or z alone is that axis, with a sign where it points back."""
     if isinstance(value.held, str):
         sign, name = (-1.0, value.held[1:]) if value.held[:1] == "-" else (1.0, value.held)
         if name not in XYZ:
             raise value.wrong(f"A direction is x, y, z, -x, -y, -z or three numbers, not {value}.")
         return frozen(sign * np.eye(3)[XYZ.index(name)])
-    found: FloatArray = vector(number(-FARTHEST, FARTHEST), partly=True)(value)
+    found: FloatArray = vector(number(-MAX_COORDINATE, MAX_COORDINATE), partly=True)(value)
     length = math.hypot(*found)
     if length < 1e-9:
         raise value.wrong("A direction is not zero.")
     return frozen(found / length)
 
 
-def _plain(value: Value) -> float | None:
+def _plain(value: YamlValue) -> float | None:
     """Of what YAML takes for a text though people write it for a number, as 1e-3."""
     return value.number if value.kind == "text" else None

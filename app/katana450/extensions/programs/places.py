@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.bench import Place
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.setting import Setting
-from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.plan_builder import StepTarget
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 
@@ -18,7 +18,7 @@ ROOMIEST = "roomiest"
 """The pitch that leaves the joints the most room along an arc."""
 
 
-def place(value: Value, setting: Setting) -> Place:
+def place(value: YamlValue, setting: ScriptContext) -> StepTarget:
     """The name of a pose, {joints: [...]}, or {x, y, z, pitch, roll, branch}."""
     if value.kind == "text":
         if value.held not in setting.poses:
@@ -29,19 +29,19 @@ def place(value: Value, setting: Setting) -> Place:
     if fields.has("joints"):
         found = fields.take("joints", joints, None)
         fields.done()
-        return Place(joints=found)
+        return StepTarget(joints=found)
     position = np.array([fields.need(name, read.millimetres(), 0.0) for name in read.XYZ])
-    at = Place(None, position, *angles(fields), branch(fields), setting.in_base)
+    at = StepTarget(None, position, *angles(fields), branch(fields), setting.in_base)
     fields.done()
     return at
 
 
-def joints(value: Value) -> FloatArray:
+def joints(value: YamlValue) -> FloatArray:
     """Five angles (5,) [rad]."""
     return np.array(read.listed(read.degrees(-720.0, 720.0), 5, 5)(value))
 
 
-def pitch(value: Value) -> float | str | None:
+def pitch(value: YamlValue) -> float | str | None:
     """[rad], ROOMIEST, or None to keep it."""
     if value.number is not None:
         return read.degrees(-360.0, 360.0)(value)
@@ -51,7 +51,7 @@ def pitch(value: Value) -> float | str | None:
 
 def angles(fields: Fields) -> tuple[float | None, float | None]:
     """Pitch and roll [rad], None where they are not given."""
-    each: Callable[[Value], float | None] = read.degrees(-360.0, 360.0)
+    each: Callable[[YamlValue], float | None] = read.degrees(-360.0, 360.0)
     return fields.take("pitch", each, None), fields.take("roll", each, None)
 
 

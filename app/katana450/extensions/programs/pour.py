@@ -21,7 +21,7 @@ class PourDemo:
     def text(self) -> str:
         """The script."""
         puts = "".join(
-            f"  - put: {{thing: {name}, x: {spot[0]:g}, y: {spot[1]:g}}}\n"
+            f"  - put: {{object: {name}, x: {spot[0]:g}, y: {spot[1]:g}}}\n"
             for name, spot in (("cup", self.cup), ("basin", self.basin))
             if spot is not None
         )

@@ -7,13 +7,13 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import COMMAND, LARGEST, Request, RequestTraits
+from katana450.server.api.fields import COMMAND, MAX_REQUEST_BYTES, Request, RequestTraits
 
 SLOWEST_SPEED = 0.01
 """Smallest fraction of its own speed that a program can be run at."""
 
 
-class Order(Enum):
+class ProgramOrder(Enum):
     """What a program can be told."""
 
     RUN = "run"
@@ -28,15 +28,16 @@ class Order(Enum):
 class Program(Request, frozen=True, kw_only=True):
     """A part of a script, of docs/programs.md; after the last one it is planned.
 
-    All but the last say ``more``. ``speed``: share of the script's own. The state tells how far the
-    planning is, when it is done, or what is wrong with the script, line by line. The last plan is
+    All but the last say ``more``. ``speed``: fraction of the script's own. The state tells how far
+    the planning is, when it is done, or what is wrong with the script, line by line. The last plan
+    is
     kept: the same script is ready at once while posture, gripper, tool, scene and water are the
     same.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    text: Annotated[str, Meta(max_length=LARGEST)]
+    text: Annotated[str, Meta(max_length=MAX_REQUEST_BYTES)]
     more: bool = False
     speed: Annotated[float, Meta(ge=SLOWEST_SPEED, le=1.0)] = 1.0
 
@@ -53,4 +54,4 @@ class Steer(Request, frozen=True, kw_only=True):
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    order: Order
+    order: ProgramOrder

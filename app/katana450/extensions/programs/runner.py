@@ -8,7 +8,7 @@ from enum import Enum
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
-from katana450.extensions.programs.order import PATIENCE
+from katana450.extensions.programs.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.program import Program
 
 
@@ -35,7 +35,7 @@ class Run:
 
     t: float
     number: int = 0
-    begun: bool = False
+    started: bool = False
     waited: float = 0.0
     blocked: float = 0.0
     phase: Phase = Phase.RUNNING
@@ -51,7 +51,7 @@ class Progress:
     steps: int
     line: int
     name: str
-    share: float
+    fraction: float
     status: str
     why: str
 
@@ -72,12 +72,14 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
     if state.paused:
         return run, ()
     task = program.tasks[run.number]
-    if not run.begun:
-        return replace(run, begun=True, waited=0.0, blocked=0.0), task.order.commands(program.speed)
+    if not run.started:
+        return replace(run, started=True, waited=0.0, blocked=0.0), task.order.commands(
+            program.speed
+        )
     stands = state.blocked and state.motion.at_rest
     run = replace(run, waited=run.waited + dt, blocked=run.blocked + dt if stands else 0.0)
     try:
-        if run.blocked > PATIENCE:
+        if run.blocked > ACTION_TIMEOUT:
             raise InputError(f"The way stays blocked: {_met(state)} would meet.")
         done = task.order.done(state, run.waited)
     except InputError as error:
@@ -87,7 +89,7 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         return run, ()
     if run.number + 1 == len(program.tasks):
         return replace(run, phase=Phase.DONE), ()
-    after = replace(run, number=run.number + 1, begun=False)
+    after = replace(run, number=run.number + 1, started=False)
     if run.single and program.tasks[after.number].number != task.number:
         return replace(after, single=False), (cmd.Pause(),)
     return after, ()
@@ -119,12 +121,12 @@ def stepping(run: Run) -> tuple[Run, tuple[cmd.Command, ...]]:
 def progress(program: Program, run: Run, state: State) -> Progress:
     """How far it is."""
     task = program.tasks[run.number]
-    share = 1.0 if run.phase is Phase.DONE else 0.0
-    if run.begun and run.phase is Phase.RUNNING:
-        share = task.order.share(state, run.waited)
+    fraction = 1.0 if run.phase is Phase.DONE else 0.0
+    if run.started and run.phase is Phase.RUNNING:
+        fraction = task.order.fraction(state, run.waited)
     status = run.phase.value
     if run.phase is Phase.RUNNING and state.paused:
         status = "paused"
     elif run.phase is Phase.RUNNING and state.blocked:
         status = "blocked"
-    return Progress(task.number + 1, program.steps, task.line, task.name, share, status, run.why)
+    return Progress(task.number + 1, program.steps, task.line, task.name, fraction, status, run.why)

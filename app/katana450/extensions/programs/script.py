@@ -6,31 +6,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from katana450.arm.control.commands import LEAST_SPEED
+from katana450.arm.control.commands import MIN_SPEED
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.bench import Place
 from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.manner import Tool
 from katana450.extensions.programs.measures import MEASURES
 from katana450.extensions.programs.places import place
-from katana450.extensions.programs.setting import Setting
-from katana450.extensions.programs.source import Problem, ScriptError, Value
+from katana450.extensions.programs.plan_builder import StepTarget
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.settings_steps import Tool
+from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.extensions.programs.source import read as read_text
 from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.steps import STEPS
 
-MOST_STEPS = 1000
+MAX_STEPS = 1000
 """All repetitions counted."""
 
-MOST_TIMES = 1000
+MAX_REPETITIONS = 1000
 
-LONGEST_NAME = 40
+MAX_NAME_LENGTH = 40
 
 NOTHING: dict[str, tuple[float, float]] = {}
 """Is expected where a script does not say."""
 
 
-class Placed(NamedTuple):
+class LocatedStep(NamedTuple):
     """A step, and where it stands."""
 
     step: Step
@@ -42,7 +42,7 @@ class Placed(NamedTuple):
 class Script:
     """name, about: for people. bare: whether it is for an arm without its gripper.
 
-    speed: share of full speed. steps: in their order, all repetitions written out. expected: of
+    speed: fraction of full speed. steps: in their order, all repetitions written out. expected: of
     measures by name, the least and the most they may be.
     """
 
@@ -50,7 +50,7 @@ class Script:
     about: str
     bare: bool
     speed: float
-    steps: tuple[Placed, ...]
+    steps: tuple[LocatedStep, ...]
     expected: Mapping[str, tuple[float, float]]
 
 
@@ -61,14 +61,14 @@ def parse(text: str) -> Script:
     about = top.take("about", read.text, "")
     fitted = top.take("gripper", read.choice("fitted", "none"), "fitted")
     frame = top.take("frame", read.choice("shoulder", "base"), "shoulder")
-    speed = top.take("speed", read.number(LEAST_SPEED, 1.0), 1.0)
+    speed = top.take("speed", read.number(MIN_SPEED, 1.0), 1.0)
     in_base = frame == "base"
-    no_poses: dict[str, Place] = {}
+    no_poses: dict[str, StepTarget] = {}
     poses = top.take("poses", lambda value: _poses(value, in_base=in_base), no_poses)
-    setting = Setting(in_base, poses)
-    tool = top.take("tool", lambda value: Placed(Tool.read(value, setting), *_at(value)), None)
+    setting = ScriptContext(in_base, poses)
+    tool = top.take("tool", lambda value: LocatedStep(Tool.read(value, setting), *_at(value)), None)
     expected = top.take("expect", _expected, NOTHING)
-    steps: tuple[Placed, ...]
+    steps: tuple[LocatedStep, ...]
     steps = top.need("steps", lambda value: _steps(value, setting), ())
     top.done()
     if tool is not None:
@@ -76,16 +76,16 @@ def parse(text: str) -> Script:
     return Script(name, about, fitted == "none", speed, steps, expected)
 
 
-def _steps(value: Value, setting: Setting) -> tuple[Placed, ...]:
-    found: list[Placed] = []
+def _steps(value: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
+    found: list[LocatedStep] = []
     problems: list[Problem] = []
     for item in value.items if value.kind == "list" else ():
         try:
             found += _step(item, setting)
         except ScriptError as error:
             problems += error.problems
-        if len(found) > MOST_STEPS:
-            said = f"A script has at most {MOST_STEPS} steps, repetitions counted."
+        if len(found) > MAX_STEPS:
+            said = f"A script has at most {MAX_STEPS} steps, repetitions counted."
             problems += item.wrong(said).problems
             break
     if value.kind != "list" or not value.items:
@@ -96,9 +96,9 @@ def _steps(value: Value, setting: Setting) -> tuple[Placed, ...]:
     return tuple(found)
 
 
-def _step(item: Value, setting: Setting) -> tuple[Placed, ...]:
+def _step(item: YamlValue, setting: ScriptContext) -> tuple[LocatedStep, ...]:
     """One step, or what a `repeat` comes to."""
-    name, value = item, Value(item.line, item.column, None, "nothing")
+    name, value = item, YamlValue(item.line, item.column, None, "nothing")
     if item.kind == "mapping":
         if len(item.fields) != 1:
             names = ", ".join(str(name.held) for name, _ in item.fields)
@@ -108,36 +108,38 @@ def _step(item: Value, setting: Setting) -> tuple[Placed, ...]:
     if name.held not in known:
         raise name.wrong(f"There is no step {name}{read.or_known(str(name.held), known)}")
     if name.held != "repeat":
-        return (Placed(STEPS[str(name.held)].read(value, setting), *_at(name)),)
+        return (LocatedStep(STEPS[str(name.held)].read(value, setting), *_at(name)),)
     fields = Fields(value, "a repeat")
-    times = fields.need("times", read.whole(1, MOST_TIMES), 1)
+    times = fields.need("times", read.whole(1, MAX_REPETITIONS), 1)
     steps = fields.need("steps", lambda inner: _steps(inner, setting), ())
     fields.done()
-    if times * len(steps) > MOST_STEPS:
-        raise name.wrong(f"These are {times * len(steps)} steps; at most {MOST_STEPS} go.")
+    if times * len(steps) > MAX_STEPS:
+        raise name.wrong(f"These are {times * len(steps)} steps; at most {MAX_STEPS} go.")
     return steps * times
 
 
-def _poses(value: Value, *, in_base: bool) -> dict[str, Place]:
+def _poses(value: YamlValue, *, in_base: bool) -> dict[str, StepTarget]:
     """By their names; each may be named by those after it."""
     fields = Fields(value, "the poses")
-    found: dict[str, Place] = {}
+    found: dict[str, StepTarget] = {}
     for name in [str(key.held) for key, _ in value.fields]:
-        read_place = fields.take(name, lambda each: place(each, Setting(in_base, found)), None)
+        read_place = fields.take(
+            name, lambda each: place(each, ScriptContext(in_base, found)), None
+        )
         if read_place is not None:
             found[name] = read_place
     fields.done()
     return found
 
 
-def _expected(value: Value) -> dict[str, tuple[float, float]]:
+def _expected(value: YamlValue) -> dict[str, tuple[float, float]]:
     fields = Fields(value, "what is expected")
     found = {name: fields.take(name, _bounds, None) for name in MEASURES}
     fields.done()
     return {name: bounds for name, bounds in found.items() if bounds is not None}
 
 
-def _bounds(value: Value) -> tuple[float, float]:
+def _bounds(value: YamlValue) -> tuple[float, float]:
     fields = Fields(value, "a bound")
     any_number = read.number(-1e9, 1e9)
     bounds = (
@@ -148,12 +150,12 @@ def _bounds(value: Value) -> tuple[float, float]:
     return bounds
 
 
-def _name(value: Value) -> str:
+def _name(value: YamlValue) -> str:
     name = read.text(value)
-    if len(name) > LONGEST_NAME or not name.isprintable():
-        raise value.wrong(f"A name has at most {LONGEST_NAME} characters, all on one line.")
+    if len(name) > MAX_NAME_LENGTH or not name.isprintable():
+        raise value.wrong(f"A name has at most {MAX_NAME_LENGTH} characters, all on one line.")
     return name
 
 
-def _at(value: Value) -> tuple[int, int]:
+def _at(value: YamlValue) -> tuple[int, int]:
     return value.line, value.column

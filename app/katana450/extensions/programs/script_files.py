@@ -9,7 +9,7 @@ from pathlib import Path
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions import programs
-from katana450.extensions.programs.source import LARGEST
+from katana450.extensions.programs.source import MAX_BYTES
 
 LIBRARY = Path(programs.__file__).parent / "library"
 """Of those that come along."""
@@ -18,7 +18,7 @@ ENDING = ".yaml"
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
 
-MOST = 200
+MAX_SCRIPTS = 200
 """Scripts of one folder that are shown, by their names."""
 
 
@@ -41,7 +41,7 @@ class Scripts:
         """By their names; a person's own go before those of the library."""
         found = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}
         if self._folder is not None:
-            own = sorted(self._folder.glob(f"*{ENDING}"))[:MOST]
+            own = sorted(self._folder.glob(f"*{ENDING}"))[:MAX_SCRIPTS]
             found = {**{path.stem: path for path in own}, **found}
         return found
 
@@ -76,7 +76,7 @@ def text_of(path: Path) -> str:
     """The text of a script. Raises InputError for a file that holds none."""
     try:
         with path.open("rb") as file:
-            return file.read(LARGEST + 1).decode("utf-8")
+            return file.read(MAX_BYTES + 1).decode("utf-8")
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:

@@ -7,11 +7,11 @@ from typing import Self
 
 from katana450.arm.control import commands as cmd
 from katana450.errors import InputError
-from katana450.extensions.programs.bench import Bench
+from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.carry import APPROACHES, UP, before, carry
-from katana450.extensions.programs.order import Grip
-from katana450.extensions.programs.setting import Setting
-from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step, nothing
 from katana450.maths.planning.curve import ToolLine
 from katana450.maths.planning.plan import MARGIN
@@ -25,31 +25,31 @@ class SetDown:
     """Put what the hand holds back where it was taken, and draw back."""
 
     @classmethod
-    def read(cls, value: Value, setting: Setting) -> Self:  # noqa: ARG003
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         nothing(value, "set_down")
         return cls()
 
-    def lay(self, bench: Bench) -> None:
-        taken = bench.taken
-        if bench.state.grip is None or taken is None:
+    def build(self, builder: PlanBuilder) -> None:
+        taken = builder.taken
+        if builder.state.grip is None or taken is None:
             raise InputError("The hand holds nothing that it took in this program.")
         at = taken.at
-        above = replace(at, position=at.position * (1, 1, 0) + bench.at.position * UP)
-        carry(bench, above, "back")
+        above = replace(at, position=at.position * (1, 1, 0) + builder.at.position * UP)
+        carry(builder, above, "back")
         low = replace(at, position=at.position + SET_DOWN * UP)
-        bench.lead([ToolLine(above, low)], "set down")
-        opened = bench.rig.arm.gripper.upper
-        bench.note("let go", Grip(opened), bench.after(cmd.SetGripper(opened)))
+        builder.lead([ToolLine(above, low)], "set down")
+        opened = builder.plan_context.arm.gripper.upper
+        builder.note("let go", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
 
         def draw_back(away: float) -> None:
             end = before(low.position, low.pitch, away)
-            bench.lead([ToolLine(low, replace(end, roll=low.roll))], "draw back")
+            builder.lead([ToolLine(low, replace(end, roll=low.roll))], "draw back")
 
         try:
-            bench.first(APPROACHES, draw_back)
+            builder.first(APPROACHES, draw_back)
         except InputError as error:
             raise InputError(f"There is no room to draw back: {error}") from error
-        bench.taken = None
+        builder.taken = None
 
 
 STEPS: dict[str, type[Step]] = {"set_down": SetDown}

@@ -8,18 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.pouring import Poured
+from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.errors import InputError
 from katana450.extensions.programs import runner
-from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
-LONGEST = 24 * 3600.0
+MAX_DURATION = 24 * 3600.0
 """[s] No program goes on for longer."""
 
 
@@ -49,7 +49,7 @@ class Trace:
     segment: IntArray
     sigma: FloatArray
     tools: tuple[str, ...]
-    water: tuple[Poured | None, ...]
+    water: tuple[MotionWithWater | None, ...]
     margin: FloatArray
 
 
@@ -73,15 +73,15 @@ class Simulation:
         count = len(self._program.tasks)
         while self.run.phase is Phase.RUNNING:
             t = len(self._seen) * self._period
-            if t > LONGEST:
-                raise InputError(f"The program takes more than {LONGEST / 3600.0:g} hours.")
+            if t > MAX_DURATION:
+                raise InputError(f"The program takes more than {MAX_DURATION / 3600.0:g} hours.")
             self.run, commands = runner.step(self._program, self.run, state, state.t)
             state = self._session.step(state, commands, t)
             sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
             state = self._session.observe(state, sent.q, sent.gripper)
             self._seen.append((state, self.run.number))
-            share = runner.progress(self._program, self.run, state).share
-            yield min((self.run.number + share) / count, 1.0)
+            fraction = runner.progress(self._program, self.run, state).fraction
+            yield min((self.run.number + fraction) / count, 1.0)
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -112,10 +112,14 @@ class Simulation:
         pouring = self._session.pouring
         if pouring is None or state.poured is None:
             return math.inf
-        return pouring.margin_to_rim(state.poured, state.things)
+        return pouring.margin_to_rim(state.poured, state.objects)
 
     def _place(self, state: State, number: int) -> tuple[int, float]:
         following, order = state.following, self._program.tasks[number].order
-        if following is None or not isinstance(order, Go) or following.plan is not order.plan:
+        if (
+            following is None
+            or not isinstance(order, FollowPlan)
+            or following.plan is not order.plan
+        ):
             return -1, 0.0
         return following.number, following.segment.scaling.pace(following.local).sigma

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.aims import AT_START
+from katana450.arm.control.goals import START_TOLERANCE
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
-from katana450.arm.control.things import Thing
 from katana450.maths.geometry.arrays import FloatArray
 
 Scene = tuple[tuple[object, ...], ...]
-"""The shape and place of every thing; its looks do not matter to a plan."""
+"""The shape and place of every object; its looks do not matter to a plan."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class Situation:
         posture: (n,) the joints [rad].
         fingers: the finger joint, and where it grips; None with an empty hand [rad].
         tool: the tool frame.
-        scene: the things that stand around or are held.
+        scene: the objects that stand around or are held.
         water: in the cup [fl]; None where there is none.
     """
 
@@ -40,7 +40,7 @@ class Situation:
             state.setpoint,
             (state.gripper_setpoint, state.grip),
             state.tool,
-            tuple(map(_shape, state.things)),
+            tuple(map(_shape, state.objects)),
             None if state.poured is None else state.poured.water.cup,
         )
 
@@ -54,7 +54,7 @@ class Situation:
 
         The arm may stand as far from its posture as a plan may be begun.
         """
-        if float(np.abs(self.posture - now.posture).max()) > AT_START:
+        if float(np.abs(self.posture - now.posture).max()) > START_TOLERANCE:
             return "the arm has moved"
         if self.fingers != now.fingers:
             return "the gripper has moved"
@@ -65,10 +65,10 @@ class Situation:
         return "" if self.water == now.water else "the water has changed"
 
 
-def _shape(thing: Thing) -> tuple[object, ...]:
-    solid = None if thing.solid is None else thing.solid.key
-    T = thing.T.tobytes()
+def _shape(scene_object: SceneObject) -> tuple[object, ...]:
+    solid = None if scene_object.solid is None else scene_object.solid.key
+    T = scene_object.T.tobytes()
     return (
-        thing.name, thing.form, thing.size, thing.scale, solid, T,
-        thing.held, thing.fixed, thing.can_be_held,
+        scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, solid, T,
+        scene_object.held, scene_object.fixed, scene_object.can_be_held,
     )  # fmt: skip

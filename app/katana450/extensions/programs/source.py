@@ -13,13 +13,13 @@ import yaml
 
 from katana450.errors import InputError
 
-LARGEST = 64 * 1024
+MAX_BYTES = 64 * 1024
 """[bytes] Of a script."""
 
-DEEPEST = 12
+MAX_DEPTH = 12
 """Values within values."""
 
-MOST_VALUES = 10_000
+MAX_VALUES = 10_000
 
 NULL, TEXT = "tag:yaml.org,2002:null", "tag:yaml.org,2002:str"
 WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
@@ -31,10 +31,10 @@ class Problem:
 
     line: int
     column: int
-    said: str
+    text: str
 
     def __str__(self) -> str:
-        return f"line {self.line}, column {self.column}: {self.said}"
+        return f"line {self.line}, column {self.column}: {self.text}"
 
 
 class ScriptError(InputError):
@@ -46,7 +46,7 @@ class ScriptError(InputError):
 
 
 @dataclass(frozen=True)
-class Value:
+class YamlValue:
     """One of the text. held: a text, a list, or names with values; None for nothing.
 
     number: what a text that is a number says; None of any other.
@@ -54,18 +54,18 @@ class Value:
 
     line: int
     column: int
-    held: str | tuple[Value, ...] | tuple[tuple[Value, Value], ...] | None
+    held: str | tuple[YamlValue, ...] | tuple[tuple[YamlValue, YamlValue], ...] | None
     kind: str
     number: float | None = None
 
     @property
-    def items(self) -> tuple[Value, ...]:
+    def items(self) -> tuple[YamlValue, ...]:
         """Of a list."""
         assert self.kind == "list"
         return self.held  # type: ignore[return-value]
 
     @property
-    def fields(self) -> tuple[tuple[Value, Value], ...]:
+    def fields(self) -> tuple[tuple[YamlValue, YamlValue], ...]:
         """Of names with values."""
         assert self.kind == "mapping"
         return self.held  # type: ignore[return-value]
@@ -80,13 +80,13 @@ class Value:
         )
 
 
-def read(text: str, what: str = "script") -> Value:
+def read(text: str, what: str = "script") -> YamlValue:
     """The one value that `text` is. Raises ScriptError with its place for what it cannot be.
 
     ``what``: how a person calls it.
     """
-    if len(text.encode("utf-8", "replace")) > LARGEST:
-        raise ScriptError((Problem(1, 1, f"A {what} has at most {LARGEST // 1024} KB."),))
+    if len(text.encode("utf-8", "replace")) > MAX_BYTES:
+        raise ScriptError((Problem(1, 1, f"A {what} has at most {MAX_BYTES // 1024} KB."),))
     try:
         # Read event by event first: composing recurses, and takes anchors for values.
         _check_bounds(text, what)
@@ -118,10 +118,10 @@ def _check_bounds(text: str, what: str) -> None:
             said = "Anchors and aliases (& and *) are not understood; say it in full."
         elif getattr(event, "tag", None) is not None:
             said = f"Tags (!) are not understood: a {what} is plain data."
-        elif depth > DEEPEST:
-            said = f"This is more than {DEEPEST} levels deep."
-        elif count > MOST_VALUES:
-            said = f"A {what} holds at most {MOST_VALUES} values."
+        elif depth > MAX_DEPTH:
+            said = f"This is more than {MAX_DEPTH} levels deep."
+        elif count > MAX_VALUES:
+            said = f"A {what} holds at most {MAX_VALUES} values."
         if said:
             raise ScriptError((Problem(*_place(event.start_mark), said),))
 
@@ -130,17 +130,17 @@ def _place(mark: Any) -> tuple[int, int]:
     return mark.line + 1, mark.column + 1
 
 
-def _value(node: yaml.Node) -> Value:
+def _value(node: yaml.Node) -> YamlValue:
     line, column = _place(node.start_mark)
     if isinstance(node, yaml.MappingNode):
         fields = tuple((_value(key), _value(value)) for key, value in node.value)
-        return Value(line, column, fields, "mapping")
+        return YamlValue(line, column, fields, "mapping")
     if isinstance(node, yaml.SequenceNode):
-        return Value(line, column, tuple(_value(each) for each in node.value), "list")
+        return YamlValue(line, column, tuple(_value(each) for each in node.value), "list")
     if node.tag == NULL:
-        return Value(line, column, None, "nothing")
+        return YamlValue(line, column, None, "nothing")
     kind = {TEXT: "text", WHOLE: "whole", REAL: "number"}.get(node.tag, "other")
-    return Value(line, column, str(node.value), kind, _number(str(node.value)))
+    return YamlValue(line, column, str(node.value), kind, _number(str(node.value)))
 
 
 def _number(text: str) -> float | None:

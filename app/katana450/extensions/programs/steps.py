@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from katana450.extensions.programs import (
     grasp,
-    manner,
     moves,
     pouring,
     set_down,
+    settings_steps,
     table,
     tool_moves,
 )
@@ -19,7 +19,7 @@ from katana450.extensions.programs.step import Step
 STEPS: dict[str, type[Step]] = {
     **moves.STEPS,
     **tool_moves.STEPS,
-    **manner.STEPS,
+    **settings_steps.STEPS,
     **table.STEPS,
     **grasp.STEPS,
     **pouring.STEPS,

@@ -8,7 +8,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from katana450.extensions.programs.order import Go
+from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.program import Program
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.plan import Segment
@@ -29,7 +29,7 @@ class Timeline:
     @staticmethod
     def of(program: Program) -> Timeline:
         """The timeline of ``program``."""
-        plans = [task.order.plan for task in program.tasks if isinstance(task.order, Go)]
+        plans = [task.order.plan for task in program.tasks if isinstance(task.order, FollowPlan)]
         pieces = tuple((segment, plan.fingers) for plan in plans for segment in plan.segments)
         durations = (segment.scaling.duration for segment, _ in pieces)
         return Timeline(pieces, tuple(accumulate(durations, initial=0.0)))

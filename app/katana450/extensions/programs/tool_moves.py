@@ -10,11 +10,11 @@ import numpy as np
 
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
-from katana450.extensions.programs.bench import Bench, Place
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.moves import through
-from katana450.extensions.programs.setting import Setting
-from katana450.extensions.programs.source import Value
+from katana450.extensions.programs.plan_builder import PlanBuilder, StepTarget
+from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
@@ -23,7 +23,7 @@ from katana450.maths.planning.curve import Linear, ToolArc, ToolLine, ToolLines,
 from katana450.maths.planning.pitch import roomiest
 from katana450.maths.planning.tool_path import ToolPath
 
-LEVEL = 1e-6
+LEVEL_TOLERANCE = 1e-6
 """[1] A normal nearer to the vertical has a level circle."""
 
 
@@ -38,7 +38,7 @@ class Line:
     in_base: bool
 
     @classmethod
-    def read(cls, value: Value, setting: Setting) -> Self:
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
         fields = Fields(value, "a line")
         to = fields.take("to", read.vector(read.millimetres()), None)
         by = fields.take("by", read.vector(read.millimetres(), partly=True), None)
@@ -48,24 +48,26 @@ class Line:
         fields.done()
         return found
 
-    def lay(self, bench: Bench) -> None:
-        start = bench.at
-        end = bench.target_at(Place(None, self.to, self.pitch, self.roll, None, self.in_base))
+    def build(self, builder: PlanBuilder) -> None:
+        start = builder.at
+        end = builder.target_at(
+            StepTarget(None, self.to, self.pitch, self.roll, None, self.in_base)
+        )
         if self.by is not None:
-            way = bench.direction(self.by, in_base=self.in_base)
+            way = builder.direction(self.by, in_base=self.in_base)
             end = ToolTarget(start.position + way, end.pitch, end.roll)
-        bench.lead([ToolLine(start, end)], "line")
+        builder.lead([ToolLine(start, end)], "line")
 
 
 @dataclass(frozen=True)
 class Lines:
     """The tool on straight lines from place to place without a rest, their corners rounded."""
 
-    through: tuple[Place, ...]
+    through: tuple[StepTarget, ...]
     blend: float
 
     @classmethod
-    def read(cls, value: Value, setting: Setting) -> Self:
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
         fields = Fields(value, "lines")
         found = cls(*through(fields, setting))
         if any(each.joints is not None or each.branch is not None for each in found.through):
@@ -74,16 +76,16 @@ class Lines:
         fields.done()
         return found
 
-    def lay(self, bench: Bench) -> None:
-        vias = [bench.at]
+    def build(self, builder: PlanBuilder) -> None:
+        vias = [builder.at]
         for each in self.through:
-            vias.append(bench.target_at(each, vias[-1]))
+            vias.append(builder.target_at(each, vias[-1]))
         blend = np.full(len(vias) - 2, self.blend)
-        bench.lead([ToolLines(tuple(vias), blend)], "lines")
+        builder.lead([ToolLines(tuple(vias), blend)], "lines")
 
 
 @dataclass(frozen=True)
-class Turn:
+class ArcGeometry:
     """What arcs and circles have in common: the axis, and what the tool does meanwhile."""
 
     centre: FloatArray
@@ -93,7 +95,7 @@ class Turn:
     in_base: bool
 
     @classmethod
-    def read(cls, fields: Fields, axis: str, setting: Setting) -> Self:
+    def read(cls, fields: Fields, axis: str, setting: ScriptContext) -> Self:
         """``axis``: what it is called."""
         return cls(
             fields.need("centre", read.vector(read.millimetres()), np.zeros(3)),
@@ -103,69 +105,71 @@ class Turn:
             setting.in_base,
         )
 
-    def seen(self, bench: Bench) -> tuple[FloatArray, FloatArray]:
+    def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
         """Centre and axis (3,) in {S}."""
-        centre = bench.point(self.centre, in_base=self.in_base)
-        return centre, bench.direction(self.axis, in_base=self.in_base)
+        centre = builder.point(self.centre, in_base=self.in_base)
+        return centre, builder.direction(self.axis, in_base=self.in_base)
 
     def angles(self, now: ToolTarget) -> tuple[float, float]:
         """Pitch and roll [rad] that it says, or those of ``now``."""
         pitch = self.pitch if isinstance(self.pitch, float) else now.pitch
         return pitch, now.roll if self.roll is None else self.roll
 
-    def follow(self, bench: Bench, arc: ToolArc, name: str, branch: Branch | None = None) -> None:
+    def follow(
+        self, builder: PlanBuilder, arc: ToolArc, name: str, branch: Branch | None = None
+    ) -> None:
         """Go to where ``arc`` begins, if the arm is not there, and along it."""
 
         def path(tried: Branch) -> ToolPath:
-            found = roomiest(bench.chain, tried, arc) if self.pitch == places.ROOMIEST else arc
-            return ToolPath(bench.chain, found, tried, bench.q)
+            found = roomiest(builder.chain, tried, arc) if self.pitch == places.ROOMIEST else arc
+            return ToolPath(builder.chain, found, tried, builder.q)
 
-        way = bench.first(bench.branches(branch), path)
-        bench.move_to(way.start, f"{name}: to its start")
-        bench.follow([way], name)
+        way = builder.first(builder.branches(branch), path)
+        builder.move_to(way.start, f"{name}: to its start")
+        builder.follow([way], name)
 
 
 @dataclass(frozen=True)
 class Arc:
     """The tool round an axis from where it is, climbing along it or not."""
 
-    turn: Turn
+    turn: ArcGeometry
     angle: float
     climb: float
 
     @classmethod
-    def read(cls, value: Value, setting: Setting) -> Self:
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
         fields = Fields(value, "an arc")
         found = cls(
-            Turn.read(fields, "axis", setting),
+            ArcGeometry.read(fields, "axis", setting),
             fields.need("angle", read.degrees(), 1.0),
             fields.take("climb", read.millimetres(), 0.0),
         )
         fields.done()
         return found
 
-    def lay(self, bench: Bench) -> None:
-        start = bench.at
+    def build(self, builder: PlanBuilder) -> None:
+        start = builder.at
         pitch, roll = self.turn.angles(start)
         profiles = Linear(start.pitch, pitch), Linear(start.roll, roll)
-        arc = ToolArc(start.position, *self.turn.seen(bench), self.angle, *profiles, self.climb)
-        self.turn.follow(bench, arc, "arc")
+        arc = ToolArc(start.position, *self.turn.seen(builder), self.angle, *profiles, self.climb)
+        self.turn.follow(builder, arc, "arc")
 
 
 @dataclass(frozen=True)
 class Circle:
     """The tool round a circle, from its highest point; it is gone to first."""
 
-    turn: Turn
+    turn: ArcGeometry
     radius: float
     turns: float
     branch: Branch | None
 
     @classmethod
-    def read(cls, value: Value, setting: Setting) -> Self:
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
         fields = Fields(value, "a circle")
         found = cls(
-            Turn.read(fields, "normal", setting),
+            ArcGeometry.read(fields, "normal", setting),
             fields.need("radius", read.millimetres(0.1, 1000.0), 0.1),
             fields.take("turns", read.number(-20.0, 20.0), 1.0),
             places.branch(fields),
@@ -175,19 +179,19 @@ class Circle:
         fields.done()
         return found
 
-    def lay(self, bench: Bench) -> None:
-        centre, normal = self.turn.seen(bench)
-        up = bench.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
+    def build(self, builder: PlanBuilder) -> None:
+        centre, normal = self.turn.seen(builder)
+        up = builder.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
         out = up - (up @ normal) * normal
-        if math.hypot(*out) < LEVEL:
+        if math.hypot(*out) < LEVEL_TOLERANCE:
             # A level circle has no highest point: from the one farthest in front.
-            ahead = bench.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
+            ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = ahead - (ahead @ normal) * normal
         start = centre + self.radius / math.hypot(*out) * out
-        pitch, roll = self.turn.angles(bench.at)
+        pitch, roll = self.turn.angles(builder.at)
         profiles = Linear(pitch, pitch), Linear(roll, roll)
         arc = ToolArc(start, centre, normal, math.tau * self.turns, *profiles)
-        self.turn.follow(bench, arc, "circle", self.branch)
+        self.turn.follow(builder, arc, "circle", self.branch)
 
 
 @dataclass(frozen=True)
@@ -201,7 +205,7 @@ class Screw:
     in_base: bool
 
     @classmethod
-    def read(cls, value: Value, setting: Setting) -> Self:
+    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
         fields = Fields(value, "a screw")
         found = cls(
             fields.need("point", read.vector(read.millimetres()), np.zeros(3)),
@@ -215,12 +219,12 @@ class Screw:
         fields.done()
         return found
 
-    def lay(self, bench: Bench) -> None:
-        axis = bench.direction(self.axis, in_base=self.in_base)
+    def build(self, builder: PlanBuilder) -> None:
+        axis = builder.direction(self.axis, in_base=self.in_base)
         omega = self.angle * axis
-        v = np.cross(bench.point(self.point, in_base=self.in_base), omega) + self.climb * axis
-        branch = bench.branches(None)[0]
-        bench.lead([ToolScrew(bench.chain, branch, bench.q, np.append(omega, v))], "screw")
+        v = np.cross(builder.point(self.point, in_base=self.in_base), omega) + self.climb * axis
+        branch = builder.branches(None)[0]
+        builder.lead([ToolScrew(builder.chain, branch, builder.q, np.append(omega, v))], "screw")
 
 
 STEPS: dict[str, type[Step]] = {

@@ -11,12 +11,12 @@ _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 _COLORS = np.array([(52, 16, 90), (46, 79, 148), (22, 138, 134), (106, 192, 82), (250, 230, 60)])
 
 
-def share_colors(share: FloatArray) -> npt.NDArray[np.uint8]:
-    """(N, 3) red, green, blue for `share` (N,), from none to the greatest there is among them.
+def share_colors(fraction: FloatArray) -> npt.NDArray[np.uint8]:
+    """(N, 3) red, green, blue for `fraction` (N,), from none to the greatest there is among them.
 
     Five axes give a third of all orientations at best, so a scale up to 1 would show little.
     """
-    relative = share / share.max(initial=np.finfo(np.float64).tiny)
+    relative = fraction / fraction.max(initial=np.finfo(np.float64).tiny)
     channels = [np.interp(relative, _SHARES, channel) for channel in _COLORS.T]
     colors: npt.NDArray[np.uint8] = np.rint(np.stack(channels, axis=-1)).astype(np.uint8)
     return colors

@@ -13,7 +13,7 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 IntArray = npt.NDArray[np.int64]
 
-LEAST_VOXEL = 1e-3
+MIN_VOXEL = 1e-3
 """[m] No joint of the arm is known to less than this at the tool."""
 
 
@@ -37,10 +37,10 @@ class VoxelGrid:
         for a `size` that makes no grid, and for a table above all that can be reached.
         """
         middle = finite_array(center, (3,), "The centre of the grid")
-        if not LEAST_VOXEL <= size <= reach:
+        if not MIN_VOXEL <= size <= reach:
             raise InputError(
                 f"A voxel of {1e3 * size:g} mm makes no map; choose one from "
-                f"{1e3 * LEAST_VOXEL:g} to {1e3 * reach:.0f} mm."
+                f"{1e3 * MIN_VOXEL:g} to {1e3 * reach:.0f} mm."
             )
         top = float(middle[2]) + reach
         if not -math.inf < table < top:

@@ -17,10 +17,10 @@ from katana450.maths.geometry.arrays import FloatArray
 POSES = 65536
 """Poses worked on at a time: some 50 MB, and enough chunks for a progress bar and a cluster."""
 
-MOST_SAMPLES = 1_000_000
+MAX_MAP_SAMPLES = 1_000_000
 """Their poses take 170 MB."""
 
-MOST_SEED = 2**63 - 1
+MAX_SEED = 2**63 - 1
 """The file of the map keeps it in 64 bits."""
 
 
@@ -34,7 +34,7 @@ class ReachabilityMap:
     """
 
     points: FloatArray
-    share: FloatArray
+    fraction: FloatArray
     cloud: FloatArray
 
 
@@ -52,12 +52,12 @@ class Survey:
     seed: int
 
     def __post_init__(self) -> None:
-        for name, value, most in (
-            ("number of samples", self.samples, MOST_SAMPLES),
-            ("seed", self.seed, MOST_SEED),
+        for name, value, maximum in (
+            ("number of samples", self.samples, MAX_MAP_SAMPLES),
+            ("seed", self.seed, MAX_SEED),
         ):
-            if not 0 <= value <= most:
-                raise InputError(f"The {name} is {value}; give 0 to {most}.")
+            if not 0 <= value <= maximum:
+                raise InputError(f"The {name} is {value}; give 0 to {maximum}.")
         # Asked for now, because it may refuse.
         _ = self.grid
 
@@ -80,6 +80,6 @@ class Survey:
         reached = np.flatnonzero(found)
         return ReachabilityMap(
             points=self.grid.centers(reached),
-            share=found[reached] / self.reachability.orientations,
+            fraction=found[reached] / self.reachability.orientations,
             cloud=tool_cloud(self.reachability, self.samples, self.seed),
         )

@@ -1,7 +1,7 @@
-"""How freely the tool can be turned at a point: the share of orientations inside the limits.
+"""How freely the tool can be turned at a point: the fraction of orientations inside the limits.
 
 At a point off axis 1 a 5-axis arm is free to choose two angles of the tool: its pitch, by which the
-roll axis leans in the arm's plane through the point, and its roll about that axis. The share is
+roll axis leans in the arm's plane through the point, and its roll about that axis. The fraction is
 that of pitch and roll, each taken all round in equal steps, at which some posture holds the tool
 there with every joint inside its limits and elbow, wrist and tool point not below the table. Bodies
 are not looked at: links may cross each other or the table's edge.
@@ -32,7 +32,7 @@ from katana450.maths.kinematics.chain import Chain
 
 BoolArray = npt.NDArray[np.bool]
 
-MOST_STEPS = 720
+MAX_STEPS = 720
 """Half a degree, finer than the links of the arm are straight."""
 
 
@@ -54,8 +54,8 @@ class Reachability:
 
     def __post_init__(self) -> None:
         for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
-            if not 1 <= steps <= MOST_STEPS:
-                raise InputError(f"The number of {name} is {steps}; give 1 to {MOST_STEPS}.")
+            if not 1 <= steps <= MAX_STEPS:
+                raise InputError(f"The number of {name} is {steps}; give 1 to {MAX_STEPS}.")
         lean = float(np.linalg.norm(self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)))
         if lean > tolerances.MAPPED_ARM:
             raise RobotDescriptionError(

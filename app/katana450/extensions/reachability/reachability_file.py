@@ -42,7 +42,7 @@ class StoredMap:
     """
 
     points: FloatArray
-    share: FloatArray
+    fraction: FloatArray
     voxel: float
     robot: str
     tool: str
@@ -58,7 +58,7 @@ def write_npz(
         allow_pickle=False,
         format=np.array(FORMAT),
         points=found.points,
-        share=found.share,
+        fraction=found.fraction,
         cloud=found.cloud,
         voxel=np.array(survey.voxel),
         table=np.array(reachability.table),
@@ -85,7 +85,7 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
             arrays = np.load(file, allow_pickle=False)
             if str(arrays["format"]) != FORMAT:
                 raise ValueError(f"its format is {arrays['format']}, not {FORMAT}")
-            points, share = arrays["points"], arrays["share"]
+            points, fraction = arrays["points"], arrays["fraction"]
             voxel, robot, tool = (arrays[key].item() for key in ("voxel", "robot", "tool"))
     except OSError as error:
         raise InputError(f"{name} cannot be read: {error.strerror or error}.") from error
@@ -95,37 +95,37 @@ def load_map(path: str | os.PathLike[str]) -> StoredMap:
         raise InputError(f"'voxel' of {name} must be a number, 'robot' and 'tool' must be names.")
     if not 0.0 < voxel < math.inf:
         raise InputError(f"The voxels of {name} have an edge of {voxel} m, which is none.")
-    return StoredMap(*_checked(name, points, share), voxel, robot, tool)
+    return StoredMap(*_checked(name, points, fraction), voxel, robot, tool)
 
 
 def _checked(
-    name: Path, points: npt.NDArray[np.generic], share: npt.NDArray[np.generic]
+    name: Path, points: npt.NDArray[np.generic], fraction: npt.NDArray[np.generic]
 ) -> tuple[FloatArray, FloatArray]:
     count = len(points) if points.ndim else 0
     checked = finite_array(points, (count, 3), f"The array 'points' of {name}")
-    shares = finite_array(share, (count,), f"The array 'share' of {name}")
-    if not ((shares > 0.0) & (shares <= 1.0)).all():
-        raise InputError(f"The array 'share' of {name} must lie above 0 and up to 1.")
+    fractions = finite_array(fraction, (count,), f"The array 'fraction' of {name}")
+    if not ((fractions > 0.0) & (fractions <= 1.0)).all():
+        raise InputError(f"The array 'fraction' of {name} must lie above 0 and up to 1.")
     checked.setflags(write=False)
-    shares.setflags(write=False)
-    return checked, shares
+    fractions.setflags(write=False)
+    return checked, fractions
 
 
 def write_ply(file: BinaryIO, found: ReachabilityMap) -> None:
-    """The voxel centres as binary .ply: x, y, z [m], colour, and the share as a property."""
+    """The voxel centres as binary .ply: x, y, z [m], colour, and the fraction as a property."""
     header = (
         "ply\nformat binary_little_endian 1.0\n"
-        "comment Katana450 reachability: metres in the base frame, share of orientations\n"
+        "comment Katana450 reachability: metres in the base frame, fraction of orientations\n"
         f"element vertex {len(found.points)}\n"
         "property float x\nproperty float y\nproperty float z\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
         "property float share\nend_header\n"
     )
     vertices = np.empty(
-        len(found.points), dtype=[("xyz", "<f4", 3), ("color", "u1", 3), ("share", "<f4")]
+        len(found.points), dtype=[("xyz", "<f4", 3), ("color", "u1", 3), ("fraction", "<f4")]
     )
     vertices["xyz"] = found.points
-    vertices["color"] = share_colors(found.share)
-    vertices["share"] = found.share
+    vertices["color"] = share_colors(found.fraction)
+    vertices["fraction"] = found.fraction
     file.write(header.encode("ascii"))
     file.write(vertices.tobytes())

@@ -82,12 +82,12 @@ class ReachabilityCloud:
         self._stored = stored
         self._middle = middle
         self._node: viser.PointCloudHandle | None = None
-        self._colors = share_colors(stored.share)
+        self._colors = share_colors(stored.fraction)
 
     @property
     def legend(self) -> str:
         """What the colours mean, as HTML: a scale, and its ends in words."""
-        top = self._stored.share.max(initial=0.0)
+        top = self._stored.fraction.max(initial=0.0)
         stops = ", ".join(
             f"rgb({red}, {green}, {blue})"
             for red, green, blue in share_colors(np.linspace(0.0, 1.0, STOPS)).tolist()

@@ -14,7 +14,7 @@ from katana450.arm.robot.loader import load
 from katana450.atomic import Writer, check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
-from katana450.extensions.reachability.cluster import connected
+from katana450.extensions.reachability.cluster import connect_cluster
 from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
@@ -66,7 +66,7 @@ def _counts(survey: Survey, scheduler: str | None) -> list[IntArray]:
         if scheduler is None:
             arriving = ((number, survey.count(chunk)) for number, chunk in enumerate(chunks))
         else:
-            arriving = stack.enter_context(connected(scheduler)).counts(survey, chunks)
+            arriving = stack.enter_context(connect_cluster(scheduler)).counts(survey, chunks)
         found = dict(progress(arriving, len(chunks), "Mapping the workspace"))
     return [found[number] for number in range(len(chunks))]
 
@@ -80,12 +80,13 @@ def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:
     extent = ", ".join(
         f"{name} {a:.0f} … {b:.0f}" for name, a, b in zip("xyz", low, high, strict=True)
     )
-    best = found.points[int(np.argmax(found.share))]
+    best = found.points[int(np.argmax(found.fraction))]
     where = ", ".join(f"{1e3 * value:.0f}" for value in best)
     return (
         f"The tool {tool} reaches {len(found.points)} voxels of {1e3 * survey.voxel:g} mm, "
         f"{litres:.1f} litres above the table at {1e3 * reachability.table:g} mm:\n"
         f"{extent} mm in the base frame.\n"
-        f"Of {reachability.orientations} orientations {found.share.mean():.1%} on average, at most "
-        f"{found.share.max():.1%} at {where} mm."
+        f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, up "
+        f"to "
+        f"{found.fraction.max():.1%} at {where} mm."
     )

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from katana450.arm.control.solid import Look, Solid
-from katana450.arm.control.things import Form, Thing
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.solid import ObjectAppearance, Solid
 from katana450.errors import InputError
-from katana450.extensions.programs.source import Problem, ScriptError, Value
+from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -17,12 +17,12 @@ class Scene:
     """What stands around or is fixed to the hand, the water, and where the arm stood.
 
     Attributes:
-        things: with nothing held.
+        objects: with nothing held.
         water: in the cup [m^3]; None for no water anywhere.
         joints: (n,) [rad]; None where nobody says.
     """
 
-    things: tuple[Thing, ...]
+    objects: tuple[SceneObject, ...]
     water: float | None = None
     joints: FloatArray | None = None
 
@@ -42,26 +42,26 @@ class MeshFile:
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
-    """One thing of a text, whose mesh is still in its file. ``at``: where it is in the text."""
+class SceneEntry:
+    """One object of a text, whose mesh is still in its file. ``at``: where it is in the text."""
 
-    at: Value
+    at: YamlValue
     name: str
-    form: Form
+    shape: Shape
     size: tuple[float, ...]
     T: FloatArray
     can_be_held: bool
     mesh: MeshFile | None
     scale: float
-    look: Look
+    appearance: ObjectAppearance
     fixed: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class SceneDraft:
     """A text that is understood. Poses of what is fixed are in the frame of the tool."""
 
-    entries: tuple[Entry, ...]
+    entries: tuple[SceneEntry, ...]
     water: float | None
     joints: FloatArray | None
 
@@ -70,16 +70,16 @@ class Draft:
 
         Raises ScriptError with the places of all that cannot be.
         """
-        things: list[Thing] = []
+        objects: list[SceneObject] = []
         problems: list[Problem] = []
         for entry in self.entries:
             try:
                 if entry.fixed and T_palm_tool is None:
                     raise InputError("This arm's contacts are not looked at: it has no hand.")
-                things.append(
-                    Thing(
+                objects.append(
+                    SceneObject(
                         entry.name,
-                        entry.form,
+                        entry.shape,
                         entry.size,
                         T_palm_tool @ entry.T
                         if entry.fixed and T_palm_tool is not None
@@ -87,7 +87,7 @@ class Draft:
                         entry.can_be_held,
                         solid=None if entry.mesh is None else solids[entry.mesh],
                         scale=entry.scale,
-                        look=entry.look,
+                        appearance=entry.appearance,
                         fixed=entry.fixed,
                     )
                 )
@@ -95,4 +95,4 @@ class Draft:
                 problems += entry.at.wrong(str(error)).problems
         if problems:
             raise ScriptError(tuple(problems))
-        return Scene(tuple(things), self.water, self.joints)
+        return Scene(tuple(objects), self.water, self.joints)

@@ -8,12 +8,19 @@ from collections.abc import Mapping
 import numpy as np
 import yaml
 
-from katana450.arm.control.solid import FAINTEST, Colour, Look
-from katana450.arm.control.things import FARTHEST, LEAST_SCALE, MOST, MOST_SCALE, Form, Thing
+from katana450.arm.control.scene_objects import (
+    MAX_COORDINATE,
+    MAX_OBJECTS,
+    MAX_SCALE,
+    MIN_SCALE,
+    SceneObject,
+    Shape,
+)
+from katana450.arm.control.solid import MIN_OPACITY, Colour, ObjectAppearance
 from katana450.extensions.programs.fields import Fields, choice, listed, millimetres, number, text
 from katana450.extensions.programs.fields import degrees as read_degrees
-from katana450.extensions.programs.source import Problem, ScriptError, Value, read
-from katana450.extensions.scene.scene import Draft, Entry, MeshFile, Scene
+from katana450.extensions.programs.source import Problem, ScriptError, YamlValue, read
+from katana450.extensions.scene.scene import MeshFile, Scene, SceneDraft, SceneEntry
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import ML
@@ -33,11 +40,11 @@ UNITS = ("mm", "cm", "in", "m")
 
 COLOUR = re.compile(r"#[0-9a-f]{6}")
 
-LARGEST = 4000.0
+MAX_WRITTEN_SIZE = 4000.0
 """[mm] Of a size as it is written."""
 
 
-def parsed(source: str) -> Draft:
+def parsed(source: str) -> SceneDraft:
     """What a text says. Raises ScriptError with all that is wrong, line by line."""
     fields = Fields(read(source, "scene"), "a scene")
     version = fields.need("scene", number(1, 1000), VERSION)
@@ -45,10 +52,10 @@ def parsed(source: str) -> Draft:
         raise fields.value.wrong(f"A scene of version {VERSION} is understood, not {version:g}.")
     joints = fields.take("joints", listed(read_degrees(), 1, 16), None)
     water = fields.take("water", number(0.0, 10_000.0, "ml"), None)
-    entries = fields.take("things", listed(_entry, 0, MOST), ())
+    entries = fields.take("objects", listed(_entry, 0, MAX_OBJECTS), ())
     fields.problems += _twice(entries)
     fields.done()
-    return Draft(
+    return SceneDraft(
         entries,
         None if water is None else ML * water,
         None if joints is None else np.array(joints),
@@ -62,7 +69,7 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
         told["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
     if scene.water is not None:
         told["water"] = _round(scene.water / ML, LENGTH_DIGITS)
-    told["things"] = [_told(thing, files, T_palm_tool) for thing in scene.things]
+    told["objects"] = [_told(scene_object, files, T_palm_tool) for scene_object in scene.objects]
     said: str = yaml.dump(told, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
     return HEAD + said
 
@@ -82,33 +89,38 @@ _Dumper.add_representer(list, _Dumper.represent_list)
 
 
 def _told(
-    thing: Thing, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None
+    scene_object: SceneObject, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None
 ) -> dict[str, object]:
-    told: dict[str, object] = {"name": thing.name, "form": thing.form.value}
-    T = thing.T
-    if thing.fixed and T_palm_tool is not None:
+    told: dict[str, object] = {"name": scene_object.name, "shape": scene_object.shape.value}
+    T = scene_object.T
+    if scene_object.fixed and T_palm_tool is not None:
         T = se3.inverse(T_palm_tool) @ T
-    if thing.solid is None:
-        told["size"] = [_round(1e3 * each, LENGTH_DIGITS) for each in thing.size]
+    if scene_object.solid is None:
+        told["size"] = [_round(1e3 * each, LENGTH_DIGITS) for each in scene_object.size]
     else:
-        file = files[thing.solid.key]
+        file = files[scene_object.solid.key]
         said = {"file": file.path, "unit": file.unit, "up": file.up, "sha256": file.sha256}
         told["mesh"] = {name: each for name, each in said.items() if each is not None}
     told["pose"] = [
         *(_round(1e3 * each, LENGTH_DIGITS) for each in T[:3, 3]),
         *(_round(each, ANGLE_DIGITS) for each in np.degrees(so3.to_rpy(T[:3, :3]))),
     ]
-    scale, opacity = (float(f"{each:.12g}") for each in (thing.scale, thing.look.opacity))
+    scale, opacity = (
+        float(f"{each:.12g}") for each in (scene_object.scale, scene_object.appearance.opacity)
+    )
     if scale != 1.0:
         told["scale"] = scale
-    if thing.look.colour is not None:
-        told["colour"] = "#{:02x}{:02x}{:02x}".format(*thing.look.colour)
+    if scene_object.appearance.colour is not None:
+        told["colour"] = "#{:02x}{:02x}{:02x}".format(*scene_object.appearance.colour)
     if opacity != 1.0:
         told["opacity"] = opacity
-    for name, true in (("hidden", thing.look.hidden), ("can_be_held", thing.can_be_held)):
+    for name, true in (
+        ("hidden", scene_object.appearance.hidden),
+        ("can_be_held", scene_object.can_be_held),
+    ):
         if true:
             told[name] = True
-    if thing.fixed:
+    if scene_object.fixed:
         told["attach"] = "hand"
     return told
 
@@ -118,22 +130,22 @@ def _round(value: float, digits: int) -> int | float:
     return int(rounded) if rounded == int(rounded) else rounded
 
 
-def _entry(value: Value) -> Entry:
-    fields = Fields(value, "a thing")
-    told = fields.need("form", choice(*(each.value for each in Form)), "")
-    form = Form(told) if told else Form.BOX
+def _entry(value: YamlValue) -> SceneEntry:
+    fields = Fields(value, "an object")
+    told = fields.need("shape", choice(*(each.value for each in Shape)), "")
+    form = Shape(told) if told else Shape.BOX
     size: tuple[float, ...] = ()
     mesh = None
     if not told:
         # Which of the two it should have nobody knows.
         fields.has("size")
         fields.has("mesh")
-    elif form is Form.MESH:
+    elif form is Shape.MESH:
         mesh = fields.need("mesh", _mesh, None)
     else:
         count = form.numbers
-        size = fields.need("size", listed(millimetres(0.0, LARGEST), count, count), ())
-    found = Entry(
+        size = fields.need("size", listed(millimetres(0.0, MAX_WRITTEN_SIZE), count, count), ())
+    found = SceneEntry(
         value,
         fields.need("name", text, ""),
         form,
@@ -141,10 +153,10 @@ def _entry(value: Value) -> Entry:
         fields.need("pose", _pose, np.eye(4)),
         fields.take("can_be_held", _true, False),
         mesh,
-        fields.take("scale", number(LEAST_SCALE, MOST_SCALE), 1.0),
-        Look(
+        fields.take("scale", number(MIN_SCALE, MAX_SCALE), 1.0),
+        ObjectAppearance(
             fields.take("colour", _colour, None),
-            fields.take("opacity", number(FAINTEST, 1.0), 1.0),
+            fields.take("opacity", number(MIN_OPACITY, 1.0), 1.0),
             fields.take("hidden", _true, False),
         ),
         fields.take("attach", choice("hand", "world"), "world") == "hand",
@@ -153,7 +165,7 @@ def _entry(value: Value) -> Entry:
     return found
 
 
-def _mesh(value: Value) -> MeshFile:
+def _mesh(value: YamlValue) -> MeshFile:
     fields = Fields(value, "a mesh")
     found = MeshFile(
         fields.need("file", text, ""),
@@ -165,18 +177,18 @@ def _mesh(value: Value) -> MeshFile:
     return found
 
 
-def _pose(value: Value) -> FloatArray:
+def _pose(value: YamlValue) -> FloatArray:
     """(4, 4) of six numbers."""
     if value.kind != "list" or len(value.items) != 6:
         raise value.wrong("A pose is six numbers: x, y, z in mm, roll, pitch, yaw in degrees.")
     # In the frame of the tool a place that is near enough may have larger numbers.
-    farthest = 2e3 * FARTHEST
+    farthest = 2e3 * MAX_COORDINATE
     lengths = [millimetres(-farthest, farthest)(each) for each in value.items[:3]]
     angles = [read_degrees()(each) for each in value.items[3:]]
     return se3.from_rotation_translation(so3.from_rpy(*angles), lengths)
 
 
-def _colour(value: Value) -> Colour:
+def _colour(value: YamlValue) -> Colour:
     said = str(value.held).lower()
     if not COLOUR.fullmatch(said):
         raise value.wrong(f'A colour is as "#94a3b8", in quotes, not {value}.')
@@ -184,25 +196,25 @@ def _colour(value: Value) -> Colour:
     return red, green, blue
 
 
-def _digest(value: Value) -> str:
+def _digest(value: YamlValue) -> str:
     if not re.fullmatch(r"[0-9a-f]{64}", str(value.held)):
         raise value.wrong("A SHA-256 has 64 digits from 0 to f.")
     return str(value.held)
 
 
-def _true(value: Value) -> bool:
+def _true(value: YamlValue) -> bool:
     said = str(value.held).lower()
     if said not in ("true", "false", "yes", "no"):
         raise value.wrong(f"true or false goes here, not {value}.")
     return said in ("true", "yes")
 
 
-def _twice(entries: tuple[Entry, ...]) -> list[Problem]:
+def _twice(entries: tuple[SceneEntry, ...]) -> list[Problem]:
     seen: set[str] = set()
     problems: list[Problem] = []
     for entry in entries:
         if entry.name in seen:
-            problems += entry.at.wrong(f"There are two things called {entry.name!r}.").problems
+            problems += entry.at.wrong(f"There are two objects called {entry.name!r}.").problems
         seen.add(entry.name)
     return problems
 

@@ -7,38 +7,38 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import LONG_WAY, Placed, World
+from katana450.maths.collision.world import PATH_LENGTH_FACTOR, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
 
 STOP = 0.005
 """[m] The arm comes no nearer to itself or to anything else."""
 
-SETTLING = 0.04
+MIN_STOP_TIME = 0.04
 """[s] Distance beyond STOP may shrink to nothing in no less time than this, whatever the speed: the
 arm slows down as a body in oil, from the farther away the faster it is (Faverjon and Tournassoud,
 A local based approach for path planning, ICRA 1987)."""
 
-SAME = 1e-7
+DISTANCE_ROUNDING = 1e-7
 """[m] Changes of distance below this are the rounding of the search for the nearest points."""
 
-SAME_DEPTH = 1e-5
+DEPTH_ROUNDING = 1e-5
 """[m] The same for how deep bodies are in each other, which is known less well."""
 
-CREEP = 1e-5
+MIN_TRAVEL = 1e-5
 """[m] A step that moves nothing farther than this is none: the arm has stopped."""
 
-GRAZE = 1e-3
+MAX_UNCHECKED_PATH = 1e-3
 """[m] Ways shorter than this are not looked at in between: no part is as thin."""
 
-TRIES = 6
-"""Shares of a step that are tried before the arm rather waits."""
+STEP_ATTEMPTS = 6
+"""Fractions of a step that are tried before the arm rather waits."""
 
 
-FAR = 0.6
+MAX_GLANCE_ANGLE = 0.6
 """[rad] Joints that turn more than this together are not judged at a glance."""
 
-SHY = 0.98
-"""[1] Share of what is left that is tried next: a way that bends seldom fits to the last bit."""
+STEP_FRACTION = 0.98
+"""[1] Fraction of what is left that is tried next: a way that bends seldom fits to the last bit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Advance:
 
 
 def advance(
-    world: World,
+    world: CollisionWorld,
     x: FloatArray,
     towards: FloatArray,
     dt: float,
@@ -74,56 +74,60 @@ def advance(
     """
     if (towards == x).all():
         return Advance(x)
-    least = np.full(len(world.first), STOP) if keep is None else keep
+    minimum = np.full(len(world.first), STOP) if keep is None else keep
     here = world.at(x)
     travel = world.travel(here, x, towards)
-    part = min(dt / SETTLING, 1.0)
+    part = min(dt / MIN_STOP_TIME, 1.0)
     # What is so far away that the whole way does not matter needs no closer look.
-    free = least + travel / part
+    free = minimum + travel / part
     free[travel == 0.0] = -np.inf
-    way = _Way(world, x, towards)
+    way = _Path(world, x, towards)
     for pair in here.nearer_than(free)[0].tolist():
         before = here.distance(pair)
         if before < free[pair]:
-            way.minded.append(_Minded(pair, float(travel[pair]), before, part, float(least[pair])))
+            way.minded.append(
+                _ActivePair(pair, float(travel[pair]), before, part, float(minimum[pair]))
+            )
     if not way.minded:
         return Advance(towards)
-    share, held = 1.0, None
-    for _ in range(TRIES):
-        there = way.at(share)
-        after = [(each, there.distance(each.pair)) for each in way.minded if each.tight(share)]
+    fraction, held = 1.0, None
+    for _ in range(STEP_ATTEMPTS):
+        there = way.at(fraction)
+        after = [(each, there.distance(each.pair)) for each in way.minded if each.tight(fraction)]
         fit, pressed = min(((each.fit(d), each) for each, d in after), default=(1.0, None))
         if fit < 1.0:
             held = pressed
-            share *= SHY * fit
-        elif passed := next((e for e, d in after if way.passes(e, 0.0, e.before, share, d)), None):
+            fraction *= STEP_FRACTION * fit
+        elif passed := next(
+            (e for e, d in after if way.passes(e, 0.0, e.before, fraction, d)), None
+        ):
             held = passed
-            share *= 0.5
+            fraction *= 0.5
         else:
             contact = None if held is None else there.contact(held.pair)
-            return Advance(way.x(share), contact)
-        if share * float(travel.max()) < CREEP:
+            return Advance(way.x(fraction), contact)
+        if fraction * float(travel.max()) < MIN_TRAVEL:
             break
     return Advance(x, None if held is None else here.contact(held.pair), stopped=True)
 
 
-def surely_clear(world: World, x: FloatArray, towards: FloatArray) -> bool:
+def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -> bool:
     """Whether nothing comes nearer than STOP on any way from ``x`` to ``towards``, at a glance.
 
     On the way no joint leaves the span between its two ends. False only says that it has to be
     looked at: the joints may be too far apart for that, or something too near.
     """
     turns = float(np.abs(towards - x).sum())
-    if turns >= FAR:
+    if turns >= MAX_GLANCE_ANGLE:
         return False
     here = world.at(x)
-    needed = STOP + world.travel(here, x, towards) * (1.0 / (1.0 - turns)) / LONG_WAY
+    needed = STOP + world.travel(here, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
     pairs, _ = here.nearer_than(needed)
     return all(here.distance(pair) >= needed[pair] for pair in pairs.tolist())
 
 
 @dataclass(frozen=True, order=True)
-class _Minded:
+class _ActivePair:
     """A pair of bodies that a step may bring too near.
 
     pair: its number in the world. travel: at most how far its bodies move against each other on the
@@ -142,37 +146,39 @@ class _Minded:
         """[m] How much nearer the step may bring them."""
         return self.part * max(self.before - self.keep, 0.0)
 
-    def tight(self, share: float) -> bool:
+    def tight(self, fraction: float) -> bool:
         """Whether that much of the way could be too much."""
-        return share * self.travel > self.spare
+        return fraction * self.travel > self.spare
 
     def fit(self, after: float) -> float:
-        """What share of a step is allowed that ends with the distance ``after`` [m]."""
+        """What fraction of a step is allowed that ends with the distance ``after`` [m]."""
         used = self.before - after
-        rounding = SAME if self.before > 0.0 else SAME_DEPTH
+        rounding = DISTANCE_ROUNDING if self.before > 0.0 else DEPTH_ROUNDING
         return self.spare / used if used > self.spare + rounding else 1.0
 
 
-class _Way:
+class _Path:
     """A straight way from ``start`` to ``end`` (k,) [rad], and the pairs to mind on it."""
 
-    def __init__(self, world: World, start: FloatArray, end: FloatArray) -> None:
-        self.minded: list[_Minded] = []
+    def __init__(self, world: CollisionWorld, start: FloatArray, end: FloatArray) -> None:
+        self.minded: list[_ActivePair] = []
         self._world = world
         self._start = start
         self._end = end
-        self._placed: dict[float, Placed] = {}
+        self._placed: dict[float, PlacedWorld] = {}
 
-    def x(self, share: float) -> FloatArray:
-        return self._end if share == 1.0 else self._start + share * (self._end - self._start)
+    def x(self, fraction: float) -> FloatArray:
+        return self._end if fraction == 1.0 else self._start + fraction * (self._end - self._start)
 
-    def at(self, share: float) -> Placed:
-        found = self._placed.get(share)
+    def at(self, fraction: float) -> PlacedWorld:
+        found = self._placed.get(fraction)
         if found is None:
-            found = self._placed[share] = self._world.at(self.x(share))
+            found = self._placed[fraction] = self._world.at(self.x(fraction))
         return found
 
-    def passes(self, minded: _Minded, low: float, d_low: float, high: float, d_high: float) -> bool:
+    def passes(
+        self, minded: _ActivePair, low: float, d_low: float, high: float, d_high: float
+    ) -> bool:
         """Whether a pair comes too near between two shares of the way.
 
         ``d_low``, ``d_high``: how far apart its bodies are at both [m].
@@ -180,12 +186,12 @@ class _Way:
         travel = (high - low) * minded.travel
         kept = min(minded.before, minded.keep)
         # Bodies that are in each other have nothing left to pass.
-        if minded.before <= 0.0 or travel <= GRAZE or d_low + d_high - travel >= kept:
+        if minded.before <= 0.0 or travel <= MAX_UNCHECKED_PATH or d_low + d_high - travel >= kept:
             return False
         middle = 0.5 * (low + high)
         d_middle = self.at(middle).distance(minded.pair)
         return (
-            d_middle < kept - SAME
+            d_middle < kept - DISTANCE_ROUNDING
             or self.passes(minded, low, d_low, middle, d_middle)
             or self.passes(minded, middle, d_middle, high, d_high)
         )

@@ -15,7 +15,7 @@ GROUND = 0
 
 
 @dataclass(frozen=True, eq=False)
-class Mover:
+class RigidGroup:
     """Bodies that move as one piece about one joint.
 
     Attributes:
@@ -45,7 +45,7 @@ class Linkage:
         carries: (m, m) bool, whether the joint of the second moves the first.
     """
 
-    def __init__(self, movers: Sequence[Mover]) -> None:
+    def __init__(self, movers: Sequence[RigidGroup]) -> None:
         m = len(movers) + 1
         self.count = m
         self.parent = np.array([GROUND, *(mover.parent for mover in movers)])
@@ -76,12 +76,12 @@ class Linkage:
     def poses(self, x: FloatArray) -> FloatArray:
         """T_base_mover (m, 4, 4) of every piece at ``x`` (k,)."""
         angles = self.factor * x[self.variable] + self._offset
-        shares = np.ones((self.count, 1, 3))
-        np.sin(angles, out=shares[:, 0, 1])
-        np.cos(angles, out=shares[:, 0, 2])
+        fractions = np.ones((self.count, 1, 3))
+        np.sin(angles, out=fractions[:, 0, 1])
+        np.cos(angles, out=fractions[:, 0, 2])
         if self.sliding.size:
-            shares[self.sliding, 0, 1] = angles[self.sliding]
-        T = list((shares @ self._terms).reshape(-1, 4, 4))
+            fractions[self.sliding, 0, 1] = angles[self.sliding]
+        T = list((fractions @ self._terms).reshape(-1, 4, 4))
         for number, parent in self._chained:
             T[number] = T[parent] @ T[number]
         return np.array(T)

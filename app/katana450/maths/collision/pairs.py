@@ -8,23 +8,23 @@ from itertools import combinations
 import numpy as np
 
 from katana450.maths.collision.linkage import Linkage
-from katana450.maths.collision.world import Part, World
+from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
 
 SAMPLES = 1000
 """Postures tried."""
 
-ALWAYS = 50
+DESIGN_OVERLAP_SAMPLES = 50
 """Parts that are in each other in this many postures, the first ones, are so by their design."""
 
-ROOM = 0.01
+MEETING_DISTANCE = 0.01
 """[m] Parts that never come nearer cannot meet: twice what the arm keeps, for between the samples
 they may be somewhat nearer."""
 
 SEED = 450
 
-BEYOND = 0.5
-"""Share of a range that postures are drawn beyond each of its ends and brought back: parts often
+OVERDRAW_FRACTION = 0.5
+"""Fraction of a range that postures are drawn beyond each of its ends and brought back: parts often
 come nearest where joints are at their limits, and so each joint is at one in half the postures."""
 
 
@@ -42,7 +42,7 @@ def pairs_that_meet(
         for a, b in combinations(range(len(parts)), 2)
         if len(linkage.variables_between(parts[a].mover, parts[b].mover)) > 1
     ]
-    world = World(linkage, parts, candidates)
+    world = CollisionWorld(linkage, parts, candidates)
     numbers = {pair: number for number, pair in enumerate(candidates)}
     a, b = world.part_of[world.first], world.part_of[world.second]
     owner = np.array(
@@ -50,23 +50,25 @@ def pairs_that_meet(
     )
     deep = np.zeros(len(candidates), dtype=int)
     near = np.zeros(len(candidates), dtype=bool)
-    beyond = BEYOND * (upper - lower)
+    beyond = OVERDRAW_FRACTION * (upper - lower)
     drawn = np.random.default_rng(SEED).uniform(
         lower - beyond, upper + beyond, (SAMPLES, len(lower))
     )
     postures = np.clip(drawn, lower, upper)
     for number, x in enumerate(postures):
         placed = world.at(x)
-        known = near if number >= ALWAYS else np.zeros_like(near)
+        known = near if number >= DESIGN_OVERLAP_SAMPLES else np.zeros_like(near)
         inside = np.zeros_like(near)
-        for pair in placed.nearer_than(np.where(known[owner], -np.inf, ROOM))[0].tolist():
+        for pair in placed.nearer_than(np.where(known[owner], -np.inf, MEETING_DISTANCE))[
+            0
+        ].tolist():
             which = owner[pair]
             distance = placed.distance(pair)
-            near[which] |= distance < ROOM
+            near[which] |= distance < MEETING_DISTANCE
             inside[which] |= distance < 0.0
         deep += inside
     return [
         pair
         for pair, meets, times in zip(candidates, near, deep, strict=True)
-        if meets and times < ALWAYS
+        if meets and times < DESIGN_OVERLAP_SAMPLES
     ]

@@ -12,7 +12,7 @@ from katana450.errors import InputError
 from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
-FAR = 1e6
+HALF_SPACE_RADIUS = 1e6
 """[m] Radius of the ball that stands for a half-space where balls are compared: within a metre of
 its pole it is off by less than a micrometre."""
 
@@ -21,7 +21,7 @@ FLAT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class CollisionShape:
     """A convex body in a frame of its own.
 
     Attributes:
@@ -39,7 +39,7 @@ class Shape:
     mark: bytes
 
 
-def hull(points: npt.ArrayLike) -> Shape:
+def hull(points: npt.ArrayLike) -> CollisionShape:
     """The convex hull of ``points`` (n, 3) [m]; InputError when they lie in one plane."""
     points = np.asarray(points, dtype=np.float64)
     corners = np.unique(finite_array(points, (len(points), 3), "The points of a hull"), axis=0)
@@ -51,14 +51,16 @@ def hull(points: npt.ArrayLike) -> Shape:
     geometry = engine().hull(corners)
     centre = 0.5 * (low + high)
     radius = float(np.linalg.norm(corners - centre, axis=1).max())
-    return Shape(geometry, frozen(centre), radius, frozen(low), frozen(high), corners.tobytes())
+    return CollisionShape(
+        geometry, frozen(centre), radius, frozen(low), frozen(high), corners.tobytes()
+    )
 
 
-def box(size: npt.ArrayLike) -> Shape:
+def box(size: npt.ArrayLike) -> CollisionShape:
     """A box of ``size`` (3,) [m] about its middle."""
     size = _lengths(size, 3, "The size of a box")
     half = frozen(0.5 * size)
-    return Shape(
+    return CollisionShape(
         engine().box(size),
         frozen(np.zeros(3)),
         float(np.linalg.norm(half)),
@@ -68,11 +70,11 @@ def box(size: npt.ArrayLike) -> Shape:
     )
 
 
-def cylinder(radius: float, length: float) -> Shape:
+def cylinder(radius: float, length: float) -> CollisionShape:
     """An upright cylinder about its middle [m]."""
     _lengths((radius, length), 2, "Radius and length of a cylinder")
     half = frozen((radius, radius, 0.5 * length))
-    return Shape(
+    return CollisionShape(
         engine().cylinder(radius, length),
         frozen(np.zeros(3)),
         float(np.hypot(radius, 0.5 * length)),
@@ -82,11 +84,11 @@ def cylinder(radius: float, length: float) -> Shape:
     )
 
 
-def sphere(radius: float) -> Shape:
+def sphere(radius: float) -> CollisionShape:
     """A ball about its middle [m]."""
     _lengths((radius,), 1, "The radius of a sphere")
     half = frozen((radius, radius, radius))
-    return Shape(
+    return CollisionShape(
         engine().sphere(radius),
         frozen(np.zeros(3)),
         radius,
@@ -96,13 +98,13 @@ def sphere(radius: float) -> Shape:
     )
 
 
-def half_space() -> Shape:
+def half_space() -> CollisionShape:
     """Everything with z <= 0."""
-    far = np.full(3, FAR)
-    return Shape(
+    far = np.full(3, HALF_SPACE_RADIUS)
+    return CollisionShape(
         engine().half_space(),
-        frozen((0.0, 0.0, -FAR)),
-        FAR,
+        frozen((0.0, 0.0, -HALF_SPACE_RADIUS)),
+        HALF_SPACE_RADIUS,
         frozen(-far),
         frozen(far * (1.0, 1.0, 0.0)),
         b"half-space",

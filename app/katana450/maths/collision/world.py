@@ -14,20 +14,20 @@ import numpy.typing as npt
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.engine import engine
 from katana450.maths.collision.linkage import GROUND, Linkage
-from katana450.maths.collision.shape import Shape
+from katana450.maths.collision.shape import CollisionShape
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
 
-FEW = 8
+DIRECT_PAIRS = 8
 """Pairs that are measured as quickly as the boxes round their bodies are compared."""
 
-LONG_WAY = 1.2
+PATH_LENGTH_FACTOR = 1.2
 """[1] How much longer than its tangent the way of a point may be: joints that turn by t_i at the
 distances r_i move it by d <= sum t_i (r_i + d), so this holds up to sum t_i = 1 - 1 / LONG_WAY."""
 
-LONGEST_WAY = 1.0 - 1.0 / LONG_WAY
-"""[rad] Up to which sum of turns `World.travel` is a bound."""
+MAX_PATH_LENGTH = 1.0 - 1.0 / PATH_LENGTH_FACTOR
+"""[rad] Up to which sum of turns `CollisionWorld.travel` is a bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Part:
     """One named link, or one thing that stands around the arm.
 
     Attributes:
-        name: of the link or thing.
+        name: of the link or object.
         mover: index of the piece it moves with; GROUND stands still.
         T_mover_shape: where each of its shapes is, (4, 4) in the frame of the piece [m].
         shapes: convex; together they are the part.
@@ -44,11 +44,11 @@ class Part:
     name: str
     mover: int
     T_mover_shape: tuple[FloatArray, ...]
-    shapes: tuple[Shape, ...]
+    shapes: tuple[CollisionShape, ...]
 
 
-def obstacle(name: str, T_base_shape: FloatArray, *shapes: Shape) -> Part:
-    """A thing that stands still, all its ``shapes`` in one frame."""
+def obstacle(name: str, T_base_shape: FloatArray, *shapes: CollisionShape) -> Part:
+    """An object that stands still, all its ``shapes`` in one frame."""
     return Part(name, GROUND, tuple(frozen(T_base_shape) for _ in shapes), shapes)
 
 
@@ -66,7 +66,7 @@ class Fingerprint:
         return float(np.abs(self.places - other.places).max(initial=0.0))
 
 
-class World:
+class CollisionWorld:
     """Convex bodies on the pieces of a linkage, and the pairs of them that may meet.
 
     Attributes:
@@ -134,11 +134,11 @@ class World:
         self._second_seen = self.second * linkage.count + self.mover_of[self.first]
         self._first_seen = self.first * linkage.count + self.mover_of[self.second]
 
-    def at(self, x: FloatArray) -> Placed:
+    def at(self, x: FloatArray) -> PlacedWorld:
         """All bodies where ``x`` (k,) [rad] puts them."""
-        return Placed(self, self.linkage.poses(x))
+        return PlacedWorld(self, self.linkage.poses(x))
 
-    def travel(self, placed: Placed, x: FloatArray, towards: FloatArray) -> FloatArray:
+    def travel(self, placed: PlacedWorld, x: FloatArray, towards: FloatArray) -> FloatArray:
         """At most how far the bodies of each pair move against each other, (p,) [m].
 
         ``placed`` is at ``x`` (k,) [rad or m]; on the way to ``towards`` (k,) the joints turn by no
@@ -148,7 +148,7 @@ class World:
         turns = np.abs(joints.factor * (towards - x)[joints.variable])
         # (b, m): how far a body is moved by the joints that do not move another piece with it.
         moved = ((placed.reach() * turns * self._carries) @ self._stays).ravel()
-        return np.asarray(LONG_WAY * (moved[self._second_seen] + moved[self._first_seen]))
+        return np.asarray(PATH_LENGTH_FACTOR * (moved[self._second_seen] + moved[self._first_seen]))
 
     def nearest(self, x: FloatArray) -> Contact | None:
         """The pair of bodies that are nearest to each other at ``x`` (k,) [rad].
@@ -183,7 +183,7 @@ class World:
         return min(gaps, default=np.inf)
 
     @cached_property
-    def likeness(self) -> Fingerprint:
+    def fingerprint(self) -> Fingerprint:
         """By which another world, of another process too, is known to be the same."""
         told = hashlib.sha256(repr(self.pairs).encode())
         for part in self.parts:
@@ -192,7 +192,7 @@ class World:
                 told.update(shape.mark)
         return Fingerprint(told.digest(), frozen(self.T_mover_body))
 
-    def with_carried(self, carried: Part) -> World:
+    def with_carried(self, carried: Part) -> CollisionWorld:
         """This world and what the arm carries, which meets what more than one joint lets meet it.
 
         What it is held by turns with it, and the next link turns under it.
@@ -203,20 +203,20 @@ class World:
             for number, part in enumerate(self.parts)
             if len(self.linkage.variables_between(part.mover, carried.mover)) > 1
         ]
-        return World(self.linkage, (*self.parts, carried), (*self.pairs, *met))
+        return CollisionWorld(self.linkage, (*self.parts, carried), (*self.pairs, *met))
 
-    def with_obstacles(self, obstacles: Sequence[Part]) -> World:
+    def with_obstacles(self, obstacles: Sequence[Part]) -> CollisionWorld:
         """This world and ``obstacles``, which every part that moves may meet."""
         count = len(self.parts)
         moving = [number for number, part in enumerate(self.parts) if part.mover != GROUND]
         met = [(number, count + k) for number in moving for k in range(len(obstacles))]
-        return World(self.linkage, (*self.parts, *obstacles), (*self.pairs, *met))
+        return CollisionWorld(self.linkage, (*self.parts, *obstacles), (*self.pairs, *met))
 
 
-class Placed:
+class PlacedWorld:
     """The bodies of a world in one posture."""
 
-    def __init__(self, world: World, T_base_mover: FloatArray) -> None:
+    def __init__(self, world: CollisionWorld, T_base_mover: FloatArray) -> None:
         self._world = world
         self._T = T_base_mover
         self._transforms: dict[int, Any] = {}
@@ -266,7 +266,7 @@ class Placed:
         """
         world = self._world
         pairs = np.nonzero(self._apart < limit)[0]
-        if len(pairs) <= FEW:
+        if len(pairs) <= DIRECT_PAIRS:
             return pairs, self._apart[pairs]
         # The ball of each against the box of the other, one way and the other.
         a, b = world.first[pairs], world.second[pairs]

@@ -83,16 +83,16 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
     # What is not finite is refused, or left to the scalar solver.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for rows in _chunks(len(T)):
-            asked, angles = _arrays(work, rows.stop - rows.start)
-            np.copyto(asked, T[rows].transpose(1, 2, 0))
-            _validate(asked, rows.start, angles.reshape(20, -1))
-            _solve(made, asked, angles, q[rows], inside[rows])
+            canonical, angles = _arrays(work, rows.stop - rows.start)
+            np.copyto(canonical, T[rows].transpose(1, 2, 0))
+            _validate(canonical, rows.start, angles.reshape(20, -1))
+            _solve(made, canonical, angles, q[rows], inside[rows])
             if position is not None and rotation is not None:
                 for branch in range(4):
                     reached = _forward(chain, q[rows, branch].T)
-                    x, y, z = reached[:3, 3] - asked[:3, 3]
+                    x, y, z = reached[:3, 3] - canonical[:3, 3]
                     position[rows, branch] = np.hypot(np.hypot(x, y), z)
-                    rotation[rows, branch] = _angle(reached, asked)
+                    rotation[rows, branch] = _angle(reached, canonical)
     return Solutions(q, inside, position, rotation)
 
 
@@ -102,8 +102,8 @@ def _chunks(n: int) -> Iterator[slice]:
 
 def _arrays(work: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
     """Poses (4, 4, count) and angles (2, 2, 5, count) in the memory of `work`."""
-    asked, angles = work[: 16 * count], work[16 * count : 36 * count]
-    return asked.reshape(4, 4, count), angles.reshape(2, 2, 5, count)
+    canonical, angles = work[: 16 * count], work[16 * count : 36 * count]
+    return canonical.reshape(4, 4, count), angles.reshape(2, 2, 5, count)
 
 
 def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:

@@ -8,16 +8,16 @@ from katana450 import tolerances
 from katana450.maths.kinematics.level import nearest_at_pitch
 from katana450.maths.kinematics.orientation import PlaneOrientation
 from katana450.maths.kinematics.planar import Interval, PlanarArm, Posture
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 
 
-class Wish(NamedTuple):
+class PlanarTarget(NamedTuple):
     """The orientation wanted in the plane, the roll allowed, and the roll [rad] now, if known."""
 
     orientation: PlaneOrientation
     roll: Interval
     roll_hint: float | None
-    reading: Reading
+    priority: Priority
 
 
 class InPlane(NamedTuple):
@@ -30,46 +30,46 @@ class InPlane(NamedTuple):
     roll_bound: bool
 
 
-def reaching(planar: PlanarArm, u: float, v: float, wish: Wish) -> InPlane | None:
+def reaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InPlane | None:
     """With the tool point at (u, v), or None.
 
     Behind axis 1, where the branch has no points, the nearest is straight across from (u, v) on it.
     """
     u = planar.axis if planar.behind(u) > 0.0 else u
-    if wish.reading is not Reading.PITCH:
-        return _best_at(planar, u, v, wish)
-    posture = planar.at(u, v, wish.orientation.best()[0])
-    return None if posture is None else _with_roll(posture, wish, bound=False)
+    if target.priority is not Priority.PITCH:
+        return _best_at(planar, u, v, target)
+    posture = planar.at(u, v, target.orientation.best()[0])
+    return None if posture is None else _with_roll(posture, target, bound=False)
 
 
-def approaching(planar: PlanarArm, u: float, v: float, wish: Wish) -> InPlane | None:
+def approaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InPlane | None:
     """With the tool point as near to (u, v) as it comes, when it cannot come there.
 
     None where no posture has the pitch that is held.
     """
-    if wish.reading is Reading.PITCH:
-        posture = nearest_at_pitch(planar, u, v, wish.orientation.best()[0])
-        return None if posture is None else _with_roll(posture, wish, bound=True)
+    if target.priority is Priority.PITCH:
+        posture = nearest_at_pitch(planar, u, v, target.orientation.best()[0])
+        return None if posture is None else _with_roll(posture, target, bound=True)
     nearest = planar.nearest(u, v)
-    held = _with_roll(nearest, wish, bound=True)
+    held = _with_roll(nearest, target, bound=True)
     pu, pv = planar.tool(nearest)
     if abs(planar.behind(pu)) > tolerances.ON_AXIS:
         return held
     # On axis 1 the orientation is free to improve; at the edge of the workspace the same posture
     # comes back, off by the root of rounding.
-    other = _best_at(planar, pu, pv, wish)
+    other = _best_at(planar, pu, pv, target)
     if other is None or other.rotation_error > held.rotation_error - tolerances.TOUCHING:
         return held
     return other._replace(posture_bound=True)
 
 
-def _best_at(planar: PlanarArm, u: float, v: float, wish: Wish) -> InPlane | None:
+def _best_at(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InPlane | None:
     """The best orientation with the tool point at (u, v); None when no posture has it there.
 
     Either pitch and roll are both free and best; or the roll is at an end and the pitch best for
     it; or a joint is at an end and the roll best for that, or at its own end.
     """
-    wanted, roll, hint, _ = wish
+    wanted, roll, hint, _ = target
     phi, psi = wanted.best()
     posture = planar.at(u, v, phi)
     free_roll = roll.fit(psi)
@@ -81,17 +81,17 @@ def _best_at(planar: PlanarArm, u: float, v: float, wish: Wish) -> InPlane | Non
         if posture is not None:
             found.append(InPlane(posture, end, wanted.angle(posture.phi, end), False, True))
     for posture in planar.pitch_ends(u, v):
-        found.extend(_rolled(posture, wish, bound=True))
+        found.extend(_rolled(posture, target, bound=True))
     return _chosen(found, hint) if found else None
 
 
-def _with_roll(posture: Posture, wish: Wish, *, bound: bool) -> InPlane:
-    return _chosen(_rolled(posture, wish, bound=bound), wish.roll_hint)
+def _with_roll(posture: Posture, target: PlanarTarget, *, bound: bool) -> InPlane:
+    return _chosen(_rolled(posture, target, bound=bound), target.roll_hint)
 
 
-def _rolled(posture: Posture, wish: Wish, *, bound: bool) -> list[InPlane]:
+def _rolled(posture: Posture, target: PlanarTarget, *, bound: bool) -> list[InPlane]:
     """`posture` with the roll best for its pitch, or with each end of the roll."""
-    wanted, roll = wish.orientation, wish.roll
+    wanted, roll = target.orientation, target.roll
     best = roll.fit(wanted.best_roll(posture.phi))
     rolls = roll.ends if best is None else (best,)
     return [
@@ -100,6 +100,6 @@ def _rolled(posture: Posture, wish: Wish, *, bound: bool) -> list[InPlane]:
 
 
 def _chosen(found: list[InPlane], roll_hint: float | None) -> InPlane:
-    least = min(each.rotation_error for each in found) + tolerances.SAME_ROTATION
-    equal = [each for each in found if each.rotation_error <= least]
+    minimum = min(each.rotation_error for each in found) + tolerances.SAME_ROTATION
+    equal = [each for each in found if each.rotation_error <= minimum]
     return equal[0] if roll_hint is None else min(equal, key=lambda e: abs(e.psi - roll_hint))

@@ -76,10 +76,10 @@ class Solution:
 
     def _measured(self) -> tuple[float, float]:
         if self._errors is None:
-            asked, reached = np.array(self._rows), forward(self._chain, self.angles)
+            canonical, reached = np.array(self._rows), forward(self._chain, self.angles)
             self._errors = (
-                math.dist(reached[:3, 3], asked[:3, 3]),
-                so3.angle(reached[:3, :3], asked[:3, :3]),
+                math.dist(reached[:3, 3], canonical[:3, 3]),
+                so3.angle(reached[:3, :3], canonical[:3, :3]),
             )
         return self._errors
 

@@ -24,15 +24,15 @@ def nearest_at_pitch(planar: PlanarArm, u: float, v: float, phi: float) -> Postu
     if reached is not None:
         return reached
     wrist = u - planar.l3 * math.cos(phi), v - planar.l3 * math.sin(phi)
-    best, least = None, math.inf
+    best, minimum = None, math.inf
     for theta2, theta3 in (*_straight(planar, phi, wrist), *_corners(planar, phi)):
         posture = _fitted(planar, theta2, theta3, phi - theta2 - theta3)
         if posture is None:
             continue
         pu, pv = planar.tool(posture)
         gap = math.hypot(pu - u, pv - v)
-        if gap < least and planar.behind(pu) <= tolerances.PLANAR_LIMIT_SLACK:
-            best, least = posture, gap
+        if gap < minimum and planar.behind(pu) <= tolerances.PLANAR_LIMIT_SLACK:
+            best, minimum = posture, gap
     return best
 
 

@@ -19,13 +19,13 @@ from katana450 import tolerances
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
-from katana450.maths.kinematics.asked import Asked
 from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.limited import LimitedArm
-from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import in_limits_turn, nearest_turn, wrapped
 
 POSITION_WORTH_TELLING: Final = 5e-5
@@ -70,9 +70,9 @@ def project(
     branch: Branch | None = None,
     within_limits: bool = True,
     q_hint: npt.ArrayLike | None = None,
-    reading: Reading = Reading.POSE,
+    priority: Priority = Priority.POSE,
 ) -> Projection:
-    """The feasible pose nearest to `T` (4, 4) = T_S_tool [m], as `reading` has it.
+    """The feasible pose nearest to `T` (4, 4) = T_S_tool [m], as `priority` has it.
 
     branch: the branch to stay on; None takes the one that comes nearest, and of equals the one
     nearest to `q_hint` (5,) [rad]. The hint also says which limit of axis 1 to wait at,
@@ -88,48 +88,56 @@ def project(
     arm = limited.arm
     T = se3.validated(T)
     x, y, z = (arm.T_C_S[:3, :3] @ T[:3, 3] + arm.T_C_S[:3, 3]).tolist()
-    asked = Asked.pose(arm.pose(T), (x, y, z), reading)
-    stance = nearest_stance(limited, asked, branch, None if hint is None else arm.angles(hint))
-    q = arm.joints(stance.alpha)
+    canonical = CanonicalTarget.pose(arm.pose(T), (x, y, z), priority)
+    found_posture = nearest_posture(
+        limited, canonical, branch, None if hint is None else arm.angles(hint)
+    )
+    q = arm.joints(found_posture.alpha)
     if within_limits:
-        return measured(chain, T, asked, stance)
+        return measured(chain, T, canonical, found_posture)
     q = nearest_turn(chain, in_limits_turn(chain, q), hint)
-    return measured(chain, T, asked, stance, q)
+    return measured(chain, T, canonical, found_posture, q)
 
 
 def measured(
-    chain: Chain, T: FloatArray, asked: Asked, stance: NearestPosture, q: FloatArray | None = None
+    chain: Chain,
+    T: FloatArray,
+    canonical: CanonicalTarget,
+    found_posture: NearestPosture,
+    q: FloatArray | None = None,
 ) -> Projection:
     """What `stance` makes of `T` (4, 4) = T_S_tool [m], which `asked` is.
 
     q: its joint angles (5,) [rad] where limits do not count.
     """
-    arm, in_plane = arm_of(chain), stance.in_plane
+    arm, in_plane = arm_of(chain), found_posture.in_plane
     limits: tuple[int, ...] = ()
     if q is None:
-        q = np.minimum(np.maximum(arm.joints(stance.alpha), chain.lower), chain.upper)
-        limits = tuple(_binding(chain, q, stance))
+        q = np.minimum(np.maximum(arm.joints(found_posture.alpha), chain.lower), chain.upper)
+        limits = tuple(_binding(chain, q, found_posture))
     reached = forward(chain, q)
     position_error = math.dist(reached[:3, 3], T[:3, 3])
-    theta1 = stance.alpha[0]
-    outward, sideways, down = asked.heading(theta1)
+    theta1 = found_posture.alpha[0]
+    outward, sideways, down = canonical.heading(theta1)
     flat = math.hypot(outward, down)
     yaw_error, pitch_error = math.atan2(abs(sideways), flat), 0.0
-    if asked.reading is not Reading.POSE or flat > tolerances.ON_AXIS:
-        pitch = arm.pitch(stance.alpha)
-        pitch_error = abs(wrapped(pitch - asked.pitch(theta1)))
-        if asked.reading is Reading.PITCH and asked.along is not None:
-            turned = math.pi - asked.pitch(theta1)
+    if canonical.priority is not Priority.POSE or flat > tolerances.ON_AXIS:
+        pitch = arm.pitch(found_posture.alpha)
+        pitch_error = abs(wrapped(pitch - canonical.pitch(theta1)))
+        if canonical.priority is Priority.PITCH and canonical.along is not None:
+            turned = math.pi - canonical.pitch(theta1)
             pitch_error = min(pitch_error, abs(wrapped(pitch - turned)))
-    pitch_kept = asked.reading is not Reading.POSE and pitch_error <= tolerances.SAME_ROTATION
-    axis1 = position_error > tolerances.SAME_POSITION and _axis_1_binds(arm, asked, stance)
+    pitch_kept = canonical.priority is not Priority.POSE and pitch_error <= tolerances.SAME_ROTATION
+    axis1 = position_error > tolerances.SAME_POSITION and _axis_1_binds(
+        arm, canonical, found_posture
+    )
     # A yaw that is given up changes the pitch that is nearest.
-    pitched = asked.reading is not Reading.POSE or yaw_error <= tolerances.SAME_ROTATION
+    pitched = canonical.priority is not Priority.POSE or yaw_error <= tolerances.SAME_ROTATION
     missed = max(position_error, pitch_error if pitched else 0.0) > tolerances.SAME_POSITION
     return Projection(
         T=frozen(reached),
         q=frozen(q),
-        branch=stance.branch,
+        branch=found_posture.branch,
         position_error=position_error,
         rotation_error=so3.angle(reached[:3, :3], T[:3, :3]),
         yaw_error=yaw_error,
@@ -142,25 +150,27 @@ def measured(
     )
 
 
-def _axis_1_binds(arm: FiveAxisArm, asked: Asked, stance: NearestPosture) -> bool:
+def _axis_1_binds(
+    arm: FiveAxisArm, canonical: CanonicalTarget, found_posture: NearestPosture
+) -> bool:
     """Whether the asked point is across axis 1 from where the branch ends, or where it cannot turn.
 
     A turn of axis 1 moves a tool point beside it outward or inward alone.
     """
-    x, y, _ = arm.tool_point(stance.alpha)
-    dx, dy = asked.tool[0] - x, asked.tool[1] - y
-    c, s = math.cos(stance.alpha[0]), math.sin(stance.alpha[0])
+    x, y, _ = arm.tool_point(found_posture.alpha)
+    dx, dy = canonical.tool[0] - x, canonical.tool[1] - y
+    c, s = math.cos(found_posture.alpha[0]), math.sin(found_posture.alpha[0])
     outward, missed_outward, missed_aside = c * x + s * y, c * dx + s * dy, c * dy - s * dx
-    r = outward - arm.beside(arm.pitch(stance.alpha), stance.alpha[4])[0]
-    side = 1.0 if stance.branch.shoulder == "front" else -1.0
+    r = outward - arm.beside(arm.pitch(found_posture.alpha), found_posture.alpha[4])[0]
+    side = 1.0 if found_posture.branch.shoulder == "front" else -1.0
     ends = abs(r) <= tolerances.ON_AXIS and side * missed_outward < -tolerances.SAME_POSITION
     beside = abs(outward) <= tolerances.ON_AXIS and abs(missed_aside) > tolerances.SAME_POSITION
     return ends or beside
 
 
-def _binding(chain: Chain, q: FloatArray, stance: NearestPosture) -> Iterator[int]:
-    held = stance.in_plane.posture_bound
-    may_bind = (stance.theta1_bound, held, held, held, stance.in_plane.roll_bound)
+def _binding(chain: Chain, q: FloatArray, found_posture: NearestPosture) -> Iterator[int]:
+    held = found_posture.in_plane.posture_bound
+    may_bind = (found_posture.theta1_bound, held, held, held, found_posture.in_plane.roll_bound)
     if any(may_bind):
         at_end = np.minimum(abs(q - chain.lower), abs(q - chain.upper)) <= tolerances.LIMIT_SLACK
         yield from (i for i, bound in enumerate(may_bind) if bound and at_end[i])

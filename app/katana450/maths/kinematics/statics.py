@@ -22,7 +22,7 @@ GRAVITY: Final = 9.80665
 
 
 @dataclass(frozen=True, eq=False)
-class Load:
+class LinkLoad:
     """A mass [kg] that hangs on the first `axes` joints; its centre is (3,) [m] in {S} at q = 0."""
 
     axes: int
@@ -30,7 +30,7 @@ class Load:
     centre: FloatArray
 
 
-def holding_torques(chain: Chain, q: npt.ArrayLike, loads: Iterable[Load]) -> FloatArray:
+def holding_torques(chain: Chain, q: npt.ArrayLike, loads: Iterable[LinkLoad]) -> FloatArray:
     """(n,) torques [N m] about the joints' axes that hold `loads` still at `q` (n,) [rad]."""
     q = chain.check_q(q)
     moved, J = joint_frames(chain, q), jacobian_space(chain, q)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
-from katana450.maths.kinematics.asked import Asked
 from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import wrapped
 
 
@@ -35,10 +35,10 @@ class ToolTarget:
         """Where the tool is with the joints at `q` (5,) [rad]."""
         return ToolTarget(frozen(forward(chain, q)[:3, 3]), *pitch_and_roll(chain, q))
 
-    def asked(self, arm: FiveAxisArm, reading: Reading) -> Asked:
+    def canonical(self, arm: FiveAxisArm, priority: Priority) -> CanonicalTarget:
         """The same of the canonical arm."""
         x, y, z = (arm.T_C_S[:3, :3] @ self.position + arm.T_C_S[:3, 3]).tolist()
-        return Asked.five(arm, (x, y, z), self.pitch, self.roll, reading)
+        return CanonicalTarget.five(arm, (x, y, z), self.pitch, self.roll, priority)
 
     def facing(self, chain: Chain, branch: Branch, theta1: float) -> float:
         """The theta1 [rad] in (-pi, pi] at which the arm's plane has the position on `branch`.
@@ -46,7 +46,7 @@ class ToolTarget:
         Over axis 1, where any has, that where the arm stands, `theta1`.
         """
         arm = arm_of(chain)
-        alpha1 = self.asked(arm, Reading.POSE).facing(arm, branch.shoulder)
+        alpha1 = self.canonical(arm, Priority.POSE).facing(arm, branch.shoulder)
         return theta1 if alpha1 is None else wrapped(arm.signs[0] * alpha1)
 
     def pose(self, chain: Chain, theta1: float) -> FloatArray:
@@ -66,10 +66,10 @@ class ToolTarget:
             self.position, wrapped(math.pi - self.pitch), wrapped(self.roll + math.pi)
         )
 
-    def towards(self, other: ToolTarget, share: float) -> ToolTarget:
-        """The target that `share` (0 to 1) of the straight way to `other` leads to."""
+    def towards(self, other: ToolTarget, fraction: float) -> ToolTarget:
+        """The target that `fraction` (0 to 1) of the straight way to `other` leads to."""
         return ToolTarget(
-            frozen(self.position + share * (other.position - self.position)),
-            self.pitch + share * (other.pitch - self.pitch),
-            self.roll + share * (other.roll - self.roll),
+            frozen(self.position + fraction * (other.position - self.position)),
+            self.pitch + fraction * (other.pitch - self.pitch),
+            self.roll + fraction * (other.roll - self.roll),
         )

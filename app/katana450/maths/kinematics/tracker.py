@@ -21,19 +21,19 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import Five, FiveAxisArm
-from katana450.maths.kinematics.asked import Asked
 from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.limited import LimitedArm
-from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_stance
+from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
 from katana450.maths.kinematics.planar import Interval
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import (
     ANGLE_WORTH_TELLING,
     POSITION_WORTH_TELLING,
     Projection,
     measured,
 )
-from katana450.maths.kinematics.reading import Reading
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
@@ -41,30 +41,30 @@ HOP: Final = 0.1
 """[rad] How far an axis may go at once: what the joints do in a twelfth of a second, so that a
 person sees motion and no leap."""
 
-STRIDE: Final = 0.02
+DRAG_STRIDE: Final = 0.02
 """[m] A faster drag is followed along its way in strides: about a hop of the joints."""
 
-LONGEST_WAY: Final = 32
+MAX_PATH_LENGTH: Final = 32
 """Strides along one drag; a longer one takes longer strides."""
 
-FAR: Final = 16.0
+MAX_DISTANCE_RATIO: Final = 16.0
 """[1] Of the arm's reach: of a hand that is farther away its direction alone counts on the way, so
 that every way has an end."""
 
-EFFORT: Final = 18
+MAX_POSES: Final = 18
 """Nearest poses sought in one call. What is farther is reached in the next: the joints need several
 ticks for a hop, so the goal stays ahead of them."""
 
-OUT_OF_REACH_EFFORT: Final = 3
+MAX_POSES_OUT_OF_REACH: Final = 3
 """Looking for the nearest to what cannot be reached takes that many times as long."""
 
-EFFORT_A_STRIDE: Final = 2 * OUT_OF_REACH_EFFORT
+MAX_POSES_PER_STRIDE: Final = 2 * MAX_POSES_OUT_OF_REACH
 """For the hops of one stride: two are enough unless something is in the way."""
 
-WORTH_A_HOP: Final = 1e-6
+MIN_HOP_GAIN: Final = 1e-6
 """[m], [rad] Coming nearer by less is rounding."""
 
-WORTH_A_LEAP: Final = 5e-5
+MIN_LEAP_GAIN: Final = 5e-5
 """[m], [rad] A leap that brings the tool nearer by less than half of the arm's precision is not
 missed."""
 
@@ -74,7 +74,7 @@ class TrackingStatus(Enum):
 
     OK = "ok"
     LIMITED = "limited"
-    HELD = "held"
+    GAP = "gap"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +87,14 @@ class Tracked:
     """
 
     best: Projection
-    ahead: Projection | None = None
+    beyond_gap: Projection | None = None
     since: ToolTarget | None = None
 
     @property
     def status(self) -> TrackingStatus:
         """HELD when a better pose lies beyond a gap, OK when nothing worth telling is given up."""
-        if self.ahead is not None:
-            return TrackingStatus.HELD
+        if self.beyond_gap is not None:
+            return TrackingStatus.GAP
         given_up = (
             self.best.position_error > POSITION_WORTH_TELLING
             or self.best.rotation_error > ANGLE_WORTH_TELLING
@@ -103,9 +103,9 @@ class Tracked:
 
     def leap_ahead(self) -> tuple[int, float]:
         """The axis (from 0) that would leap farthest to the pose ahead, and how far [rad]."""
-        if self.ahead is None:
+        if self.beyond_gap is None:
             return 0, 0.0
-        way = np.abs(self.ahead.q - self.best.q)
+        way = np.abs(self.beyond_gap.q - self.best.q)
         return int(way.argmax()), float(way.max())
 
 
@@ -115,7 +115,7 @@ def track(
     target: ToolTarget,
     *,
     branch: Branch,
-    reading: Reading = Reading.POSE,
+    priority: Priority = Priority.POSE,
     since: ToolTarget | None = None,
 ) -> Tracked:
     """From the goal `q` (5,) [rad] on `branch`, inside the limits, on towards `target`.
@@ -127,54 +127,60 @@ def track(
     """
     limited = LimitedArm.of(chain)
     alpha = limited.arm.angles(chain.clamp(q))
-    asked = target.asked(limited.arm, reading)
-    ahead = nearest_stance(limited, asked, branch, alpha)
+    canonical = target.canonical(limited.arm, priority)
+    ahead = nearest_posture(limited, canonical, branch, alpha)
     if _within_hop(alpha, ahead.alpha):
         return Tracked(
-            _projection(chain, target, asked, _not_away(limited.arm, alpha, asked, ahead))
+            _projection(chain, target, canonical, _not_away(limited.arm, alpha, canonical, ahead))
         )
     # One hop at least, so that there is an end.
-    effort = max(EFFORT - _effort(ahead), 1)
+    effort = max(MAX_POSES - _effort(ahead), 1)
     for stop in () if since is None else _way(limited.arm, since, target):
-        wish = stop.asked(limited.arm, reading)
-        pursuit = _Pursuit(limited, wish, nearest_stance(limited, wish, branch, alpha))
-        found = pursuit.follow(alpha, EFFORT_A_STRIDE)
+        stop_target = stop.canonical(limited.arm, priority)
+        pursuit = _Pursuit(
+            limited, stop_target, nearest_posture(limited, stop_target, branch, alpha)
+        )
+        found = pursuit.follow(alpha, MAX_POSES_PER_STRIDE)
         alpha, effort = found.alpha, effort - _effort(pursuit.best) - pursuit.effort
         if effort <= 0:
-            return Tracked(_projection(chain, target, asked, found), since=stop)
-    pursuit = _Pursuit(limited, asked, ahead)
+            return Tracked(_projection(chain, target, canonical, found), since=stop)
+    pursuit = _Pursuit(limited, canonical, ahead)
     found = pursuit.follow(alpha, effort)
-    best = _projection(chain, target, asked, found)
+    best = _projection(chain, target, canonical, found)
     if not pursuit.ended:
         return Tracked(best, since=target)
-    miss, miss_ahead = (_misses(limited.arm, asked, s.alpha) for s in (found, ahead))
-    if not _nearer(miss_ahead, miss, WORTH_A_LEAP):
+    miss, miss_ahead = (_misses(limited.arm, canonical, s.alpha) for s in (found, ahead))
+    if not _nearer(miss_ahead, miss, MIN_LEAP_GAIN):
         return Tracked(best)
-    return Tracked(best, ahead=_projection(chain, target, asked, ahead))
+    return Tracked(best, beyond_gap=_projection(chain, target, canonical, ahead))
 
 
 def leap(
-    chain: Chain, q: FloatArray, target: ToolTarget, branch: Branch, reading: Reading
+    chain: Chain, q: FloatArray, target: ToolTarget, branch: Branch, priority: Priority
 ) -> Projection:
     """The nearest pose to `target` on `branch`, however far from the goal `q` (5,) [rad].
 
     Pitch and roll are taken in the plane the arm comes to stand in. Errors as of `project`.
     """
     limited = LimitedArm.of(chain)
-    asked = target.asked(limited.arm, reading)
-    stance = nearest_stance(limited, asked, branch, limited.arm.angles(chain.check_q(q)))
-    return _projection(chain, target, asked, stance)
+    canonical = target.canonical(limited.arm, priority)
+    found_posture = nearest_posture(
+        limited, canonical, branch, limited.arm.angles(chain.check_q(q))
+    )
+    return _projection(chain, target, canonical, found_posture)
 
 
 def _projection(
-    chain: Chain, target: ToolTarget, asked: Asked, stance: NearestPosture
+    chain: Chain, target: ToolTarget, canonical: CanonicalTarget, found_posture: NearestPosture
 ) -> Projection:
     sign = LimitedArm.of(chain).arm.signs[0]
-    return measured(chain, target.pose(chain, sign * stance.alpha[0]), asked, stance)
+    return measured(
+        chain, target.pose(chain, sign * found_posture.alpha[0]), canonical, found_posture
+    )
 
 
 def _near(arm: FiveAxisArm, target: ToolTarget) -> ToolTarget:
-    far = math.hypot(*target.position) / (FAR * arm.reach)
+    far = math.hypot(*target.position) / (MAX_DISTANCE_RATIO * arm.reach)
     return target if far <= 1.0 else replace(target, position=target.position / far)
 
 
@@ -182,11 +188,11 @@ def _way(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[To
     """The stops of the drag, without its ends."""
     since, target = _near(arm, since), _near(arm, target)
     strides = max(
-        math.dist(since.position, target.position) / STRIDE,
+        math.dist(since.position, target.position) / DRAG_STRIDE,
         abs(target.pitch - since.pitch) / HOP,
         abs(target.roll - since.roll) / HOP,
     )
-    count = math.ceil(min(strides, LONGEST_WAY))
+    count = math.ceil(min(strides, MAX_PATH_LENGTH))
     return (since.towards(target, i / count) for i in range(1, count))
 
 
@@ -196,27 +202,29 @@ class _Pursuit:
     effort: what looking for them took. ended: whether no further one would lead nearer.
     """
 
-    def __init__(self, limited: LimitedArm, asked: Asked, best: NearestPosture) -> None:
+    def __init__(
+        self, limited: LimitedArm, canonical: CanonicalTarget, best: NearestPosture
+    ) -> None:
         self.limited = limited
-        self.asked = asked
+        self.canonical = canonical
         self.best = best
         self.effort = 0
         self.ended = False
 
-    def follow(self, alpha: Five, most: int) -> NearestPosture:
+    def follow(self, alpha: Five, maximum: int) -> NearestPosture:
         """`best` if it is a hop away, else where hops from `alpha` of so much effort lead."""
         arm = self.limited.arm
-        found, miss = None, _misses(arm, self.asked, alpha)
-        while not self.ended and self.effort < most:
+        found, miss = None, _misses(arm, self.canonical, alpha)
+        while not self.ended and self.effort < maximum:
             if _within_hop(alpha, self.best.alpha):
-                found, self.ended = _not_away(arm, alpha, self.asked, self.best), True
+                found, self.ended = _not_away(arm, alpha, self.canonical, self.best), True
                 break
-            hop = _hop(self.limited, alpha, self.asked, self.best.branch)
+            hop = _hop(self.limited, alpha, self.canonical, self.best.branch)
             self.effort += _effort(hop)
-            hop_miss = _misses(arm, self.asked, hop.alpha)
-            worthwhile = _nearer(hop_miss, miss, WORTH_A_HOP)
+            hop_miss = _misses(arm, self.canonical, hop.alpha)
+            worthwhile = _nearer(hop_miss, miss, MIN_HOP_GAIN)
             # Where not the bounds of the hop hold it, another one would lead nowhere.
-            self.ended = not worthwhile or _within(HOP * (1.0 - WORTH_A_HOP), alpha, hop.alpha)
+            self.ended = not worthwhile or _within(HOP * (1.0 - MIN_HOP_GAIN), alpha, hop.alpha)
             if worthwhile or (found is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
                 found, alpha, miss = hop, hop.alpha, hop_miss
             else:
@@ -226,42 +234,50 @@ class _Pursuit:
         return found
 
 
-def _effort(stance: NearestPosture) -> int:
-    reached = stance.position_error <= tolerances.SAME_POSITION
-    return stance.searches * (1 if reached else OUT_OF_REACH_EFFORT)
+def _effort(found_posture: NearestPosture) -> int:
+    reached = found_posture.position_error <= tolerances.SAME_POSITION
+    return found_posture.searches * (1 if reached else MAX_POSES_OUT_OF_REACH)
 
 
-def _not_away(arm: FiveAxisArm, alpha: Five, asked: Asked, best: NearestPosture) -> NearestPosture:
+def _not_away(
+    arm: FiveAxisArm, alpha: Five, canonical: CanonicalTarget, best: NearestPosture
+) -> NearestPosture:
     """`best`, but not where it only ends near the nearest place, farther from it than `alpha`."""
     if arm.off_axis == 0.0:
         return best
-    miss, miss_best = (_misses(arm, asked, angles) for angles in (alpha, best.alpha))
+    miss, miss_best = (_misses(arm, canonical, angles) for angles in (alpha, best.alpha))
     away = _nearer(miss, miss_best, tolerances.SAME_POSITION)
     return best._replace(alpha=alpha) if away else best
 
 
-def _hop(limited: LimitedArm, alpha: Five, asked: Asked, branch: Branch) -> NearestPosture:
+def _hop(
+    limited: LimitedArm, alpha: Five, canonical: CanonicalTarget, branch: Branch
+) -> NearestPosture:
     """The nearest pose with every axis within a hop of `alpha`."""
     arm = limited.arm
-    theta1 = _theta1(limited, alpha[0], asked, branch)
-    if asked.reading is Reading.PITCH:
+    theta1 = _theta1(limited, alpha[0], canonical, branch)
+    if canonical.priority is Priority.PITCH:
         # The pitch comes first, and no posture within a hop has one that is farther away.
         pitch = arm.pitch(alpha)
-        turn = wrapped(asked.pitch(alpha[0]) - pitch)
-        asked = asked.pitched(arm, pitch + min(max(turn, -HOP), HOP))
-    return nearest_stance(limited.near(alpha, HOP, theta1), asked, branch, alpha)
+        turn = wrapped(canonical.pitch(alpha[0]) - pitch)
+        canonical = canonical.pitched(arm, pitch + min(max(turn, -HOP), HOP))
+    return nearest_posture(limited.near(alpha, HOP, theta1), canonical, branch, alpha)
 
 
-def _theta1(limited: LimitedArm, theta1: float, asked: Asked, branch: Branch) -> Interval:
+def _theta1(
+    limited: LimitedArm, theta1: float, canonical: CanonicalTarget, branch: Branch
+) -> Interval:
     """Where axis 1 may go from `theta1` in a hop, which is the way that leads nearer."""
-    facing = asked.facing(limited.arm, branch.shoulder)
+    facing = canonical.facing(limited.arm, branch.shoulder)
     if facing is None:
         return Interval(theta1, theta1)
     turn = wrapped(facing - theta1)
-    aside = asked.aside(limited.arm)
+    aside = canonical.aside(limited.arm)
     if aside != 0.0:
         # A plane beside axis 1 comes nearer on one way round, though it may be the longer one.
-        square = math.copysign(0.5 * math.pi, aside) - (math.atan2(asked.y, asked.x) - facing)
+        square = math.copysign(0.5 * math.pi, aside) - (
+            math.atan2(canonical.y, canonical.x) - facing
+        )
         turn = square + wrapped(turn - square)
     elif abs(turn) > 0.5 * math.pi:
         # The target is behind the tool point's side of axis 1: no small turn brings it nearer.
@@ -282,15 +298,15 @@ def _within_hop(a: Five, b: Five) -> bool:
     return _within(HOP, a, b)
 
 
-def _misses(arm: FiveAxisArm, asked: Asked, alpha: Five) -> tuple[float, ...]:
+def _misses(arm: FiveAxisArm, canonical: CanonicalTarget, alpha: Five) -> tuple[float, ...]:
     """What `alpha` misses of `asked` [m], [rad], what counts most first."""
-    position = math.dist(arm.tool_point(alpha), asked.tool)
+    position = math.dist(arm.tool_point(alpha), canonical.tool)
     pitch, roll = arm.pitch(alpha), alpha[4]
-    if asked.reading is Reading.POSE:
-        return position, asked.orientation.angle(pitch, roll)
-    wished_pitch, wished_roll = asked.orientation.best()
+    if canonical.priority is Priority.POSE:
+        return position, canonical.orientation.angle(pitch, roll)
+    wished_pitch, wished_roll = canonical.orientation.best()
     pitch, roll = abs(wrapped(pitch - wished_pitch)), abs(wrapped(roll - wished_roll))
-    if asked.reading is Reading.PITCH:
+    if canonical.priority is Priority.PITCH:
         return pitch, position, roll
     return position, pitch, roll
 

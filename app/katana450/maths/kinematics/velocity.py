@@ -44,7 +44,7 @@ class JogFrame(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Ellipsoid:
+class VelocityEllipsoid:
     """Velocities of the tool point with joint rates of unit norm.
 
     axes: (3, 3), the principal directions in {S} as columns, right-handed. radii: (3,) [m/rad],
@@ -90,13 +90,13 @@ def limit_distances(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     return np.minimum(q - chain.lower, chain.upper - q)
 
 
-def velocity_ellipsoid(chain: Chain, q: npt.ArrayLike) -> Ellipsoid:
+def velocity_ellipsoid(chain: Chain, q: npt.ArrayLike) -> VelocityEllipsoid:
     """Of the translational Jacobian of the tool point at `q` (n,) [rad]."""
     R = forward(chain, q)[:3, :3]
     axes, radii, _ = np.linalg.svd(R @ jacobian_body(chain, q)[3:])
     if np.linalg.det(axes) < 0.0:
         axes[:, 2] *= -1.0
-    return Ellipsoid(frozen(axes), frozen(radii))
+    return VelocityEllipsoid(frozen(axes), frozen(radii))
 
 
 def jog(
@@ -129,25 +129,25 @@ def jog(
     # Slowed before the limits are looked at: what the arm is too slow for passes none.
     wanted /= _excess(chain, _damped(J, wanted))
     # A joint beyond its limit may come back, and need not.
-    most = np.maximum((chain.upper - q) / dt, 0.0)
-    least = np.minimum((chain.lower - q) / dt, 0.0)
+    maximum = np.maximum((chain.upper - q) / dt, 0.0)
+    minimum = np.minimum((chain.lower - q) / dt, 0.0)
     if bounds is not None:
-        least, most = np.maximum(least, bounds[0]), np.minimum(most, bounds[1])
+        minimum, maximum = np.maximum(minimum, bounds[0]), np.minimum(maximum, bounds[1])
     qd = np.zeros(chain.n)
     free = np.ones(chain.n, dtype=np.bool_)
     while free.any():
         qd[free] = _damped(J[:, free], wanted - J[:, ~free] @ qd[~free])
-        over = np.where(free, np.maximum(qd - most, least - qd), -math.inf)
+        over = np.where(free, np.maximum(qd - maximum, minimum - qd), -math.inf)
         worst = int(over.argmax())
         if over[worst] <= 0.0:
             break
-        qd[worst] = min(max(qd[worst], least[worst]), most[worst])
+        qd[worst] = min(max(qd[worst], minimum[worst]), maximum[worst])
         free[worst] = False
     return qd / _excess(chain, qd)
 
 
-def followed(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = None) -> float:
-    """The share of the twist `V` (6,) in {S} that a jog at `q` (n,) [rad] follows, from 0 to 1.
+def limited_jog(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = None) -> float:
+    """The fraction of the twist `V` (6,) in {S} that a jog at `q` (n,) [rad] follows, from 0 to 1.
 
     However fast it is. edge: so far from a limit [rad] a joint does not go towards it; None leaves
     limits aside.
@@ -158,10 +158,10 @@ def followed(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = No
         return 1.0
     if edge is None:
         return float(wanted @ (J @ _damped(J, wanted))) / size
-    least = np.where(q - chain.lower > edge, -chain.speed, 0.0)
-    most = np.where(chain.upper - q > edge, chain.speed, 0.0)
+    minimum = np.where(q - chain.lower > edge, -chain.speed, 0.0)
+    maximum = np.where(chain.upper - q > edge, chain.speed, 0.0)
     slow = SLOW / math.sqrt(size)
-    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(least, most))
+    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(minimum, maximum))
     return float(wanted @ (J @ qd)) / (slow * size)
 
 

@@ -26,18 +26,18 @@ from ruckig import (
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
-STRAIGHT = 1e-6
+LINE_TOLERANCE = 1e-6
 """Of the limits: a motion this little beside the line to its goal is on it."""
 
-SLACK = 1e-9
+LIMIT_TOLERANCE = 1e-9
 """[rad] A plan that ends at a limit may miss it by rounding."""
 
-DONE = (Result.Working, Result.Finished)
+VALID_RESULTS = (Result.Working, Result.Finished)
 
-CALM = 0.7
+BOUND_BRAKE_FRACTION = 0.7
 """Of acceleration and jerk, what a joint that is led along a bound brakes with."""
 
-LEAST_SHARE = 1e-3
+MIN_SPEED_FRACTION = 1e-3
 """Of the speed; slower than that takes ages and is a hold."""
 
 
@@ -64,7 +64,7 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class JointMotion:
     """Where the joints are and how they move: q, qd, qdd, (n,) each [rad, rad/s, rad/s^2]."""
 
     q: FloatArray
@@ -72,10 +72,10 @@ class Motion:
     qdd: FloatArray
 
     @staticmethod
-    def rest(q: FloatArray) -> Motion:
+    def rest(q: FloatArray) -> JointMotion:
         """Standing still at ``q`` (n,)."""
         zero = frozen(np.zeros(len(q)))
-        return Motion(frozen(q), zero, zero)
+        return JointMotion(frozen(q), zero, zero)
 
     @property
     def at_rest(self) -> bool:
@@ -100,7 +100,9 @@ class Limiter:
         self._input.max_acceleration = limits.acceleration.tolist()
         self._input.max_jerk = limits.jerk.tolist()
 
-    def towards(self, now: Motion, goal: FloatArray, dt: float, share: float = 1.0) -> Motion:
+    def towards(
+        self, now: JointMotion, goal: FloatArray, dt: float, fraction: float = 1.0
+    ) -> JointMotion:
         """The motion ``dt`` [s] on, on its way to rest at ``goal`` (n,) inside the limits.
 
         All joints arrive together. A motion that heads straight for the goal, as one from rest
@@ -110,10 +112,10 @@ class Limiter:
         """
         if dt <= 0.0 or (now.at_rest and (now.q == goal).all()):
             return now
-        along = self._along(now, goal, dt, share)
+        along = self._along(now, goal, dt, fraction)
         if along is not None:
             return along
-        self._start(now, ControlInterface.Position, share)
+        self._start(now, ControlInterface.Position, fraction)
         self._input.target_position = goal.tolist()
         self._input.target_velocity = [0.0] * len(goal)
         for synchronization in (Synchronization.Time, Synchronization.No):
@@ -123,7 +125,9 @@ class Limiter:
         # Each joint alone would still leave its limits, so it came too fast: stop first.
         return self.stop(now, dt)
 
-    def at_rate(self, now: Motion, qd: FloatArray, dt: float, share: float = 1.0) -> Motion:
+    def at_rate(
+        self, now: JointMotion, qd: FloatArray, dt: float, fraction: float = 1.0
+    ) -> JointMotion:
         """The motion ``dt`` [s] on, on its way to the joint rates ``qd`` (n,) [rad/s].
 
         The joints get to them in step, so that the direction stays what it is. Where one could then
@@ -131,12 +135,12 @@ class Limiter:
         """
         if dt <= 0.0:
             return now
-        wanted = np.clip(qd, -share * self.limits.speed, share * self.limits.speed)
+        wanted = np.clip(qd, -fraction * self.limits.speed, fraction * self.limits.speed)
         synchronization = Synchronization.Phase
         for _ in range(len(wanted) + 1):
-            ahead = self._rates(now, wanted, dt, share, synchronization)
-            halt = self.halt(ahead)
-            beyond = (halt < self.limits.lower) | (halt > self.limits.upper)
+            ahead = self._rates(now, wanted, dt, fraction, synchronization)
+            stopping_point = self.stopping_point(ahead)
+            beyond = (stopping_point < self.limits.lower) | (stopping_point > self.limits.upper)
             if not beyond.any():
                 return ahead
             wanted = np.where(beyond, 0.0, wanted)
@@ -148,14 +152,17 @@ class Limiter:
 
         Braking takes v^2 / 2a + v a / 2j, or v^(3/2) / j^(1/2) where the jerk alone bounds it.
         """
-        a, j = CALM * self.limits.acceleration, CALM * self.limits.jerk
+        a, j = (
+            BOUND_BRAKE_FRACTION * self.limits.acceleration,
+            BOUND_BRAKE_FRACTION * self.limits.jerk,
+        )
         rooms = np.maximum((q - self.limits.lower, self.limits.upper - q), 0.0)
         soft = a * a / (2.0 * j)
         long = np.sqrt(soft * soft + 2.0 * a * rooms) - soft
-        least, most = np.where(rooms > 4.0 * soft * soft / a, long, np.cbrt(j * rooms * rooms))
-        return -least, most
+        minimum, maximum = np.where(rooms > 4.0 * soft * soft / a, long, np.cbrt(j * rooms * rooms))
+        return -minimum, maximum
 
-    def pause(self, now: Motion, goal: FloatArray, dt: float) -> Motion:
+    def pause(self, now: JointMotion, goal: FloatArray, dt: float) -> JointMotion:
         """The motion ``dt`` [s] on when it brakes on its way to ``goal``, so that it can go on."""
         if dt <= 0.0 or now.at_rest:
             return now
@@ -166,13 +173,13 @@ class Limiter:
                 return self._on_line(now, line, dt)
         return self.stop(now, dt)
 
-    def stop(self, now: Motion, dt: float) -> Motion:
+    def stop(self, now: JointMotion, dt: float) -> JointMotion:
         """The motion ``dt`` [s] on when every joint brakes as hard as it may."""
         if dt <= 0.0 or now.at_rest:
             return now
         return self._rates(now, np.zeros(len(now.q)), dt, 1.0, Synchronization.No)
 
-    def halt(self, now: Motion) -> FloatArray:
+    def stopping_point(self, now: JointMotion) -> FloatArray:
         """(n,) where the joints come to rest when they brake now [rad]."""
         if now.at_rest:
             return now.q
@@ -180,7 +187,7 @@ class Limiter:
         q, _, _ = self._trajectory.at_time(self._trajectory.duration)
         return np.array(q)
 
-    def way_to_halt(self, now: Motion, longest: float) -> list[FloatArray]:
+    def stopping_path(self, now: JointMotion, longest: float) -> list[FloatArray]:
         """Where the joints pass when they brake now, (n,) each, the present place first.
 
         longest: [rad] all joints together move no farther from one to the next.
@@ -195,30 +202,32 @@ class Limiter:
         times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
         return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
 
-    def braking(self, now: Motion) -> tuple[Callable[[float], Motion], float]:
+    def braking(self, now: JointMotion) -> tuple[Callable[[float], JointMotion], float]:
         """The motion by time from now on [s] when every joint brakes, and how long that takes [s].
 
         To be used before anything else is asked of this limiter.
         """
         self._brake(now)
         at = self._trajectory.at_time
-        return lambda t: Motion(*map(np.array, at(t))), self._trajectory.duration
+        return lambda t: JointMotion(*map(np.array, at(t))), self._trajectory.duration
 
-    def fastest(self, now: Motion) -> FloatArray:
+    def fastest(self, now: JointMotion) -> FloatArray:
         """(n,) the greatest rates while they brake from now on [rad/s]: they may still rise."""
         rise = now.qdd * np.abs(now.qdd) / (2.0 * self.limits.jerk)
         return np.maximum(np.abs(now.qd), np.abs(now.qd + rise))
 
-    def time_to_halt(self, now: Motion) -> float:
+    def stopping_time(self, now: JointMotion) -> float:
         """[s] until then."""
         if now.at_rest:
             return 0.0
         self._brake(now)
         return float(self._trajectory.duration)
 
-    def _along(self, now: Motion, goal: FloatArray, dt: float, share: float) -> Motion | None:
+    def _along(
+        self, now: JointMotion, goal: FloatArray, dt: float, fraction: float
+    ) -> JointMotion | None:
         """The step on the straight line to ``goal``, or None when the motion is not on it."""
-        line = self._line_to(now, goal, share)
+        line = self._line_to(now, goal, fraction)
         if line is None:
             return None
         self._line.control_interface = ControlInterface.Position
@@ -228,10 +237,10 @@ class Limiter:
         if not all(self._holds(now.q + end * line) for end in (extrema.min, extrema.max)):
             return None
         if self._line_trajectory.duration <= dt:
-            return Motion.rest(goal)
+            return JointMotion.rest(goal)
         return self._on_line(now, line, dt)
 
-    def _line_to(self, now: Motion, goal: FloatArray, share: float) -> FloatArray | None:
+    def _line_to(self, now: JointMotion, goal: FloatArray, fraction: float) -> FloatArray | None:
         """The direction (n,) to ``goal``, the plan along it prepared; None when not on the way."""
         way = goal - now.q
         length = float(np.linalg.norm(way))
@@ -244,7 +253,7 @@ class Limiter:
             float(np.max(np.abs(now.qd - v * d) / limits.speed)),
             float(np.max(np.abs(now.qdd - a * d) / limits.acceleration)),
         )
-        if beside > STRAIGHT:
+        if beside > LINE_TOLERANCE:
             return None
         # A joint that hardly takes part bounds nothing.
         with np.errstate(divide="ignore", over="ignore"):
@@ -255,39 +264,42 @@ class Limiter:
             )
         line.current_position, line.target_position = [0.0], [length]
         line.current_velocity, line.current_acceleration = [v], [a]
-        line.max_velocity = [max(share, LEAST_SHARE) * speed]
+        line.max_velocity = [max(fraction, MIN_SPEED_FRACTION) * speed]
         line.max_acceleration, line.max_jerk = [acceleration], [jerk]
         return np.asarray(d)
 
-    def _on_line(self, now: Motion, line: FloatArray, dt: float) -> Motion:
+    def _on_line(self, now: JointMotion, line: FloatArray, dt: float) -> JointMotion:
         (s,), (v,), (a,) = self._line_trajectory.at_time(dt)
         q = np.clip(now.q + s * line, self.limits.lower, self.limits.upper)
         if self._line_trajectory.duration <= dt:
-            return Motion.rest(q)
-        return Motion(frozen(q), frozen(v * line), frozen(a * line))
+            return JointMotion.rest(q)
+        return JointMotion(frozen(q), frozen(v * line), frozen(a * line))
 
     def _holds(self, q: FloatArray) -> bool:
         limits = self.limits
-        return bool((q >= limits.lower - SLACK).all() and (q <= limits.upper + SLACK).all())
+        return bool(
+            (q >= limits.lower - LIMIT_TOLERANCE).all()
+            and (q <= limits.upper + LIMIT_TOLERANCE).all()
+        )
 
-    def _brake(self, now: Motion) -> None:
+    def _brake(self, now: JointMotion) -> None:
         self._aim_at_rates(now, [0.0] * len(now.q), 1.0, Synchronization.No)
 
     def _rates(
         self,
-        now: Motion,
+        now: JointMotion,
         qd: FloatArray,
         dt: float,
-        share: float,
+        fraction: float,
         synchronization: Synchronization,
-    ) -> Motion:
-        self._aim_at_rates(now, qd.tolist(), share, synchronization)
+    ) -> JointMotion:
+        self._aim_at_rates(now, qd.tolist(), fraction, synchronization)
         return self._at(dt, None, to_rest=not qd.any())
 
     def _aim_at_rates(
-        self, now: Motion, qd: list[float], share: float, synchronization: Synchronization
+        self, now: JointMotion, qd: list[float], fraction: float, synchronization: Synchronization
     ) -> None:
-        self._start(now, ControlInterface.Velocity, share)
+        self._start(now, ControlInterface.Velocity, fraction)
         self._input.target_velocity = qd
         for way in (synchronization, Synchronization.No):
             self._input.synchronization = way
@@ -295,12 +307,12 @@ class Limiter:
                 return
         raise ArithmeticError("No way to brake was found, which is a fault of the limiter.")
 
-    def _start(self, now: Motion, interface: ControlInterface, share: float) -> None:
+    def _start(self, now: JointMotion, interface: ControlInterface, fraction: float) -> None:
         self._input.control_interface = interface
         self._input.current_position = now.q.tolist()
         self._input.current_velocity = now.qd.tolist()
         self._input.current_acceleration = now.qdd.tolist()
-        self._input.max_velocity = (max(share, LEAST_SHARE) * self.limits.speed).tolist()
+        self._input.max_velocity = (max(fraction, MIN_SPEED_FRACTION) * self.limits.speed).tolist()
 
     def _planned(self) -> bool:
         return _planned(self._ruckig, self._input, self._trajectory)
@@ -308,28 +320,28 @@ class Limiter:
     def _inside(self) -> bool:
         extrema = self._trajectory.position_extrema
         return all(
-            lower - SLACK <= each.min and each.max <= upper + SLACK
+            lower - LIMIT_TOLERANCE <= each.min and each.max <= upper + LIMIT_TOLERANCE
             for each, lower, upper in zip(
                 extrema, self.limits.lower.tolist(), self.limits.upper.tolist(), strict=True
             )
         )
 
-    def _at(self, dt: float, goal: FloatArray | None, *, to_rest: bool = False) -> Motion:
+    def _at(self, dt: float, goal: FloatArray | None, *, to_rest: bool = False) -> JointMotion:
         ends = self._trajectory.duration <= dt
         q, qd, qdd = (np.array(each) for each in self._trajectory.at_time(dt))
         if goal is not None and ends:
-            return Motion.rest(goal)
+            return JointMotion.rest(goal)
         np.clip(q, self.limits.lower, self.limits.upper, out=q)
         if ends and to_rest:
-            return Motion.rest(q)
+            return JointMotion.rest(q)
         if ends:
             qdd[:] = 0.0
-        return Motion(frozen(q), frozen(qd), frozen(qdd))
+        return JointMotion(frozen(q), frozen(qd), frozen(qdd))
 
 
 def _planned(ruckig: Ruckig, wanted: InputParameter, trajectory: Trajectory) -> bool:
     """Whether ``trajectory`` now leads where ``wanted`` says; there may be another way."""
     try:
-        return ruckig.calculate(wanted, trajectory) in DONE
+        return ruckig.calculate(wanted, trajectory) in VALID_RESULTS
     except RuckigError:
         return False

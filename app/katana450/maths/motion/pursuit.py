@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.motion.limiter import LEAST_SHARE, Limiter, Limits, Motion
+from katana450.maths.motion.limiter import MIN_SPEED_FRACTION, JointMotion, Limiter, Limits
 from katana450.maths.motion.stream import Stream
 
 BoolArray = npt.NDArray[np.bool_]
@@ -20,10 +20,10 @@ BoolArray = npt.NDArray[np.bool_]
 POSITION_GAIN, RATE_GAIN, ACCELERATION_GAIN = 8.0, 16.0, 48.0
 """[1/s] Of errors of position, rate and acceleration."""
 
-APPROACH = 0.6
+APPROACH_FRACTION = 0.6
 """[1] Of the acceleration that the motion followed leaves over, what brakes an approach."""
 
-LEAST_LEFT = 0.15
+MIN_APPROACH_FRACTION = 0.15
 """[1] Of all acceleration, what an approach may count on in any case."""
 
 HALVINGS = 12
@@ -31,25 +31,25 @@ HALVINGS = 12
 
 
 def stream_step(
-    limiter: Limiter, now: Motion, stream: Stream, t: float, dt: float, share: float = 1.0
-) -> Motion:
+    limiter: Limiter, now: JointMotion, stream: Stream, t: float, dt: float, fraction: float = 1.0
+) -> JointMotion:
     """The motion ``dt`` [s] on from ``now``, at the time ``t`` [s], that follows ``stream``.
 
     A stream inside the limits is reproduced with a short lag; for another one the motion stays
     inside its extremes, as far as these can be foreseen. share: of the greatest speed.
     """
     bounds = _intended(stream, t, limiter.limits)
-    return pursued(limiter, now, stream.at(t), bounds, dt, share)
+    return pursued(limiter, now, stream.at(t), bounds, dt, fraction)
 
 
 def pursued(
     limiter: Limiter,
-    now: Motion,
-    wanted: Motion,
+    now: JointMotion,
+    wanted: JointMotion,
     bounds: tuple[FloatArray, FloatArray],
     dt: float,
-    share: float = 1.0,
-) -> Motion:
+    fraction: float = 1.0,
+) -> JointMotion:
     """The motion ``dt`` [s] on from ``now``, following ``wanted``, which is where to be by then.
 
     bounds: the least and the most (n,) [rad] between which every joint could come to rest, wherever
@@ -59,7 +59,7 @@ def pursued(
     if dt <= 0.0:
         return now
     limits = limiter.limits
-    A, J, V = limits.acceleration, limits.jerk, max(share, LEAST_SHARE) * limits.speed
+    A, J, V = limits.acceleration, limits.jerk, max(fraction, MIN_SPEED_FRACTION) * limits.speed
     qd, qdd = np.clip(wanted.qd, -V, V), np.clip(wanted.qdd, -A, A)
     here = braked(now.q, now.qd, now.qdd, A, J)
     low = np.minimum(np.maximum(bounds[0], limits.lower), here)
@@ -78,11 +78,11 @@ def pursued(
         rest, (dip, peak) = braked(q, v, a, A, J), _rates_ahead(v, a, J)
         return (rest < low) | (dip < slowest), (rest > high) | (peak > fastest)
 
-    least, most = np.maximum(-J, (-A - now.qdd) / dt), np.minimum(J, (A - now.qdd) / dt)
-    jerk = np.clip(_wished_jerk(now, wanted.q, qd, qdd, A, V, dt), least, most)
+    minimum, maximum = np.maximum(-J, (-A - now.qdd) / dt), np.minimum(J, (A - now.qdd) / dt)
+    jerk = np.clip(_wished_jerk(now, wanted.q, qd, qdd, A, V, dt), minimum, maximum)
     down, up = beyond(jerk)
     if (down | up).any():
-        good, bad = np.where(up, least, np.where(down, most, jerk)), jerk
+        good, bad = np.where(up, minimum, np.where(down, maximum, jerk)), jerk
         for _ in range(HALVINGS):
             middle = 0.5 * (good + bad)
             too_low, too_high = beyond(middle)
@@ -95,7 +95,7 @@ def pursued(
         # A jerk that lasts for all of dt is too coarse: brake exactly.
         stop, brakes = limiter.stop(now, dt), down | up
         q, v, a = (np.where(brakes, x, y) for x, y in ((stop.q, q), (stop.qd, v), (stop.qdd, a)))
-    return Motion(frozen(np.clip(q, limits.lower, limits.upper)), frozen(v), frozen(a))
+    return JointMotion(frozen(np.clip(q, limits.lower, limits.upper)), frozen(v), frozen(a))
 
 
 def _rates_ahead(v: FloatArray, a: FloatArray, J: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -104,7 +104,7 @@ def _rates_ahead(v: FloatArray, a: FloatArray, J: FloatArray) -> tuple[FloatArra
 
 
 def _wished_jerk(
-    now: Motion,
+    now: JointMotion,
     q: FloatArray,
     qd: FloatArray,
     qdd: FloatArray,
@@ -115,7 +115,7 @@ def _wished_jerk(
     """(n,) what leads to ``q``, ``qd`` and ``qdd`` in ``dt`` [s] and on with them."""
     error = q - dt * qd + 0.5 * dt * dt * qdd - now.q
     drift = qd - dt * qdd - now.qd
-    left = APPROACH * np.maximum(A + np.sign(error) * qdd, LEAST_LEFT * A)
+    left = APPROACH_FRACTION * np.maximum(A + np.sign(error) * qdd, MIN_APPROACH_FRACTION * A)
     # Linear near by; beyond, the speed that the acceleration left over can lose on the way.
     near = left / POSITION_GAIN**2
     root = np.sqrt(2.0 * left * np.maximum(np.abs(error) - 0.5 * near, 0.5 * near))

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.motion.limiter import Motion
+from katana450.maths.motion.limiter import JointMotion
 
-LAG = 0.02
+READ_DELAY = 0.02
 """[s] How long before now an even stream is read: about one sample of a usual one."""
 
 WINDOW = 0.12
@@ -28,7 +28,7 @@ MORE_LAG, MOST_LAG = 8.0, 0.03
 MORE_WINDOW, MOST_WINDOW = 20.0, 0.14
 """[1], [s] Window added per second of jitter, and the most of it."""
 
-MEMORY = 4.0
+TURN_MEMORY = 4.0
 """[s] Over which it is forgotten how hard a stream has turned."""
 
 MARGIN, MOST_HARDNESS = 1.15, 5.0
@@ -37,10 +37,10 @@ MARGIN, MOST_HARDNESS = 1.15, 5.0
 DOUBT, MOST_DOUBT = 100.0, 0.4
 """[1/s], [1] About its rates, per second of jitter, and the most of it."""
 
-SPREAD = 0.08
+MIN_SPREAD = 0.08
 """[s] Over which samples have to lie before their curvature says anything."""
 
-FEWEST = 4
+MIN_SAMPLES = 4
 """Samples kept of a slow stream, whatever their age."""
 
 SPACING = 2e-3
@@ -52,7 +52,7 @@ AVERAGING = 0.1
 RATES_WEIGHT = 0.05
 """[s] Error of a position that counts as much as one of a rate by 1 per second."""
 
-AHEAD = 0.04
+CURVE_HORIZON = 0.04
 """[s] Beyond its newest sample, or two periods if longer, a stream is taken to curve as it did."""
 
 
@@ -82,7 +82,7 @@ class Stream:
     jitter: float = 0.0
 
     @staticmethod
-    def begun(t: float, q: FloatArray, qd: FloatArray | None) -> Stream:
+    def begin(t: float, q: FloatArray, qd: FloatArray | None) -> Stream:
         """The stream whose first sample ``q`` (n,), changing at ``qd``, came at ``t`` [s]."""
         rates = None if qd is None else qd[None]
         times, samples = np.array([t]), q[None]
@@ -101,12 +101,16 @@ class Stream:
 
     @property
     def _lag(self) -> float:
-        return LAG if self.qd is not None else LAG + min(MORE_LAG * self.jitter, MOST_LAG)
+        return (
+            READ_DELAY
+            if self.qd is not None
+            else READ_DELAY + min(MORE_LAG * self.jitter, MOST_LAG)
+        )
 
     @property
     def sure_until(self) -> float:
         """[s] From when on nothing is known of where it goes, unless another sample comes."""
-        return self.t + self._lag + max(AHEAD, 2.0 * self.period)
+        return self.t + self._lag + max(CURVE_HORIZON, 2.0 * self.period)
 
     def followed_by(
         self, t: float, q: FloatArray, qd: FloatArray | None, acceleration: FloatArray
@@ -116,7 +120,7 @@ class Stream:
         if qd is not None and self.qd is not None:
             rates = self.qd
         elif qd is not None or self.qd is not None:
-            return Stream.begun(t, q, qd)
+            return Stream.begin(t, q, qd)
         interval = t - self.t
         if interval < SPACING:
             kept, period, jitter = slice(0, -1), self.period, self.jitter
@@ -125,15 +129,15 @@ class Stream:
             jitter = self.jitter + AVERAGING / 2.0 * (abs(interval - period) - self.jitter)
             window = WINDOW if qd is not None else WINDOW + min(MORE_WINDOW * jitter, MOST_WINDOW)
             first = int(np.searchsorted(self.times, t - window))
-            kept = slice(max(min(first, len(self.times) - FEWEST + 1), 0), None)
+            kept = slice(max(min(first, len(self.times) - MIN_SAMPLES + 1), 0), None)
         times = np.append(self.times[kept], t if interval >= SPACING else self.t)
         samples = np.vstack((self.q[kept], q))
         if rates is not None and qd is not None:
             rates = np.vstack((rates[kept], qd))
         parabola = _fitted(times, samples, rates)
-        fading = math.exp(-max(interval, 0.0) / MEMORY)
+        fading = math.exp(-max(interval, 0.0) / TURN_MEMORY)
         hardness = np.maximum(1.0 + fading * (self.hardness - 1.0), 1.0)
-        if times[-1] - times[0] >= SPREAD:
+        if times[-1] - times[0] >= MIN_SPREAD:
             seen = MARGIN * np.abs(2.0 * parabola[2]) / acceleration
             hardness = np.maximum(hardness, np.minimum(seen, MOST_HARDNESS))
         return Stream(
@@ -148,14 +152,14 @@ class Stream:
             jitter,
         )
 
-    def at(self, now: float) -> Motion:
+    def at(self, now: float) -> JointMotion:
         """What the stream does, as seen at ``now`` [s]: q, qd, qdd (n,) a short lag ago."""
         seen = min(now, self.sure_until)
         late, known = now - seen, seen - self._lag - self.t
         c0, c1, c2 = self.parabola
         q, qd = c0 + known * (c1 + known * c2), c1 + 2.0 * known * c2
         qdd = 2.0 * c2 if late == 0.0 else 0.0 * c2
-        return Motion(frozen(q + late * qd), frozen(qd), frozen(qdd))
+        return JointMotion(frozen(q + late * qd), frozen(qd), frozen(qdd))
 
 
 def _fitted(times: FloatArray, q: FloatArray, qd: FloatArray | None) -> FloatArray:

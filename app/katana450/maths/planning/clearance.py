@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.maths.collision.clearance import SAME, SAME_DEPTH, STOP
+from katana450.maths.collision.clearance import DEPTH_ROUNDING, DISTANCE_ROUNDING, STOP
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import LONGEST_WAY, Placed, World
+from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.checkpoint import checkpoint
 
@@ -23,7 +23,7 @@ FINE = 1e-4
 """[m] A piece on which no body travels farther is not halved: the least clearance may be nearer by
 that much than asked for."""
 
-SHARE = 0.1
+FRACTION = 0.1
 """[1] How exactly the nearest clearance is found, of itself."""
 
 At = Callable[[float], FloatArray]
@@ -42,34 +42,34 @@ class Clearance:
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
+class SweptClearance:
     """What a way has to keep clear of, and by how much.
 
     world: bodies and pairs. least: (p,) [m] the distance that each pair keeps.
     """
 
-    world: World
-    least: FloatArray
+    world: CollisionWorld
+    minimum: FloatArray
 
     @staticmethod
     def about(
-        world: World, margin: float, start: FloatArray, end: FloatArray | None = None
-    ) -> Room:
+        world: CollisionWorld, margin: float, start: FloatArray, end: FloatArray | None = None
+    ) -> SweptClearance:
         """Room of `margin` [m] for a way from `start` (k,) to `end` (k,) [rad].
 
         Pairs that are nearer at the start come no nearer: so a way may lead out of a contact. Those
         that are nearer at the end may be as near as that, but not below STOP.
         """
-        least = np.full(len(world.first), margin)
+        minimum = np.full(len(world.first), margin)
         for x, lowest in ((start, -np.inf), (end, STOP)):
             if x is None:
                 continue
             placed = world.at(x)
             for pair in placed.nearer_than(margin)[0].tolist():
                 distance = placed.distance(pair)
-                rounding = SAME if distance > 0.0 else SAME_DEPTH
-                least[pair] = min(least[pair], max(distance - rounding, lowest))
-        return Room(world, least)
+                rounding = DISTANCE_ROUNDING if distance > 0.0 else DEPTH_ROUNDING
+                minimum[pair] = min(minimum[pair], max(distance - rounding, lowest))
+        return SweptClearance(world, minimum)
 
     def blocked(
         self, at: At, turned: Turned, low: float = 0.0, high: float = 1.0, fine: float = FINE
@@ -87,13 +87,13 @@ class Room:
             placed = self.world.at(x)
             travel = self._travel(placed, x, turned, low, high)
             # Where joints turn too far for a bound only the place itself is looked at.
-            reach = np.zeros(len(self.least)) if travel is None else travel
+            reach = np.zeros(len(self.minimum)) if travel is None else travel
             left_open = travel is None
-            for pair in placed.nearer_than(self.least + reach)[0].tolist():
+            for pair in placed.nearer_than(self.minimum + reach)[0].tolist():
                 distance = placed.distance(pair)
-                if distance < self.least[pair]:
+                if distance < self.minimum[pair]:
                     return Clearance(placed.contact(pair), middle)
-                left_open |= distance < self.least[pair] + reach[pair] and reach[pair] > fine
+                left_open |= distance < self.minimum[pair] + reach[pair] and reach[pair] > fine
             if left_open:
                 pieces += [(middle, high), (low, middle)]
         return None
@@ -101,10 +101,12 @@ class Room:
     def blocked_line(self, start: FloatArray, end: FloatArray) -> Clearance | None:
         """The same on the straight line from `start` (k,) to `end` (k,) [rad]."""
         way = end - start
-        return self.blocked(lambda share: start + share * way, lambda a, b: (b - a) * np.abs(way))
+        return self.blocked(
+            lambda fraction: start + fraction * way, lambda a, b: (b - a) * np.abs(way)
+        )
 
     def nearest(self, at: At, turned: Turned) -> Clearance | None:
-        """Where parts come nearest on the whole way, to SHARE of it; None when none can meet."""
+        """Where parts come nearest on the whole way, to FRACTION of it; None when none can meet."""
         best: Clearance | None = None
         pieces = [(0.0, 1.0)]
         while pieces:
@@ -122,7 +124,7 @@ class Room:
             if travel is None:
                 pieces += [(low, middle), (middle, high)]
                 continue
-            wanted = best.contact.distance - max(SHARE * abs(best.contact.distance), FINE)
+            wanted = best.contact.distance - max(FRACTION * abs(best.contact.distance), FINE)
             if any(
                 placed.distance(pair) < wanted + travel[pair]
                 for pair in placed.nearer_than(wanted + travel)[0].tolist()
@@ -132,7 +134,7 @@ class Room:
         return best
 
     def _travel(
-        self, placed: Placed, x: FloatArray, turned: Turned, low: float, high: float
+        self, placed: PlacedWorld, x: FloatArray, turned: Turned, low: float, high: float
     ) -> FloatArray | None:
         """(p,) the most that each pair travels from `x`, in the middle, to any place between.
 
@@ -140,6 +142,6 @@ class Room:
         """
         middle = 0.5 * (low + high)
         turns = np.maximum(turned(low, middle), turned(middle, high))
-        if float(turns.sum()) > LONGEST_WAY:
+        if float(turns.sum()) > MAX_PATH_LENGTH:
             return None
         return self.world.travel(placed, x, x + turns)

@@ -26,17 +26,17 @@ from katana450.maths.planning.jet import Jet, atan2, sin_cos
 from katana450.maths.planning.polyline import Polyline
 from katana450.maths.planning.posture import facing
 
-LEVER = 0.25
+TURN_LENGTH = 0.25
 """[m] A turn by 1 rad counts for as long a way, where the legs of a way are told in lengths."""
 
-SAME = 1e-9
+VIA_TOLERANCE = 1e-9
 """[m] Vias nearer to each other are one."""
 
 Profile = Callable[[Jet], Jet]
 """An angle along a curve [rad], as a function of sigma."""
 
 
-class Tool(NamedTuple):
+class ToolCoordinates(NamedTuple):
     """The five freedoms as jets: the tool point x, y, z in {S}, pitch and roll."""
 
     x: Jet
@@ -54,7 +54,7 @@ class Curve(Protocol):
         """Where between 0 and 1 one formula ends and another begins, growing."""
         ...
 
-    def at(self, sigma: Jet) -> Tool:
+    def at(self, sigma: Jet) -> ToolCoordinates:
         """The tool at `sigma`, one place or many."""
         ...
 
@@ -115,13 +115,13 @@ class ToolLine:
         """None: it is one formula."""
         return ()
 
-    def at(self, sigma: Jet) -> Tool:
+    def at(self, sigma: Jet) -> ToolCoordinates:
         x, y, z = (
             a + (b - a) * sigma
             for a, b in zip(self.start.position.tolist(), self.end.position.tolist(), strict=True)
         )
         pitch = Linear(self.start.pitch, self.end.pitch)(sigma)
-        return Tool(x, y, z, pitch, Linear(self.start.roll, self.end.roll)(sigma))
+        return ToolCoordinates(x, y, z, pitch, Linear(self.start.roll, self.end.roll)(sigma))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +141,8 @@ class ToolLines:
         numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
         legs = np.diff(numbers, axis=0)
         ways = np.linalg.norm(legs[:, :3], axis=1)
-        lengths = np.maximum(ways, LEVER * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
-        if len(rows) < 2 or (lengths <= SAME).any():
+        lengths = np.maximum(ways, TURN_LENGTH * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
+        if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
             raise InputError("Lines need two vias at least, each of them elsewhere.")
         line = Polyline(frozen(numbers), lengths, self.blend)
         object.__setattr__(self, "blend", line.blend)
@@ -153,8 +153,8 @@ class ToolLines:
         """Where legs and corners meet."""
         return self._line.joins
 
-    def at(self, sigma: Jet) -> Tool:
-        return Tool(*self._line.at(sigma))
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        return ToolCoordinates(*self._line.at(sigma))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,10 +188,10 @@ class ToolArc:
         """None: it is one formula."""
         return ()
 
-    def at(self, sigma: Jet) -> Tool:
+    def at(self, sigma: Jet) -> ToolCoordinates:
         s, c = sin_cos(self.angle * sigma)
         x, y, z = (c * u + s * v + (f + k * sigma) for u, v, f, k in self._terms)
-        return Tool(x, y, z, self.pitch(sigma), self.roll(sigma))
+        return ToolCoordinates(x, y, z, self.pitch(sigma), self.roll(sigma))
 
     @cached_property
     def _terms(self) -> list[list[float]]:
@@ -235,7 +235,7 @@ class ToolScrew:
         """None: it is one formula."""
         return ()
 
-    def at(self, sigma: Jet) -> Tool:
+    def at(self, sigma: Jet) -> ToolCoordinates:
         arm = arm_of(self.chain)
         x, y, z, _, _ = self._way.at(sigma)
         # The orientation of {K} in {C} as a quaternion, turned by the twist.
@@ -250,7 +250,7 @@ class ToolScrew:
         s, k = sin_cos(0.5 * alpha1)
         W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
         total, difference = atan2(X + Y, W + Z), atan2(Y - X, W - Z)
-        return Tool(x, y, z, total + difference, total - difference)
+        return ToolCoordinates(x, y, z, total + difference, total - difference)
 
     @cached_property
     def _way(self) -> ToolLine | ToolArc:

@@ -15,7 +15,7 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.polyline import Polyline
 from katana450.maths.planning.posture import FiveJets, ThreeJets, tool_point
 
-SAME = 1e-9
+VIA_TOLERANCE = 1e-9
 """[rad] Vias nearer to each other are one."""
 
 
@@ -36,7 +36,7 @@ class JointPath:
 
     def __post_init__(self) -> None:
         vias = np.array([self.chain.check_q(q) for q in self.vias])
-        if len(vias) < 2 or (np.abs(np.diff(vias, axis=0)).max(axis=1) <= SAME).any():
+        if len(vias) < 2 or (np.abs(np.diff(vias, axis=0)).max(axis=1) <= VIA_TOLERANCE).any():
             raise InputError("A path needs two vias at least, each of them elsewhere.")
         for number, q in enumerate(vias):
             if not self.chain.within_limits(q):

@@ -16,28 +16,28 @@ from katana450.maths.planning.scaling import CUBIC, Bounds, Scaling, rest_to_res
 KNOTS: Final = 20
 """Pieces of the slowness, and half as many more for each join of the path."""
 
-LOOKS: Final = 16
+SAMPLES_PER_PIECE: Final = 16
 """Places looked at in each of them; what lies between is covered by SPARE."""
 
-SPARE: Final = 0.995
+LIMIT_FRACTION: Final = 0.995
 """[1] Of every limit."""
 
 ROUNDS: Final = 50
 """Of making a path slower where it is too fast and faster where it is not."""
 
-TRIED: Final = 8
+TRIAL_ROUNDS: Final = 8
 """Of the same, to tell whether other a and j are better."""
 
-PRESS: Final = 0.6
+SLOWING_POWER: Final = 0.6
 """[1] Power of what a place is too fast by, by which it is slowed in one round."""
 
-RELAX: Final = 0.1
+SPEEDING_POWER: Final = 0.1
 """[1] The same where it is too slow: less, or the rounds would chase each other."""
 
-TINY: Final = 1e-300
+SMALLEST_DIVISOR: Final = 1e-300
 """Keeps nothing by nothing from being no number."""
 
-NARROWINGS: Final = (2.0, 1.4, 1.18, 1.08)
+SEARCH_FACTORS: Final = (2.0, 1.4, 1.18, 1.08)
 """[1] By which a and j are varied, ever less, as long as it saves time."""
 
 
@@ -56,14 +56,14 @@ def fastest(path: Path, bounds: Bounds) -> Scaling:
     # As slow everywhere, or as slow as each place by itself has to be: either may end up better.
     starts = even, sampled.near(sampled.excess(even, a, j))
     best = min((sampled.fitted(a, j, each, ROUNDS) for each in starts), key=lambda f: f.time)
-    for factor in NARROWINGS:
+    for factor in SEARCH_FACTORS:
         improved = True
         while improved:
             improved = False
             for x, y in ((1, 1), (-1, -1), (1, 0), (-1, 0), (0, 1), (0, -1)):
                 fa, fj = factor**x, factor**y
                 a, j = best.acceleration * fa, best.jerk * fj
-                other = sampled.fitted(a, j, best.coefficients, TRIED)
+                other = sampled.fitted(a, j, best.coefficients, TRIAL_ROUNDS)
                 if other.time < (1.0 - 1e-3) * best.time:
                     best, improved = other, True
     best = sampled.fitted(best.acceleration, best.jerk, best.coefficients, ROUNDS)
@@ -97,16 +97,16 @@ class _Sampled:
     @staticmethod
     def of(path: Path, bounds: Bounds) -> _Sampled:
         count = KNOTS + (KNOTS // 2) * len(path.joins)
-        even = np.linspace(0.0, 1.0, count * LOOKS + 1)
+        even = np.linspace(0.0, 1.0, count * SAMPLES_PER_PIECE + 1)
         # Either side of a join, where the third derivative leaps.
         joins = np.array(path.joins)
         sigma = np.unique(np.concatenate((even, joins - 1e-12, joins + 1e-12)))
         piece = np.minimum((sigma * count).astype(np.int64), count - 1)
-        share = sigma * count - piece
-        powers = np.stack((np.ones_like(share), share, share**2, share**3))
-        zero = np.zeros_like(share)
-        slopes = np.stack((zero, zero + count, 2.0 * count * share, 3.0 * count * share**2))
-        bends = np.stack((zero, zero, zero + 2.0 * count**2, 6.0 * count**2 * share))
+        fraction = sigma * count - piece
+        powers = np.stack((np.ones_like(fraction), fraction, fraction**2, fraction**3))
+        zero = np.zeros_like(fraction)
+        slopes = np.stack((zero, zero + count, 2.0 * count * fraction, 3.0 * count * fraction**2))
+        bends = np.stack((zero, zero, zero + 2.0 * count**2, 6.0 * count**2 * fraction))
         weights = np.stack([each.T @ CUBIC for each in (powers, slopes, bends)])
         return _Sampled(
             joint_derivatives(path, sigma)[1:],
@@ -120,18 +120,18 @@ class _Sampled:
     def fitted(self, a: float, j: float, start: FloatArray, rounds: int) -> _Fitted:
         """The least slowness found for the bounds `a` and `j` of tau(t), from `start` (K + 3,)."""
         c = start * self.excess(start, a, j).max()
-        best, least = c, np.inf
+        best, minimum = c, np.inf
         for _ in range(rounds):
             checkpoint()
             excess = self.excess(c, a, j)
-            most = float(excess.max())
+            maximum = float(excess.max())
             # tau at the end, were all made slower until nothing is too fast.
-            time = rest_to_rest(most * self._span(c), a, j)
-            if time < least:
-                best, least = most * c, time
+            time = rest_to_rest(maximum * self._span(c), a, j)
+            if time < minimum:
+                best, minimum = maximum * c, time
             near = self.near(excess)
-            c = c * np.where(near > 1.0, near**PRESS, near**RELAX)
-        return _Fitted(best, a, j, least)
+            c = c * np.where(near > 1.0, near**SLOWING_POWER, near**SPEEDING_POWER)
+        return _Fitted(best, a, j, minimum)
 
     def near(self, excess: FloatArray) -> FloatArray:
         """(K + 3,) the greatest of `excess` (N,) that each coefficient has a part in."""
@@ -157,7 +157,7 @@ class _Sampled:
         speed = np.abs(q1) * f
         bend = np.abs(q2 * f * f + q1 * s)
         jerk = np.abs(q3 * f**3 + 3.0 * q2 * f * s + q1 * t)
-        spare = SPARE
+        spare = LIMIT_FRACTION
         found = (speed / (spare * limits.speed)).max(axis=1)
         A, J = spare * limits.acceleration, spare * limits.jerk
         np.maximum(found, _quadratic(bend / A, a * speed / A).max(axis=1), out=found)
@@ -185,5 +185,5 @@ def _cubic(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     r = np.cbrt(x) + np.sqrt(y) + z
     for _ in range(3):
         value = ((r - z) * r - y) * r - x
-        r = r - value / ((3.0 * r - 2.0 * z) * r - y + TINY)
+        r = r - value / ((3.0 * r - 2.0 * z) * r - y + SMALLEST_DIVISOR)
     return r

@@ -18,7 +18,7 @@ from katana450.maths.planning.curve import Swing, ToolArc
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.posture import posture
 
-PLACES: Final = 48
+ARC_SAMPLES: Final = 48
 """Of the arc, looked at."""
 
 SWINGS: Final = np.radians((-30.0, -15.0, 0.0, 15.0, 30.0))
@@ -67,7 +67,7 @@ def _rooms(chain: Chain, branch: Branch, arc: ToolArc, swings: FloatArray) -> Fl
     Below 0 beyond them, and -infinity out of reach.
     """
     arm = arm_of(chain)
-    sigma = np.linspace(0.0, 1.0, PLACES + 1)
+    sigma = np.linspace(0.0, 1.0, ARC_SAMPLES + 1)
     x, y, z, _, roll = arc.at(Jet.constant(sigma))
     t = arc.angle * sigma
     pitch = swings @ np.stack((np.ones_like(t), np.sin(t), np.cos(t)))
@@ -79,6 +79,6 @@ def _rooms(chain: Chain, branch: Branch, arc: ToolArc, swings: FloatArray) -> Fl
         lower, upper = chain.lower[axis], chain.upper[axis]
         middle = 0.5 * (lower + upper)
         off = np.abs(np.remainder(q - middle + math.pi, math.tau) - math.pi)
-        least = np.min(0.5 * (upper - lower) - off, axis=-1)
-        room = np.minimum(room, np.where(np.isnan(least), -np.inf, least))
+        minimum = np.min(0.5 * (upper - lower) - off, axis=-1)
+        room = np.minimum(room, np.where(np.isnan(minimum), -np.inf, minimum))
     return room

@@ -13,10 +13,10 @@ import numpy as np
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import Fingerprint, World
+from katana450.maths.collision.world import CollisionWorld, Fingerprint
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.clearance import Clearance, Room
+from katana450.maths.planning.clearance import Clearance, SweptClearance
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.pacing import fastest
 from katana450.maths.planning.path import Path, point_derivatives
@@ -26,7 +26,7 @@ from katana450.maths.planning.sweep import Sweep
 MARGIN = STOP + 1e-3
 """[m] What a plan keeps: more than the arm stops at, so that rounding never stops it."""
 
-JOINED = 1e-7
+JOIN_TOLERANCE = 1e-7
 """[rad] Paths that follow each other meet to this."""
 
 CHORDS = 1000
@@ -34,7 +34,7 @@ CHORDS = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
+class PathMotion:
     """Joints at some tau, (5,) each: q [rad] and its derivatives by tau [rad/s, rad/s^2]."""
 
     q: FloatArray
@@ -49,14 +49,14 @@ class Segment:
     path: Path
     scaling: Scaling
 
-    def at(self, tau: float) -> Moving:
+    def at(self, tau: float) -> PathMotion:
         """The joints at `tau`, from 0 to the scaling's span [s]."""
         pace = self.scaling.pace(tau)
         joints = self.path.joints(Jet.variable(pace.sigma))
         q, q1, q2 = (
             np.array(each) for each in zip(*(j.derivatives()[:3] for j in joints), strict=True)
         )
-        return Moving(frozen(q), q1 * pace.first, q2 * pace.first**2 + q1 * pace.second)
+        return PathMotion(frozen(q), q1 * pace.first, q2 * pace.first**2 + q1 * pace.second)
 
     @cached_property
     def length(self) -> float:
@@ -136,7 +136,7 @@ class Plan:
 def plan(
     paths: Sequence[Path],
     bounds: Bounds,
-    world: World | None = None,
+    world: CollisionWorld | None = None,
     fingers: float = 0.0,
     margin: float = MARGIN,
 ) -> Plan:
@@ -151,7 +151,7 @@ def plan(
         raise InputError("A plan needs a path at least.")
     for number, (before, after) in enumerate(pairwise(paths), 1):
         gap = float(np.abs(after.start - before.end).max())
-        if gap > JOINED:
+        if gap > JOIN_TOLERANCE:
             raise InputError(
                 f"Path {number + 1} begins {np.degrees(gap):.3g} deg from where path {number} ends."
             )
@@ -164,7 +164,7 @@ def plan(
     timed = {key: Segment(path, fastest(path, bounds)) for key, path in once.items()}
     clearances = [looked[id(path)] for path in paths]
     segments = tuple(timed[id(path)] for path in paths)
-    found = Plan(segments, None if world is None else world.likeness, fingers)
+    found = Plan(segments, None if world is None else world.fingerprint, fingers)
     each = [
         Nearest(clearance.contact, begin + segment.scaling.tau(clearance.sigma))
         for clearance, segment, begin in zip(clearances, segments, found.begins, strict=False)
@@ -173,20 +173,20 @@ def plan(
     return replace(found, nearest=min(each, key=lambda n: n.contact.distance, default=None))
 
 
-def check_clear(path: Path, world: World, fingers: float, margin: float = MARGIN) -> None:
+def check_clear(path: Path, world: CollisionWorld, fingers: float, margin: float = MARGIN) -> None:
     """BlockedError, as of `plan`, unless the whole of `path` keeps `margin` [m]."""
-    _clearance(path, world, fingers, margin, asked=False)
+    _clearance(path, world, fingers, margin, canonical=False)
 
 
 def _clearance(
-    path: Path, world: World, fingers: float, margin: float, *, asked: bool = True
+    path: Path, world: CollisionWorld, fingers: float, margin: float, *, canonical: bool = True
 ) -> Clearance | None:
     """The nearest on `path`, if it is asked for; BlockedError where it is too near."""
     sweep = Sweep(path)
-    room = Room.about(world, margin, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
+    room = SweptClearance.about(world, margin, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
     met = sweep.blocked(room, fingers)
     if met is None:
-        return sweep.nearest(room, fingers) if asked else None
+        return sweep.nearest(room, fingers) if canonical else None
     one, other = met.contact.parts
     x, y, z = (1e3 * forward(path.chain, sweep.at(met.sigma, fingers)[:5])[:3, 3]).tolist()
     raise BlockedError(

@@ -56,7 +56,7 @@ class Polyline:
         if not ((blend > 0.0) & (blend <= 1.0)).all():
             raise InputError(f"A blend is above 0 and up to 1, not {blend.tolist()}.")
         object.__setattr__(self, "blend", frozen(blend))
-        self._lay()
+        self._build()
 
     @property
     def joins(self) -> tuple[float, ...]:
@@ -75,8 +75,8 @@ class Polyline:
             terms = self._terms[pieces].transpose(2, 1, 0)
         return tuple(_polynomial(row, local) for row in terms)
 
-    def _lay(self) -> None:
-        """Legs and corners as polynomials, each from 0 of its own share of sigma."""
+    def _build(self) -> None:
+        """Legs and corners as polynomials, each from 0 of its own fraction of sigma."""
         vias, lengths = self.vias, self.lengths
         rates = np.diff(vias, axis=0) / lengths[:, None]
         cut = np.zeros(len(vias))

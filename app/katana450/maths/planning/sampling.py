@@ -14,26 +14,26 @@ import numpy as np
 
 from katana450.errors import BlockedError
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.planning.clearance import Room
+from katana450.maths.planning.clearance import SweptClearance
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.plan import MARGIN, check_clear
 
-STEP: Final = 0.3
+TREE_STEP: Final = 0.3
 """[s] How long the joints move at full speed from one posture of a tree to the next."""
 
-EFFORT: Final = 3000
+MAX_POSTURES: Final = 3000
 """Postures drawn before the search is given up: some seconds."""
 
 SHORTCUTS: Final = 150
 """Tries to go straight from one place of the way to another."""
 
 ROUNDINGS: Final = (1.0, 0.5, 0.25, 0.1, 0.03)
-"""Shares of half a leg that a corner may cut off, the smoothest first."""
+"""Fractions of half a leg that a corner may cut off, the smoothest first."""
 
-AWAY: Final = 1e-3
+SAME_POSTURE_TIME: Final = 1e-3
 """[s] What is nearer than this is the same posture."""
 
 
@@ -66,12 +66,17 @@ class _Search:
     """One question: from where to where, in what room."""
 
     def __init__(
-        self, chain: Chain, world: World, fingers: float, start: FloatArray, end: FloatArray
+        self,
+        chain: Chain,
+        world: CollisionWorld,
+        fingers: float,
+        start: FloatArray,
+        end: FloatArray,
     ) -> None:
         self.chain = chain
         self.fingers = fingers
         x = np.append(start, fingers), np.append(end, fingers)
-        self.room = Room.about(world, MARGIN, *x)
+        self.room = SweptClearance.about(world, MARGIN, *x)
         self.start, self.end = start, end
 
     def met(self, a: FloatArray, b: FloatArray) -> Contact | None:
@@ -83,7 +88,7 @@ class _Search:
         """Vias of a clear way; None when EFFORT was not enough."""
         chain, speed = self.chain, self.chain.speed
         trees = _Tree([self.start]), _Tree([self.end])
-        for turn in range(EFFORT):
+        for turn in range(MAX_POSTURES):
             growing, other = trees[turn % 2], trees[1 - turn % 2]
             drawn = random.uniform(chain.lower, chain.upper)
             new = self._extended(growing, growing.nearest(drawn, speed), drawn)
@@ -102,12 +107,12 @@ class _Search:
         """A step from posture `number`; None when it is not clear."""
         here = tree.postures[number]
         way = towards - here
-        share = STEP / float((np.abs(way) / self.chain.speed).max())
-        q = towards if share >= 1.0 else here + share * way
+        fraction = TREE_STEP / float((np.abs(way) / self.chain.speed).max())
+        q = towards if fraction >= 1.0 else here + fraction * way
         return None if self.met(here, q) is not None else tree.grown(number, q)
 
     def _same(self, a: FloatArray, b: FloatArray) -> bool:
-        return bool((np.abs(a - b) <= AWAY * self.chain.speed).all())
+        return bool((np.abs(a - b) <= SAME_POSTURE_TIME * self.chain.speed).all())
 
     def taut(self, way: list[FloatArray], random: np.random.Generator) -> list[FloatArray]:
         """`way` with its detours cut off, never longer in time."""
@@ -148,8 +153,13 @@ class _Search:
         return float(legs.max(axis=1).sum())
 
 
-def way_round(
-    chain: Chain, start: FloatArray, end: FloatArray, world: World, fingers: float, seed: int
+def collision_free_path(
+    chain: Chain,
+    start: FloatArray,
+    end: FloatArray,
+    world: CollisionWorld,
+    fingers: float,
+    seed: int,
 ) -> JointPath:
     """A clear path from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
 
@@ -172,7 +182,7 @@ def way_round(
             "" if straight is None else f" The straight way meets {' and '.join(straight.parts)}."
         )
         raise BlockedError(
-            f"No way round was found in {EFFORT} tries from seed {seed}.{between} "
+            f"No way round was found in {MAX_POSTURES} tries from seed {seed}.{between} "
             "Try another seed, or go by a posture in between."
         )
     way = search.taut(way, random)

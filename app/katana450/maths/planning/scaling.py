@@ -60,7 +60,7 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class Pace:
+class PathRates:
     """sigma at some tau, and its first three derivatives by tau."""
 
     sigma: float
@@ -107,7 +107,7 @@ class Scaling:
 
     @cached_property
     def _pieces(self) -> list[list[float]]:
-        """Of each piece the slowness as a polynomial of its own share."""
+        """Of each piece the slowness as a polynomial of its own fraction."""
         c = self.coefficients
         fours = np.stack([c[k : len(c) - 3 + k] for k in range(4)], axis=1)
         pieces: list[list[float]] = (fours @ CUBIC.T).tolist()
@@ -116,36 +116,37 @@ class Scaling:
     @cached_property
     def _starts(self) -> list[float]:
         """tau where each piece begins, and that at the end."""
-        shares = np.array([1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0]) / len(self._pieces)
-        passed = np.cumsum(np.array(self._pieces) @ shares)
+        fractions = np.array([1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0]) / len(self._pieces)
+        passed = np.cumsum(np.array(self._pieces) @ fractions)
         return [0.0, *passed.tolist()]
 
-    def pace(self, tau: float) -> Pace:
+    def pace(self, tau: float) -> PathRates:
         """sigma at `tau`, from 0 to `span`."""
         starts, count = self._starts, len(self._pieces)
         piece = min(max(bisect_right(starts, tau) - 1, 0), count - 1)
         a, b, c, d = self._pieces[piece]
         passed = (tau - starts[piece]) * count
-        # tau grows with the share and is nearly straight over a piece: Newton is there in no time.
-        share = passed / ((starts[piece + 1] - starts[piece]) * count)
+        # tau grows with the fraction and is nearly straight over a piece: Newton is there in no
+        # time.
+        fraction = passed / ((starts[piece + 1] - starts[piece]) * count)
         for _ in range(8):
-            gone = share * (a + share * (b / 2.0 + share * (c / 3.0 + share * d / 4.0)))
-            step = (passed - gone) / (a + share * (b + share * (c + share * d)))
-            share = min(max(share + step, 0.0), 1.0)
+            gone = fraction * (a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0)))
+            step = (passed - gone) / (a + fraction * (b + fraction * (c + fraction * d)))
+            fraction = min(max(fraction + step, 0.0), 1.0)
             if abs(step) < 1e-15:
                 break
-        w = a + share * (b + share * (c + share * d))
-        w1 = count * (b + share * (2.0 * c + share * 3.0 * d))
-        w2 = count * count * (2.0 * c + share * 6.0 * d)
-        return Pace((piece + share) / count, *_inverted(w, w1, w2))
+        w = a + fraction * (b + fraction * (c + fraction * d))
+        w1 = count * (b + fraction * (2.0 * c + fraction * 3.0 * d))
+        w2 = count * count * (2.0 * c + fraction * 6.0 * d)
+        return PathRates((piece + fraction) / count, *_inverted(w, w1, w2))
 
     def tau(self, sigma: float) -> float:
         """[s] at the place `sigma` of the path, from 0 to 1."""
         count = len(self._pieces)
         piece = min(max(int(sigma * count), 0), count - 1)
         a, b, c, d = self._pieces[piece]
-        share = sigma * count - piece
-        gone = share * (a + share * (b / 2.0 + share * (c / 3.0 + share * d / 4.0)))
+        fraction = sigma * count - piece
+        gone = fraction * (a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0)))
         return self._starts[piece] + gone / count
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.planning.clearance import FINE, Clearance, Room
+from katana450.maths.planning.clearance import FINE, Clearance, SweptClearance
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path, joint_derivatives
 
-PLACES = 512
+SWEEP_PIECES = 512
 """Pieces in each of which the rates of the joints are bounded."""
 
-LOOSE = 2.0
+MAX_DERIVATIVE_RATIO = 2.0
 """[1] The third derivative changes by no more than this within a piece."""
 
 
@@ -21,13 +21,13 @@ class Sweep:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        even = np.linspace(0.0, 1.0, PLACES + 1)
+        even = np.linspace(0.0, 1.0, SWEEP_PIECES + 1)
         self._sigma = np.unique(np.concatenate((even, np.array(path.joins))))
         d = np.abs(joint_derivatives(path, self._sigma))
         h = np.diff(self._sigma)[:, None]
         rate, jerk = (np.maximum(each[:-1], each[1:]) for each in (d[1], d[3]))
         # Between its ends a function is above its chord by no more than h^2 / 8 of its bend.
-        turns = h * (rate + LOOSE * h * h / 8.0 * jerk)
+        turns = h * (rate + MAX_DERIVATIVE_RATIO * h * h / 8.0 * jerk)
         self._turned = np.vstack((np.zeros(turns.shape[1]), np.cumsum(turns, axis=0)))
 
     def at(self, sigma: float, fingers: float) -> FloatArray:
@@ -35,19 +35,19 @@ class Sweep:
         joints = self._path.joints(Jet.variable(sigma))
         return np.array([*(each.c0 for each in joints), fingers])
 
-    def nearest(self, room: Room, fingers: float) -> Clearance | None:
+    def nearest(self, room: SweptClearance, fingers: float) -> Clearance | None:
         """Where on the whole path parts come nearest."""
         return room.nearest(lambda sigma: self.at(sigma, fingers), self.turned)
 
     def blocked(
         self,
-        room: Room,
+        room: SweptClearance,
         fingers: float,
         low: float = 0.0,
         high: float = 1.0,
         fine: float = FINE,
     ) -> Clearance | None:
-        """A place between two that is too near, or None; as `Room.blocked`."""
+        """A place between two that is too near, or None; as `SweptClearance.blocked`."""
         return room.blocked(lambda sigma: self.at(sigma, fingers), self.turned, low, high, fine)
 
     def turned(self, low: float, high: float) -> FloatArray:
@@ -58,6 +58,6 @@ class Sweep:
         piece = int(np.searchsorted(self._sigma, sigma, side="right")) - 1
         piece = min(max(piece, 0), len(self._sigma) - 2)
         low, high = self._sigma[piece], self._sigma[piece + 1]
-        share = (sigma - low) / (high - low)
+        fraction = (sigma - low) / (high - low)
         before, after = self._turned[piece], self._turned[piece + 1]
-        return np.asarray(before + share * (after - before))
+        return np.asarray(before + fraction * (after - before))

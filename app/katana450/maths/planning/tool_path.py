@@ -16,23 +16,23 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.limited import LimitedArm
-from katana450.maths.kinematics.nearest_posture import nearest_stance
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.nearest_posture import nearest_posture
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.curve import Curve, Tool
+from katana450.maths.planning.curve import Curve, ToolCoordinates
 from katana450.maths.planning.jet import Coefficient, Jet
 from katana450.maths.planning.posture import FiveJets, ThreeJets, posture
 
 KNOTS = 400
 """Places at which a path is looked at when it is built."""
 
-LEAST = 16
+MIN_KNOTS = 16
 """The same on each piece of its curve."""
 
-APART = 1e-9
+MIN_KNOT_GAP = 1e-9
 """[1] No two of them are nearer."""
 
-KINK = 1e-4
+KINK_TOLERANCE = 1e-4
 """[rad] Between two of them no axis is farther from the cubic through both, unless the path meets
 the end of the branch in between."""
 
@@ -67,7 +67,7 @@ class ToolPath:
         q[0] += np.round((near - q[0]) / (2.0 * np.pi)) * (2.0 * np.pi)
         q = np.unwrap(q, axis=0)
         object.__setattr__(self, "_sigma", sigma)
-        even = np.searchsorted(sigma, np.linspace(0.0, 1.0, KNOTS + 1) - 0.5 * APART)
+        even = np.searchsorted(sigma, np.linspace(0.0, 1.0, KNOTS + 1) - 0.5 * MIN_KNOT_GAP)
         object.__setattr__(self, "_turns", frozen(q[even]))
         self._refuse_kinks(q, qd)
         self._refuse_limits(q, qd)
@@ -119,10 +119,10 @@ class ToolPath:
         ends = (0.0, *self.joins, 1.0)
         if len(ends) == 2:
             return even
-        pieces = [np.linspace(low, high, LEAST + 1) for low, high in pairwise(ends)]
+        pieces = [np.linspace(low, high, MIN_KNOTS + 1) for low, high in pairwise(ends)]
         inner = np.unique(np.concatenate(pieces))
         near = even[np.clip(np.rint(inner * KNOTS), 0, KNOTS).astype(np.int64)]
-        return np.unique(np.concatenate((even, inner[np.abs(inner - near) > APART])))
+        return np.unique(np.concatenate((even, inner[np.abs(inner - near) > MIN_KNOT_GAP])))
 
     def _loose(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Angles and their rates (N, 5) whatever turn they are in; not finite out of reach."""
@@ -134,7 +134,7 @@ class ToolPath:
         return (q - arm.shifts) * arm.signs, qd * arm.signs
 
     def _target(self, sigma: float) -> ToolTarget:
-        tool = Tool(*(float(each.c0) for each in self.curve.at(Jet.variable(sigma))))  # type: ignore[arg-type]
+        tool = ToolCoordinates(*(float(each.c0) for each in self.curve.at(Jet.variable(sigma))))  # type: ignore[arg-type]
         return ToolTarget(np.array(tool[:3]), float(tool.pitch), float(tool.roll))  # type: ignore[arg-type]
 
     def _refuse_reach(self, sigma: FloatArray, bad: int) -> None:
@@ -145,8 +145,8 @@ class ToolPath:
             good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
         target = self._target(failing)
         limited = LimitedArm.of(self.chain, within_limits=False)
-        asked = target.asked(limited.arm, Reading.PITCH)
-        best = nearest_stance(limited, asked, self.branch, limited.arm.angles(self.near))
+        canonical = target.canonical(limited.arm, Priority.PITCH)
+        best = nearest_posture(limited, canonical, self.branch, limited.arm.angles(self.near))
         short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
         raise InputError(
             f"The path leaves what the arm reaches on the branch {self.branch} "
@@ -161,7 +161,7 @@ class ToolPath:
         middle, _ = self._loose(self._sigma[:-1] + 0.5 * h[:, 0])
         smooth = 0.5 * (q[:-1] + q[1:]) + 0.125 * h * (qd[:-1] - qd[1:])
         gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
-        kinked = ~(gap <= KINK)
+        kinked = ~(gap <= KINK_TOLERANCE)
         if kinked.any():
             place, axis = (int(each) for each in np.argwhere(kinked)[0])
             sigma = float(self._sigma[place])

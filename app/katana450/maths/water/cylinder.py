@@ -79,8 +79,8 @@ class Cylinder:
         if high == low:
             return self.radius**2 * self.depth * cut
         # Slices that are wet all over, and those that the plane cuts.
-        share = (math.pi * (high - top) + cut * (top - base)) / (high - low)
-        return self.radius**2 * self.depth * share
+        fraction = (math.pi * (high - top) + cut * (top - base)) / (high - low)
+        return self.radius**2 * self.depth * fraction
 
     def level(self, tilt: float, volume: float) -> float:
         """The level [m] below which there is ``volume`` [m^3]: to rounding, by Newton's rule.
@@ -115,7 +115,7 @@ class Cylinder:
         """The area [m^2] of the plane inside."""
         floor, rim = self.arcs(tilt, level)
         cosine = math.cos(tilt)
-        if abs(cosine) < STEEP:
+        if abs(cosine) < AXIAL_COSINE:
             return 2.0 * self.radius * math.sin(floor) * self.depth
         return self.radius**2 * (_segment(floor) - _segment(rim)) / cosine
 
@@ -147,7 +147,7 @@ class Cylinder:
         return self.lip(tilt) - level
 
 
-STEEP = 1e-9
+AXIAL_COSINE = 1e-9
 """Cosine of a tilt at which the plane runs along the axis, but for rounding."""
 
 

@@ -70,7 +70,7 @@ class Basin:
 
 
 @dataclass(frozen=True)
-class Table:
+class TableTop:
     """Its upper face is z = 0 of the base frame; x, y: its ends; floor: the height of that [m]."""
 
     x: tuple[float, float]
@@ -84,4 +84,4 @@ class WaterEnvironment:
 
     cup: Cup
     basin: Basin
-    table: Table
+    table: TableTop

@@ -24,19 +24,19 @@ from katana450.maths.water.slosh import Slosh, frequency
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY, MILLILITRE, counted
 
 DISCHARGE = 0.61
-"""[1] The share of Poleni's rule that a sharp edge lets pass: Kirchhoff's pi / (pi + 2)."""
+"""[1] The fraction of Poleni's rule that a sharp edge lets pass: Kirchhoff's pi / (pi + 2)."""
 
-FILM = 0.25
+FILM_TIME = 0.25
 """[s] In which what is left over the lip thins to a third. Of so thin a film a weir's rule would
 make a trickle without end."""
 
-DROP = MILLILITRE // 20
+DROP_VOLUME = MILLILITRE // 20
 """[fl] So little over the lip falls at once."""
 
-LEVEL = 1e-9
+LEVEL_SINE = 1e-9
 """Sine of a tilt below which no side of the rim is the lower one."""
 
-WEIGHTLESS = 1e-3
+MIN_GRAVITY = 1e-3
 """[g] Water that weighs less stays where it is."""
 
 
@@ -72,7 +72,7 @@ class Water:
 
 
 @dataclass(frozen=True)
-class Surface:
+class WaterSurface:
     """The surface in the cup, as a plane of `Cylinder`: tilt [rad] and level [m].
 
     downhill: unit vector, in the cup's frame and square to its axis, to the lowest side of the rim.
@@ -83,22 +83,24 @@ class Surface:
     downhill: Vector
 
 
-class Flow:
+class WaterFlow:
     """Steps of the water in one surrounding. Its methods are pure."""
 
-    def __init__(self, around: WaterEnvironment) -> None:
-        self.around = around
-        self._cup_holds = counted(around.cup.inside.capacity)
-        self._basin_holds = counted(around.basin.capacity)
+    def __init__(self, water_environment: WaterEnvironment) -> None:
+        self.water_environment = water_environment
+        self._cup_holds = counted(water_environment.cup.inside.capacity)
+        self._basin_holds = counted(water_environment.basin.capacity)
 
     def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
         """``volume`` [m^3] at rest in the cup, and nothing elsewhere.
 
         Raises InputError when the cup does not hold it upright, or the pose is none.
         """
-        if not 0.0 <= volume <= self.around.cup.inside.capacity:
-            most = self.around.cup.inside.capacity * 1e6
-            raise InputError(f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {most:.1f} ml.")
+        if not 0.0 <= volume <= self.water_environment.cup.inside.capacity:
+            maximum = self.water_environment.cup.inside.capacity * 1e6
+            raise InputError(
+                f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {maximum:.1f} ml."
+            )
         T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
         return Water(counted(volume), 0, (), (), Slosh(), T)
 
@@ -116,29 +118,29 @@ class Flow:
             raise InputError(f"The time step is {dt} s; give 0 or more seconds.")
         if dt == 0.0:
             return replace(water, T_base_cup=T)
-        omega = frequency(self.around.cup.inside, water.cup * FEMTOLITRE)
+        omega = frequency(self.water_environment.cup.inside, water.cup * FEMTOLITRE)
         slosh = water.slosh.after(pull, omega, dt)
         flown = self._fly(replace(water, slosh=slosh), T, dt)
         return self._pour(flown, T, dt)
 
-    def surface(self, water: Water) -> Surface:
+    def surface(self, water: Water) -> WaterSurface:
         """The surface in the cup."""
         tilt, downhill = _lean(water.slosh, water.T_base_cup)
-        level = self.around.cup.inside.level(tilt, water.cup * FEMTOLITRE)
-        return Surface(tilt, level, downhill)
+        level = self.water_environment.cup.inside.level(tilt, water.cup * FEMTOLITRE)
+        return WaterSurface(tilt, level, downhill)
 
     def margin_to_rim(self, water: Water) -> float:
         """How far [m] the lip is above the surface; negative while water flows over it."""
         surface = self.surface(water)
-        return self.around.cup.inside.margin(surface.tilt, surface.level)
+        return self.water_environment.cup.inside.margin(surface.tilt, surface.level)
 
     def _pour(self, water: Water, T: FloatArray, dt: float) -> Water:
         """Let flow over the lip what the cup cannot hold."""
-        cup = self.around.cup.inside
+        cup = self.water_environment.cup.inside
         tilt, downhill = _lean(water.slosh, T)
         weight = norm(water.slosh.up)
         over = water.cup - counted(cup.holds(tilt))
-        if over <= 0 or weight < WEIGHTLESS:
+        if over <= 0 or weight < MIN_GRAVITY:
             return replace(water, T_base_cup=T)
         head = max(-cup.margin(tilt, cup.level(tilt, water.cup * FEMTOLITRE)), 0.0)
         g = GRAVITY * weight
@@ -147,7 +149,7 @@ class Flow:
         point = (
             cup.radius * downhill[0],
             cup.radius * downhill[1],
-            self.around.cup.floor + cup.depth,
+            self.water_environment.cup.floor + cup.depth,
         )
         lip = _moved(T, point)
         carried = scale(1.0 / dt, sub(lip, _moved(water.T_base_cup, point)))
@@ -165,7 +167,7 @@ class Flow:
         if not water.parcels:
             return water
         cup, basin, puddles = water.cup, water.basin, water.puddles
-        level = self.around.basin.level(basin * FEMTOLITRE)
+        level = self.water_environment.basin.level(basin * FEMTOLITRE)
         before, after = water.T_base_cup.tolist(), T.tolist()
         catches = after[2][2] > 0.0
         flying = []
@@ -175,7 +177,7 @@ class Flow:
                 cup += parcel.volume
                 continue
             aged = parcel._replace(age=parcel.age + dt)
-            end = landing(aged, self.around, level)
+            end = landing(aged, self.water_environment, level)
             if end.age > aged.age:
                 flying.append(aged)
             elif end.ground is Ground.BASIN:
@@ -189,34 +191,35 @@ class Flow:
 
     def _caught(self, parcel: Parcel, before: se3.Rows, after: se3.Rows, dt: float) -> bool:
         """Whether it comes into the cup through its mouth in the next ``dt`` [s]."""
-        mouth = self.around.cup.floor + self.around.cup.inside.depth
+        mouth = self.water_environment.cup.floor + self.water_environment.cup.inside.depth
         q = _seen_from(after, parcel.at(parcel.age + dt))
         if q[2] > mouth:
             return False
         p = _seen_from(before, parcel.at(parcel.age))
         if p[2] <= mouth:
             return False
-        share = (p[2] - mouth) / (p[2] - q[2])
-        x, y, _ = add(p, scale(share, sub(q, p)))
-        return math.hypot(x, y) < self.around.cup.inside.radius
+        fraction = (p[2] - mouth) / (p[2] - q[2])
+        x, y, _ = add(p, scale(fraction, sub(q, p)))
+        return math.hypot(x, y) < self.water_environment.cup.inside.radius
 
     def _beside_basin(self, point: Vector) -> Vector:
         """Where on the table what the basin cannot hold comes down."""
-        x, y, z = self.around.basin.at
+        x, y, z = self.water_environment.basin.at
         away = math.hypot(point[0] - x, point[1] - y)
-        out = self.around.basin.outer_radius / away if away > 0.0 else 0.0
+        out = self.water_environment.basin.outer_radius / away if away > 0.0 else 0.0
         return x + out * (point[0] - x), y + out * (point[1] - y), z
 
 
 def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
-    """Tilt [rad] between the cup's axis and the surface's normal, and downhill as in `Surface`."""
+    """Tilt [rad] between the cup's axis and the surface's normal, and downhill as in
+    `WaterSurface`."""
     R = T[:3, :3]
     weight = norm(slosh.up)
-    if weight < WEIGHTLESS:
+    if weight < MIN_GRAVITY:
         return 0.0, (1.0, 0.0, 0.0)
     x, y, z = (np.asarray(slosh.up) @ R / weight).tolist()
     sine = math.hypot(x, y)
-    if sine < LEVEL:
+    if sine < LEVEL_SINE:
         return (0.0 if z > 0.0 else math.pi), (1.0, 0.0, 0.0)
     return math.atan2(sine, z), (-x / sine, -y / sine, 0.0)
 
@@ -241,9 +244,9 @@ def _left_over(over: int, discharge: float, dt: float) -> int:
     The discharge falls with the square of what is over; the film of it that is left, exponentially.
     The equation of both, E' = -k E^2 - E / FILM, is Bernoulli's, and this its solution.
     """
-    decay = math.exp(-dt / FILM)
-    left = over * decay / (1.0 + discharge / FEMTOLITRE / over * FILM * (1.0 - decay))
-    return int(left) if left > DROP else 0
+    decay = math.exp(-dt / FILM_TIME)
+    left = over * decay / (1.0 + discharge / FEMTOLITRE / over * FILM_TIME * (1.0 - decay))
+    return int(left) if left > DROP_VOLUME else 0
 
 
 def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:

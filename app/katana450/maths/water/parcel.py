@@ -53,23 +53,23 @@ class Landing(NamedTuple):
     point: Vector
 
 
-def landing(parcel: Parcel, around: WaterEnvironment, level: float) -> Landing:
+def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -> Landing:
     """Where ``parcel`` comes down; in the basin the water stands ``level`` [m] over its floor.
 
     The basin gets what comes down through the plane of its rim inside it. The cup is not looked at.
     """
-    basin = around.basin
+    basin = water_environment.basin
     if _into(basin, parcel):
         age = parcel.falls_to(basin.at[2] + basin.floor + level) or 0.0
         return Landing(Ground.BASIN, age, parcel.at(age))
     age = parcel.falls_to(0.0) or 0.0
     x, y, _ = parcel.at(age)
-    (west, east), (south, north) = around.table.x, around.table.y
+    (west, east), (south, north) = water_environment.table.x, water_environment.table.y
     if parcel.start[2] >= 0.0 and west <= x <= east and south <= y <= north:
         return Landing(Ground.TABLE, age, (x, y, 0.0))
-    age = parcel.falls_to(around.table.floor) or 0.0
+    age = parcel.falls_to(water_environment.table.floor) or 0.0
     x, y, _ = parcel.at(age)
-    return Landing(Ground.FLOOR, age, (x, y, around.table.floor))
+    return Landing(Ground.FLOOR, age, (x, y, water_environment.table.floor))
 
 
 def _into(basin: Basin, parcel: Parcel) -> bool:

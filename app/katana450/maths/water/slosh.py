@@ -27,7 +27,7 @@ SHALLOWEST = 0.25
 """[radius] The depth below which the frequency falls no more: so little water lies in a corner of a
 tilted cup and is no longer a layer on its floor."""
 
-STILL = 1e-4
+REST_TOLERANCE = 1e-4
 """[1] A surface that is off its rest by less than this is at rest: 3 um at the wall of a cup."""
 
 
@@ -66,7 +66,7 @@ class Slosh:
             )
             for lean, rate, end in zip(self.lean, self.rate, rest, strict=True)
         )
-        if math.hypot(x, y, u / omega, v / omega) < STILL:
+        if math.hypot(x, y, u / omega, v / omega) < REST_TOLERANCE:
             return Slosh(rest, weight=weight)
         return Slosh((rest[0] + x, rest[1] + y), (u, v), weight)
 

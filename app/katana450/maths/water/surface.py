@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.flow import Surface
+from katana450.maths.water.flow import WaterSurface
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.puddle import THICKNESS
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY
@@ -26,7 +26,7 @@ RUNGS = 20
 SECTIONS, SIDES = 20, 8
 """Of the stream."""
 
-THICKEST = 0.3
+MAX_STREAM_RADIUS = 0.3
 """[cup radius] The stream at the lip: there it is slow, and a sheet rather than a jet."""
 
 SHEET, GATHERED = 0.9, 0.03
@@ -42,7 +42,7 @@ ROUND = 1e-9
 """Cosine of a tilt nearer to 0 than which the surface is drawn along the axis."""
 
 
-def body(cylinder: Cylinder, surface: Surface) -> FloatArray:
+def body(cylinder: Cylinder, surface: WaterSurface) -> FloatArray:
     """Corners (2 (4 RUNGS + 2), 3) of the water in a cylinder that stands on z = 0.
 
     Wall, underside and upper side, each with corners of its own so that only the wall is shaded
@@ -105,17 +105,17 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     age = ages[0] + (last - ages[0]) * _SPOTS
     behind = np.maximum(np.searchsorted(ages, age, side="right") - 1, 0)
     before = np.minimum(behind + 1, len(ages) - 1)
-    between = np.maximum(ages[before] - ages[behind], MOMENT)
-    share = np.minimum((age - ages[behind]) / between, 1.0)
-    here = left[behind] + share[:, None] * (left[before] - left[behind])
+    between = np.maximum(ages[before] - ages[behind], AGE_ROUNDING)
+    fraction = np.minimum((age - ages[behind]) / between, 1.0)
+    here = left[behind] + fraction[:, None] * (left[before] - left[behind])
     p, v, fall = here[:, 3:6], here[:, 6:9], GRAVITY * age
     p += v * age[:, None]
     p[:, 2] -= 0.5 * fall * age
     v[:, 2] -= fall
 
-    speed = np.maximum(np.sqrt((v * v).sum(axis=1)), SLOWEST)
-    jet = np.minimum(np.sqrt(here[:, 2] / (math.pi * speed)), THICKEST * radius)
-    jet[age > ages[behind] + left[behind, 1] + MOMENT] = 0.0
+    speed = np.maximum(np.sqrt((v * v).sum(axis=1)), MIN_STREAM_SPEED)
+    jet = np.minimum(np.sqrt(here[:, 2] / (math.pi * speed)), MAX_STREAM_RADIUS * radius)
+    jet[age > ages[behind] + left[behind, 1] + AGE_ROUNDING] = 0.0
     jet[0] = jet[-1] = 0.0
 
     level = v[:, :2].sum(axis=0).tolist()
@@ -137,10 +137,10 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     return np.asarray(corners.reshape(-1, 3))
 
 
-SLOWEST = 0.02
+MIN_STREAM_SPEED = 0.02
 """[m/s]"""
 
-MOMENT = 1e-6
+AGE_ROUNDING = 1e-6
 """[s] Rounding of ages."""
 
 

@@ -13,9 +13,9 @@ from katana450.server.api.scene_answers import (
     Links,
     Mesh,
     Node,
+    Objects,
     Scene,
-    Thing,
-    Things,
+    SceneObject,
     Value,
     Values,
     World,
@@ -25,28 +25,28 @@ __all__ = [
     "Answer",
     "AnyAnswer",
     "Arm",
+    "BranchOption",
     "Branches",
-    "Choice",
     "Done",
     "Echo",
+    "EventLog",
     "Field",
     "Finding",
-    "Ledger",
-    "Line",
     "Link",
     "Links",
+    "LogLine",
     "Loop",
     "Margins",
     "Mesh",
     "Node",
     "Numbers",
+    "Objects",
     "PartRefusal",
     "Progress",
     "Refused",
     "Scene",
+    "SceneObject",
     "State",
-    "Thing",
-    "Things",
     "Value",
     "Values",
     "Water",
@@ -72,7 +72,7 @@ class Welcome(Answer, frozen=True, kw_only=True):
 
 
 class Echo(Answer, frozen=True, kw_only=True):
-    """To a sign of life."""
+    """To a heartbeat."""
 
     n: int
 
@@ -108,8 +108,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
 
     ``by``: its owner. ``status``: planning, cancelled, refused, ready, running, paused, blocked,
     done, stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and
-    ``share`` of its ``task`` is done, or of all planning. ``seconds``: all motions at full speed.
-    ``why``: what is wrong with it, or why it was planned anew or not run."""
+    ``fraction`` of its ``task`` is done, or of all planning. ``seconds``: all motions at full
+    speed. ``why``: what is wrong with it, or why it was planned anew or not run."""
 
     name: str
     by: str
@@ -118,7 +118,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     steps: int = 0
     line: int = 0
     task: str = ""
-    share: float = 0.0
+    fraction: float = 0.0
     seconds: float = 0.0
     why: str = ""
 
@@ -128,7 +128,7 @@ class State(Answer, frozen=True, kw_only=True):
 
     Attributes:
         t: when, on the server's clock, which only goes forwards; an arm at rest is as it was then.
-        told: when this was said, on the same clock. age: time since the arm's process last
+        sent: when this was sent, on the same clock. age: time since the arm's process last
             answered; from 0.3 s on the state counts as unknown.
         ticket: of the last command that is heeded in it. q: (n,) where the arm says it is.
         setpoint, qd: (n,) where it is told to be, and how fast that moves.
@@ -143,8 +143,8 @@ class State(Answer, frozen=True, kw_only=True):
         branch: shoulder and elbow. reading: which numbers of a target count.
         Where there are only joints, tool to roll, tool_speed, margins, branch and reading are null;
             see ``arm``.
-        status: ok, limited, paused, blocked, held, stopped or fault. why: in words; else empty.
-        speed: share of full speed. holder: name of who holds the arm.
+        status: ok, limited, paused, blocked, gap, stopped or fault. why: in words; else empty.
+        speed: fraction of full speed. holder: name of who holds the arm.
         stopped: why nothing moves after a STOP; else null, as is stop: requested, until a state
             newer than the request is stopped, then confirmed.
         revocations: number of stops and of losses of the lease so far.
@@ -153,7 +153,7 @@ class State(Answer, frozen=True, kw_only=True):
     """
 
     t: float
-    told: float
+    sent: float
     ticket: int
     q: Numbers
     setpoint: Numbers
@@ -171,7 +171,7 @@ class State(Answer, frozen=True, kw_only=True):
     touching: list[str]
     held: str | None
     branch: tuple[str, str] | None
-    reading: str | None
+    priority: str | None
     status: str
     moving: bool
     why: str
@@ -220,7 +220,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     joints_only: str
 
 
-class Line(msgspec.Struct, frozen=True, kw_only=True):
+class LogLine(msgspec.Struct, frozen=True, kw_only=True):
     """A reason that began or ended, with the newest command then: whose, which, on what grounds."""
 
     when: str
@@ -231,13 +231,13 @@ class Line(msgspec.Struct, frozen=True, kw_only=True):
     finding: Finding
 
 
-class Ledger(Answer, frozen=True, kw_only=True):
+class EventLog(Answer, frozen=True, kw_only=True):
     """What held the arm back of late, the oldest first."""
 
-    lines: list[Line]
+    lines: list[LogLine]
 
 
-class Choice(msgspec.Struct, frozen=True, kw_only=True):
+class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
     """A branch that could be taken, and what it costs.
 
     ``position_error``, ``rotation_error``: what it misses the wished pose by. ``distance``: the
@@ -260,7 +260,7 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True):
 class Branches(Answer, frozen=True, kw_only=True):
     """The ways to stand at the wished pose."""
 
-    choices: list[Choice]
+    choices: list[BranchOption]
 
 
 class Loop(Answer, frozen=True, kw_only=True):
@@ -274,7 +274,7 @@ class Loop(Answer, frozen=True, kw_only=True):
     ticks: int
     late_p50: float
     late_p99: float
-    late_most: float
+    late_max: float
     lost: int
 
 
@@ -285,10 +285,10 @@ AnyAnswer = (
     | Echo
     | State
     | Arm
-    | Ledger
+    | EventLog
     | Branches
     | Loop
-    | Things
+    | Objects
     | Values
     | World
     | Links

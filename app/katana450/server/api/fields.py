@@ -15,22 +15,22 @@ VERSION = 1
 ROOT = f"/api/v{VERSION}"
 """Where the API is by HTTP."""
 
-LARGEST = 1024
+MAX_REQUEST_BYTES = 1024
 """Bytes of a request."""
 
-FASTEST_LINEAR = 0.5
+MAX_LINEAR_RATE = 0.5
 """[m/s] More than the arm can do; anything beyond is nobody's wish."""
 
-FASTEST_ANGULAR = 3.0
+MAX_ANGULAR_RATE = 3.0
 """[rad/s] Likewise."""
 
-SLOWEST, FASTEST = 0.05, 1.0
-"""Share of full speed."""
+MIN_SPEED, MAX_SPEED = 0.05, 1.0
+"""Fraction of full speed."""
 
-MOST_STATES = 100
+MAX_STATES_PER_SECOND = 100
 """States a second that one can be told: as many as there are."""
 
-MOST_JOINTS = 32
+MAX_JOINTS = 32
 
 Rates = tuple[float, float, float, float, float]
 """Velocity of the tool point (x, y, z) [m/s], rates of pitch and roll [rad/s]."""
@@ -40,11 +40,11 @@ Vector3 = tuple[float, float, float]
 Row = tuple[float, float, float, float]
 Matrix4 = tuple[Row, Row, Row, Row]
 
-LONGEST_PRESS = 64
+MAX_PRESS_LENGTH = 64
 """Characters that tell one press of STOP from another."""
 
 Id = Annotated[int, Meta(ge=0, le=2**53 - 1)] | Annotated[str, Meta(max_length=64)] | None
-Press = Annotated[str, Meta(min_length=1, max_length=LONGEST_PRESS)] | None
+Press = Annotated[str, Meta(min_length=1, max_length=MAX_PRESS_LENGTH)] | None
 Name = Annotated[str, Meta(min_length=1, max_length=40)]
 FieldValue = float | Annotated[list[float], Meta(min_length=1, max_length=4)] | None
 NodeName = Annotated[str, Meta(min_length=1, max_length=100)]
@@ -60,8 +60,8 @@ class Frame(Enum):
     """On the table under the control box."""
 
 
-class Form(Enum):
-    """What a thing counts as where contacts are looked for."""
+class Shape(Enum):
+    """What an object counts as where contacts are looked for."""
 
     BOX = "box"
     CYLINDER = "cylinder"
@@ -70,8 +70,8 @@ class Form(Enum):
     """A file that was uploaded; it counts as its convex hull."""
 
 
-class Mount(Enum):
-    """What a thing can be fixed to."""
+class Attachment(Enum):
+    """What an object can be fixed to."""
 
     HAND = "hand"
     """It goes with the hand, whatever the fingers do, and counts as a part of it."""

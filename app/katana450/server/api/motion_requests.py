@@ -10,9 +10,9 @@ from msgspec import Meta
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.fields import (
     COMMAND,
-    FASTEST_ANGULAR,
-    FASTEST_LINEAR,
-    MOST_JOINTS,
+    MAX_ANGULAR_RATE,
+    MAX_JOINTS,
+    MAX_LINEAR_RATE,
     Frame,
     Matrix4,
     Rates,
@@ -34,7 +34,7 @@ class Jog(Request, frozen=True, kw_only=True):
     frame: JogFrame = JogFrame.BASE
 
     def __post_init__(self) -> None:
-        limits = (FASTEST_LINEAR,) * 3 + (FASTEST_ANGULAR,) * 2
+        limits = (MAX_LINEAR_RATE,) * 3 + (MAX_ANGULAR_RATE,) * 2
         for rate, limit in zip(self.rates, limits, strict=True):
             if not math.isfinite(rate) or abs(rate) > limit:
                 raise ValueError(f"{rate} is no rate between {-limit:g} and {limit:g}")
@@ -45,7 +45,7 @@ class Joint(Request, frozen=True, kw_only=True):
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    axis: Annotated[int, Meta(ge=1, le=MAX_JOINTS)]
     value: float
 
 
@@ -54,7 +54,7 @@ class Joints(Request, frozen=True, kw_only=True):
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
+    q: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)]
 
 
 class Servo(Request, frozen=True, kw_only=True):
@@ -66,12 +66,12 @@ class Servo(Request, frozen=True, kw_only=True):
 
     traits: ClassVar[RequestTraits] = RequestTraits(stream=True)
 
-    q: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)]
-    qd: Annotated[list[float], Meta(min_length=1, max_length=MOST_JOINTS)] | None = None
+    q: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)]
+    qd: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)] | None = None
 
 
 class Pose(Request, frozen=True, kw_only=True):
-    """Bring the tool to a pose, as near as five axes can; what gives way is the ``reading``'s."""
+    """Bring the tool to a pose, as near as five axes can; what gives way is the ``priority``'s."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 

@@ -10,13 +10,13 @@ from katana450.server.api.fields import Answer
 class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """A reason why the arm does not reach the target as it was given.
 
-    ``said``: the reason in words. ``amount`` in ``unit``: both null where there is no number.
+    ``text``: the reason in words. ``amount`` in ``unit``: both null where there is no number.
     ``axis`` counts from 1. ``parts``: the two parts that are about to meet. ``seconds``: duration
     of a stop.
     """
 
     reason: str
-    said: str
+    text: str
     amount: float | None = None
     unit: str | None = None
     axis: int | None = None

@@ -13,24 +13,24 @@ import msgspec
 from msgspec import Meta
 
 from katana450.errors import InputError
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.server.api.fields import (
     COMMAND,
-    FASTEST,
-    LARGEST,
-    MOST_JOINTS,
-    MOST_STATES,
+    MAX_JOINTS,
+    MAX_REQUEST_BYTES,
+    MAX_SPEED,
+    MAX_STATES_PER_SECOND,
+    MIN_SPEED,
     ROOT,
-    SLOWEST,
     VERSION,
-    Form,
+    Attachment,
     Frame,
     Id,
-    Mount,
     Name,
     Press,
     Request,
     RequestTraits,
+    Shape,
     tag_of,
 )
 from katana450.server.api.lease_requests import (
@@ -57,29 +57,31 @@ from katana450.server.api.motion_requests import (
 )
 from katana450.server.api.scene_requests import (
     Attach,
+    FieldName,
+    FieldSetting,
     Fill,
     Get,
     Load,
-    Named,
     Place,
     Remove,
     Set,
-    Setting,
 )
 
 __all__ = [
-    "LARGEST",
+    "MAX_REQUEST_BYTES",
     "VERSION",
     "Acquire",
     "AnyRequest",
     "Ask",
     "Attach",
+    "Attachment",
     "Branch",
     "ClearStop",
     "Decline",
     "EndDrag",
+    "FieldName",
+    "FieldSetting",
     "Fill",
-    "Form",
     "Frame",
     "Get",
     "Give",
@@ -93,15 +95,12 @@ __all__ = [
     "Joint",
     "Joints",
     "Load",
-    "Mount",
-    "Named",
     "Nudge",
     "Pause",
     "Place",
     "Pose",
     "Position",
     "Query",
-    "Read",
     "ReleaseLease",
     "Remove",
     "Request",
@@ -109,7 +108,8 @@ __all__ = [
     "Resume",
     "Servo",
     "Set",
-    "Setting",
+    "SetPriority",
+    "Shape",
     "Speed",
     "Stop",
     "Take",
@@ -160,11 +160,11 @@ class ClearStop(Request, frozen=True):
 
 
 class Speed(Request, frozen=True, kw_only=True):
-    """How fast the arm is at most, as a share of full speed."""
+    """How fast the arm is at most, as a fraction of full speed."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
 
-    value: Annotated[float, Meta(ge=SLOWEST, le=FASTEST)]
+    value: Annotated[float, Meta(ge=MIN_SPEED, le=MAX_SPEED)]
 
 
 class Tool(Request, frozen=True, kw_only=True):
@@ -175,12 +175,12 @@ class Tool(Request, frozen=True, kw_only=True):
     name: Name
 
 
-class Read(Request, frozen=True, kw_only=True):
+class SetPriority(Request, frozen=True, kw_only=True):
     """From now on this says which numbers of a target count when not all can be had."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    reading: Reading
+    priority: Priority
 
 
 class Branch(Request, frozen=True, kw_only=True):
@@ -200,7 +200,7 @@ class Nudge(Request, frozen=True, kw_only=True):
 
     traits: ClassVar[RequestTraits] = COMMAND
 
-    axis: Annotated[int, Meta(ge=1, le=MOST_JOINTS)]
+    axis: Annotated[int, Meta(ge=1, le=MAX_JOINTS)]
     by: float
 
 
@@ -234,17 +234,19 @@ class Watch(Request, frozen=True, kw_only=True):
 
     traits: ClassVar[RequestTraits] = RequestTraits(question=True)
 
-    hz: Annotated[float, Meta(ge=0.0, le=MOST_STATES)]
-    fields: tuple[Named, ...] = ()
+    hz: Annotated[float, Meta(ge=0.0, le=MAX_STATES_PER_SECOND)]
+    fields: tuple[FieldName, ...] = ()
 
 
 class Query(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
-    the things around it, the VRML world, where its links are."""
+    the objects around it, the VRML world, where its links are."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
 
-    at: Literal["state", "arm", "ledger", "branches", "loop", "things", "world", "links"] = "state"
+    at: Literal["state", "arm", "event_log", "branches", "loop", "objects", "world", "links"] = (
+        "state"
+    )
 
 
 AnyRequest = (
@@ -270,7 +272,7 @@ AnyRequest = (
     | Turn
     | Gripper
     | Tool
-    | Read
+    | SetPriority
     | Branch
     | EndDrag
     | Home
@@ -309,8 +311,8 @@ class RequestDecoder:
 
     def decoded(self, text: str | bytes) -> Request:
         """Return the request in ``text``. Raises InputError with the reason where it holds none."""
-        if len(text) > LARGEST:
-            raise InputError(f"A request has at most {LARGEST} bytes.")
+        if len(text) > MAX_REQUEST_BYTES:
+            raise InputError(f"A request has at most {MAX_REQUEST_BYTES} bytes.")
         try:
             return self._decoder.decode(text)
         except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
@@ -324,7 +326,7 @@ class RequestDecoder:
 
 def id_of(text: str | bytes) -> Id:
     """The id in ``text``, which may be no request otherwise."""
-    return _named(text[:LARGEST]).id
+    return _named(text[:MAX_REQUEST_BYTES]).id
 
 
 def _named(text: str | bytes) -> _Named:

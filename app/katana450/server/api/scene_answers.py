@@ -15,14 +15,14 @@ class Value(msgspec.Struct, frozen=True, kw_only=True):
     value: float | Numbers
 
 
-class Thing(msgspec.Struct, frozen=True, kw_only=True):
+class SceneObject(msgspec.Struct, frozen=True, kw_only=True):
     """An object that stands around or is carried; ``T`` (4, 4) in the base frame. See ``place``.
 
     ``fixed``: whether it is fixed to the hand. ``colour``: null for the colour of its file.
     """
 
     name: str
-    form: str
+    shape: str
     size: Numbers
     T: list[Numbers]
     can_be_held: bool
@@ -35,10 +35,10 @@ class Thing(msgspec.Struct, frozen=True, kw_only=True):
     fixed: bool = False
 
 
-class Things(Answer, frozen=True, kw_only=True):
+class Objects(Answer, frozen=True, kw_only=True):
     """All objects."""
 
-    things: list[Thing]
+    objects: list[SceneObject]
 
 
 class Values(Answer, frozen=True, kw_only=True):
@@ -87,12 +87,12 @@ class Links(Answer, frozen=True, kw_only=True):
 class Mesh(Answer, frozen=True, kw_only=True):
     """An uploaded mesh. ``key``: for ``place``. ``name``: the file's, changed if an object has it.
 
-    ``said``: a summary of what was read. ``size``: along x, y, z [m].
+    ``text``: a summary of what was read. ``size``: along x, y, z [m].
     """
 
     key: str
     name: str
-    said: str
+    text: str
     size: Numbers
     triangles: int
 
@@ -101,5 +101,5 @@ class Scene(Answer, frozen=True, kw_only=True):
     """A scene that was uploaded and can now be loaded. ``key``: for ``load``."""
 
     key: str
-    things: list[str]
-    said: str
+    objects: list[str]
+    text: str

@@ -1,4 +1,4 @@
-"""The requests about what there is to be seen: things, water, and nodes of the VRML world."""
+"""The requests about what there is to be seen: objects, water, and nodes of the VRML world."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from msgspec import Meta
 
 from katana450.server.api.fields import (
     COMMAND,
+    Attachment,
     FieldValue,
-    Form,
     Frame,
     Key,
     Matrix4,
-    Mount,
     Name,
     NodeName,
     Request,
     RequestTraits,
+    Shape,
 )
 
 
 class Place(Request, frozen=True, kw_only=True):
-    """Put a thing somewhere: a new one, or one that is there, of which what is not given stays.
+    """Put an object somewhere: a new one, or one that is there, of which what is not given stays.
 
-    ``form`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
+    ``shape`` and ``size`` [m] are what it counts as where contacts are looked for: box (x, y, z),
     cylinder (radius, height) or sphere (radius); of a mesh ``mesh`` is its key, as the upload told
-    it, and the size is the file's. Its frame is in the middle of its underside. A new thing without
-    ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may touch it,
-    and hold it when both do. Such a thing, cup and basin are refused where nothing carries them:
-    they stand on the table or on another thing. ``colour``: as "#94a3b8", or "own" for that of the
-    file. ``hidden``: it is not drawn, and counts for contacts even so.
+    it, and the size is the file's. Its frame is in the middle of its underside. A new object
+    without ``T`` stands in front of the arm where there is room. ``can_be_held``: the fingers may
+    touch it, and hold it when both do. Such an object, cup and basin are refused where nothing
+    carries them: they stand on the table or on another thing. ``colour``: as "#94a3b8", or "own"
+    for that of the file. ``hidden``: it is not drawn, and counts for contacts even so.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
@@ -39,7 +39,7 @@ class Place(Request, frozen=True, kw_only=True):
     name: Name
     T: Matrix4 | None = None
     frame: Frame = Frame.BASE
-    form: Form | None = None
+    shape: Shape | None = None
     size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
     mesh: Key | None = None
     can_be_held: bool | None = None
@@ -50,7 +50,7 @@ class Place(Request, frozen=True, kw_only=True):
 
 
 class Attach(Request, frozen=True, kw_only=True):
-    """Fix a thing to the hand, as a camera or another tool, or to the world again.
+    """Fix an object to the hand, as a camera or another tool, or to the world again.
 
     ``T``: where on the hand, in the frame of the arm's default tool; without it, it stays where it
     is.
@@ -59,12 +59,12 @@ class Attach(Request, frozen=True, kw_only=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
     name: Name
-    to: Mount
+    to: Attachment
     T: Matrix4 | None = None
 
 
 class Load(Request, frozen=True, kw_only=True):
-    """Have the things of a scene that was uploaded, in place of all there are, and its water.
+    """Have the objects of a scene that was uploaded, in place of all there are, and its water.
 
     The arm stays where it is.
     """
@@ -75,7 +75,7 @@ class Load(Request, frozen=True, kw_only=True):
 
 
 class Remove(Request, frozen=True, kw_only=True):
-    """Take a thing away."""
+    """Take an object away."""
 
     traits: ClassVar[RequestTraits] = COMMAND
 
@@ -90,14 +90,14 @@ class Fill(Request, frozen=True, kw_only=True):
     ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
 
-class Named(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class FieldName(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A field of a node of the VRML world, by its DEF name."""
 
     node: NodeName
     field: NodeName
 
 
-class Setting(Named, frozen=True, kw_only=True):
+class FieldSetting(FieldName, frozen=True, kw_only=True):
     """What such a field is to be; null for how it is made."""
 
     value: FieldValue
@@ -117,7 +117,7 @@ class Set(Request, frozen=True, kw_only=True):
     node: NodeName
     field: NodeName
     value: FieldValue
-    more: tuple[Setting, ...] = ()
+    more: tuple[FieldSetting, ...] = ()
 
 
 class Get(Request, frozen=True, kw_only=True):
@@ -127,4 +127,4 @@ class Get(Request, frozen=True, kw_only=True):
 
     node: NodeName
     field: NodeName
-    more: tuple[Named, ...] = ()
+    more: tuple[FieldName, ...] = ()

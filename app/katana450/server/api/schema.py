@@ -16,10 +16,10 @@ TITLE = "katana450"
 READABLE = {
     "state": answers.State,
     "arm": answers.Arm,
-    "ledger": answers.Ledger,
+    "event_log": answers.EventLog,
     "branches": answers.Branches,
     "loop": answers.Loop,
-    "things": answers.Things,
+    "objects": answers.Objects,
     "world": answers.World,
     "links": answers.Links,
 }

@@ -6,13 +6,13 @@ from concurrent.futures import Future
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.choices import Choice
-from katana450.arm.control.event_log import Entry
+from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome, State
-from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
@@ -22,7 +22,7 @@ from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
-from katana450.maths.collision.world import World
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
 from katana450.server.service.nodes import Nodes
@@ -36,7 +36,7 @@ class ArmHandle:
         robot: Robot,
         session: Session,
         link: FrontEnd,
-        navigator: PlanningWorker | None,
+        planning_worker: PlanningWorker | None,
         nodes: Nodes,
     ) -> None:
         """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
@@ -45,18 +45,19 @@ class ArmHandle:
         self.nodes = nodes
         self.session = session
         self._link = link
-        self._board = link.board
-        self._navigator = navigator
-        self._sink: CommandSink = link if navigator is None else navigator
+        self._state_publisher = link.state_publisher
+        self._planning_worker = planning_worker
+        self._sink: CommandSink = link if planning_worker is None else planning_worker
         self._loads = loads_of(robot)
         self._measured: (
-            tuple[tuple[str, World | None, bytes], tuple[Margins, FloatArray | None]] | None
+            tuple[tuple[str, CollisionWorld | None, bytes], tuple[Margins, FloatArray | None]]
+            | None
         ) = None
 
     @property
     def snapshot(self) -> Snapshot:
         """The newest."""
-        return self._board.snapshot
+        return self._state_publisher.snapshot
 
     @property
     def ready(self) -> FloatArray:
@@ -64,9 +65,9 @@ class ArmHandle:
         return self.session.ready
 
     @property
-    def surroundings(self) -> Environment:
-        """Knows where things are."""
-        return self.session.surroundings
+    def environment(self) -> Environment:
+        """Knows where objects are."""
+        return self.session.environment
 
     @property
     def pouring(self) -> Pouring | None:
@@ -81,9 +82,9 @@ class ArmHandle:
         return self.robot.arm
 
     @property
-    def lateness(self) -> LoopTiming:
+    def loop_timing(self) -> LoopTiming:
         """How well the control loop keeps its period."""
-        return self._board.lateness
+        return self._state_publisher.loop_timing
 
     @property
     def holding(self) -> FloatArray | None:
@@ -106,7 +107,7 @@ class ArmHandle:
             self._measured = (key, (margins(chain, world, x), holding))
         return self._measured[1]
 
-    def choices(self) -> tuple[Choice, ...]:
+    def choices(self) -> tuple[BranchOption, ...]:
         """The branches there are to choose from. Raises InputError where there are none."""
         return self.session.choices(self.state)
 
@@ -119,17 +120,17 @@ class ArmHandle:
 
     def outcome(self, ticket: int) -> Future[Outcome]:
         """Return what became of the command of ``ticket``, once the arm's process has told."""
-        return self._board.outcomes.of(ticket)
+        return self._state_publisher.outcomes.of(ticket)
 
     @property
     def state(self) -> State:
         """The newest."""
-        return self._board.snapshot.state
+        return self._state_publisher.snapshot.state
 
     @property
-    def ledger(self) -> tuple[Entry, ...]:
+    def event_log(self) -> tuple[LogEntry, ...]:
         """What held it back of late, oldest first."""
-        return self._board.ledger
+        return self._state_publisher.event_log
 
     @property
     def caught_up(self) -> bool:
@@ -139,11 +140,11 @@ class ArmHandle:
     @property
     def busy(self) -> bool:
         """Whether a way is being worked out that the arm will then go."""
-        return self._navigator is not None and self._navigator.busy
+        return self._planning_worker is not None and self._planning_worker.busy
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         """Tell the arm that somebody watches over it."""
-        self._link.beat()
+        self._link.heartbeat()
 
     @property
     def age(self) -> float:

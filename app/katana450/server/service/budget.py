@@ -14,23 +14,23 @@ from contextlib import contextmanager
 
 from katana450.errors import InputError
 
-EACH = 0.25
+IDENTITY_BUDGET = 0.25
 """[s of processor time a second] Of one identity, and of whoever drives."""
 
-CROWD = 0.5
+SHARED_BUDGET = 0.5
 """[s of processor time a second] Of all who do not drive together."""
 
-FIXED = 2e-4
+REQUEST_COST = 2e-4
 """[s] That any request on a socket costs: to read and decode it, and to send the answer."""
 
-FIXED_HTTP = 5e-4
+HTTP_REQUEST_COST = 5e-4
 """[s] That one over HTTP costs."""
 
-DEBT = 1.0
+MAX_DEBT = 1.0
 """[s of processor time] Beyond its budget, an identity that asks on regardless is sent away. Its
 programs may come again once half of it is made good."""
 
-ACCOUNTS = 1024
+MAX_ACCOUNTS = 1024
 """Identities that are remembered."""
 
 
@@ -63,7 +63,7 @@ class _Account:
 
     def pay(self, cost: float) -> None:
         """Take ``cost`` away; a debt is never more than DEBT."""
-        self._left = max(self._left - cost, -DEBT)
+        self._left = max(self._left - cost, -MAX_DEBT)
 
     def wait(self, t: float) -> float:
         """[s] Until there is something left again; 0 while there is."""
@@ -79,8 +79,8 @@ class Budgets:
         """``processor``: time [s] that this thread has used, and no other."""
         self.clock = clock
         self.processor = processor
-        self._crowd = _Account(CROWD, clock())
-        self._driver = ("", _Account(EACH, clock()))
+        self._crowd = _Account(SHARED_BUDGET, clock())
+        self._driver = ("", _Account(IDENTITY_BUDGET, clock()))
         self._known: dict[str, _Account] = {}
 
     def of(self, identity: str) -> Budget:
@@ -91,12 +91,12 @@ class Budgets:
         """Who pays, the first on their own account; see ``Budget.charged``."""
         if driver:
             if self._driver[0] != driver:
-                self._driver = (driver, _Account(EACH, self.clock()))
+                self._driver = (driver, _Account(IDENTITY_BUDGET, self.clock()))
             return (self._driver[1],)
         # The one that was used last stands last.
-        own = self._known.pop(identity, None) or _Account(EACH, self.clock())
+        own = self._known.pop(identity, None) or _Account(IDENTITY_BUDGET, self.clock())
         self._known[identity] = own
-        while len(self._known) > ACCOUNTS:
+        while len(self._known) > MAX_ACCOUNTS:
             self._known.pop(next(iter(self._known)))
         return (own, self._crowd) if question else (own,)
 
@@ -110,7 +110,7 @@ class Budget:
 
     @contextmanager
     def charged(
-        self, driver: str = "", *, question: bool = True, fixed: float = FIXED
+        self, driver: str = "", *, question: bool = True, fixed: float = REQUEST_COST
     ) -> Iterator[None]:
         """Do something, and take from the budget what it cost.
 
@@ -124,7 +124,7 @@ class Budget:
         if wait > 0.0:
             # What is refused takes time as well; the crowd is not made to pay for it.
             accounts[0].pay(fixed)
-            raise BusyError(wait, gone=accounts[0].left(t) <= -DEBT)
+            raise BusyError(wait, gone=accounts[0].left(t) <= -MAX_DEBT)
         began = processor()
         try:
             yield
@@ -136,4 +136,4 @@ class Budget:
     def is_exhausted(self) -> bool:
         """Whether far more was asked of late than there is time for."""
         (own,) = self._budgets.accounts(self._identity, "", question=False)
-        return own.left(self._budgets.clock()) <= -DEBT / 2.0
+        return own.left(self._budgets.clock()) <= -MAX_DEBT / 2.0

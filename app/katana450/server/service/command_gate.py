@@ -13,8 +13,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person
 from katana450.errors import InputError, LeaseError
-from katana450.server.service.interfaces import Arm
-from katana450.server.service.stop_state import Stopped
+from katana450.server.service.interfaces import ArmInterface
+from katana450.server.service.stop_state import StopRecord
 
 log = logging.getLogger(__name__)
 
@@ -43,8 +43,8 @@ class CommandGate:
         self._clock = clock
         self._lock = threading.RLock()
         self.lease = Lease()
-        self.stopped: Stopped | None = None
-        self.arm: Arm | None = None
+        self.stopped: StopRecord | None = None
+        self.arm: ArmInterface | None = None
         """None until the arm is there."""
         self.program: RunningProgram | None = None
         """None while no program runs."""
@@ -63,7 +63,7 @@ class CommandGate:
         """
         with self._lock:
             if isinstance(command, cmd.Stop):
-                return self._stop(Stopped(actor.name, f"{actor.name} pressed STOP."), actor)
+                return self._stop(StopRecord(actor.name, f"{actor.name} pressed STOP."), actor)
             if not all(each.traits.while_stopped for each in command.parts):
                 self.check_runs()
             if actor.channel is CommandChannel.SERVER and not isinstance(command, PROTECTIVE):
@@ -91,7 +91,7 @@ class CommandGate:
             self.check_runs()
             return self._granted(actor, pacing=pacing)
 
-    def check_runs(self) -> Arm:
+    def check_runs(self) -> ArmInterface:
         """Return the arm. Raises LeaseError while there is none, or it is stopped."""
         arm = self.present()
         self.check_not_stopped()
@@ -113,7 +113,7 @@ class CommandGate:
         """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
         return actor.seen is None or actor.seen == self.revocations
 
-    def present(self) -> Arm:
+    def present(self) -> ArmInterface:
         """Return the arm. Raises LeaseError while there is none yet."""
         if self.arm is None:
             raise LeaseError("The arm is not there yet.")
@@ -147,7 +147,7 @@ class CommandGate:
     def protect(self, why: str) -> None:
         """Stop the arm on the server's own account, for the reason ``why``."""
         with self._lock:
-            self._stop(Stopped(None, why), SERVER)
+            self._stop(StopRecord(None, why), SERVER)
 
     def reconcile(self) -> None:
         """Make gate and arm agree on whether the arm is stopped; to be called often."""
@@ -172,7 +172,7 @@ class CommandGate:
             jogged = self._clock() - self._jogged < cmd.JOG_TIME
             return self.arm is not None and (self.arm.state.moving or jogged)
 
-    def _stop(self, stopped: Stopped, actor: Actor) -> int:
+    def _stop(self, stopped: StopRecord, actor: Actor) -> int:
         self._revoke()
         self.on_stop()
         if self.stopped is None:
@@ -184,7 +184,7 @@ class CommandGate:
         return self.stopped.ticket or 0
 
     @staticmethod
-    def _requested(stopped: Stopped, arm: Arm, actor: Actor) -> Stopped:
+    def _requested(stopped: StopRecord, arm: ArmInterface, actor: Actor) -> StopRecord:
         grounds = Grounds.SERVER if actor is SERVER else Grounds.SAFETY
         return stopped.requested(arm.deliver(cmd.Stop(), replace(actor, grounds=grounds)))
 

@@ -18,10 +18,10 @@ from katana450.server.service import serialize
 from katana450.server.service.budget import Budget
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub, Window
-from katana450.server.service.interfaces import Arm
+from katana450.server.service.interfaces import ArmInterface
 from katana450.server.service.object_requests import ObjectRequests
 
-BARE: dict[type[requests.Request], cmd.Command] = {
+COMMANDS: dict[type[requests.Request], cmd.Command] = {
     requests.EndDrag: cmd.EndDrag(),
     requests.Home: cmd.Home(),
     requests.GoToZero: cmd.GoToZero(),
@@ -57,7 +57,7 @@ class Dispatcher:
         self._hub = hub
         self._placing = ObjectRequests(hub)
 
-    def do(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
+    def handle(self, window: Window, request: requests.Request, budget: Budget) -> answers.Answer:
         """Execute ``request`` and return its answer. Counts as a heartbeat of ``window``.
 
         The outcome of a command may be still to come, see ``is_pending``.
@@ -72,14 +72,14 @@ class Dispatcher:
 
     def _done(self, window: Window, request: requests.Request) -> answers.Answer:
         hub = self._hub
-        hub.beat(window)
+        hub.heartbeat(window)
         match request:
             case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
             case requests.Query(at=at):
                 return self.query(at)
             case requests.Get(node=node, field=field, more=more):
-                arm, first = hub.present(), requests.Named(node=node, field=field)
+                arm, first = hub.present(), requests.FieldName(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
             case requests.Stop(press=press):
                 # Waits for nothing: the states tell when the arm has confirmed it.
@@ -140,8 +140,8 @@ class Dispatcher:
 
     def _command(self, request: requests.Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request that is none."""
-        if type(request) in BARE:
-            return BARE[type(request)]
+        if type(request) in COMMANDS:
+            return COMMANDS[type(request)]
         match request:
             case requests.Joint(axis=axis, value=value):
                 return cmd.SetJoint(axis - 1, value)
@@ -172,8 +172,8 @@ class Dispatcher:
                 return cmd.TurnTool(pitch, roll)
             case requests.Tool(name=name):
                 return cmd.SetTool(name)
-            case requests.Read(reading=reading):
-                return cmd.SetReading(reading)
+            case requests.SetPriority(priority=priority):
+                return cmd.SetPriority(priority)
             case requests.Branch(shoulder=shoulder, elbow=elbow):
                 return cmd.TakeBranch(Branch(shoulder, elbow))
         return None
@@ -181,7 +181,7 @@ class Dispatcher:
     def _setting(self, asked: requests.Set) -> cmd.Command:
         """Return the command that sets fields of the VRML world, all at once."""
         arm = self._hub.present()
-        first = requests.Setting(node=asked.node, field=asked.field, value=asked.value)
+        first = requests.FieldSetting(node=asked.node, field=asked.field, value=asked.value)
         return arm.nodes.command(arm.state, (first, *asked.more))
 
     def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
@@ -194,16 +194,16 @@ class Dispatcher:
         """What there is to be told of ``at``. Raises LeaseError while there is no arm."""
         hub = self._hub
         match at:
-            case "ledger":
-                return serialize.ledger(hub.journal.lines)
+            case "event_log":
+                return serialize.event_log(hub.event_log.lines)
             case "state":
                 return serialize.state(hub)
         arm = hub.present()
         if at == "loop":
-            return serialize.loop(arm.lateness)
+            return serialize.loop(arm.loop_timing)
         return once(arm.snapshot, at, lambda: self._derived(arm, at))
 
-    def _derived(self, arm: Arm, at: str) -> answers.Answer:
+    def _derived(self, arm: ArmInterface, at: str) -> answers.Answer:
         """What follows from the newest snapshot alone."""
         match at:
             case "arm":
@@ -211,10 +211,12 @@ class Dispatcher:
             case "links":
                 return arm.nodes.links(arm.state)
             case "branches":
-                return answers.Branches(choices=[serialize.choice(each) for each in arm.choices()])
+                return answers.Branches(
+                    choices=[serialize.branch_option(each) for each in arm.choices()]
+                )
             case "world":
                 return arm.nodes.world(arm.state)
-        return serialize.things(arm)
+        return serialize.objects(arm)
 
 
 def _done(ticket: int | None, outcome: str | None, misfit: float | None = None) -> answers.Done:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.event_log import Entry
-from katana450.arm.control.messages import told
+from katana450.arm.control.event_log import LogEntry
+from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import Reason
-from katana450.arm.runtime.state_publisher import KEPT
+from katana450.arm.runtime.state_publisher import MAX_KEPT_ENTRIES
 
 log = logging.getLogger(__name__)
 
@@ -37,10 +37,10 @@ UNITS = {
 
 
 @dataclass(frozen=True)
-class Line:
-    """An entry of the ledger. when: in UTC."""
+class LogLine:
+    """An entry of the event log. when: in UTC."""
 
-    entry: Entry
+    entry: LogEntry
     when: datetime
 
     @property
@@ -50,32 +50,32 @@ class Line:
         return None if actor is None or actor.channel is CommandChannel.SERVER else actor.name
 
 
-class Journal:
+class EventLog:
     """The newest lines."""
 
     def __init__(self) -> None:
-        self._lines: deque[Line] = deque(maxlen=KEPT)
-        self._seen: Entry | None = None
+        self._lines: deque[LogLine] = deque(maxlen=MAX_KEPT_ENTRIES)
+        self._seen: LogEntry | None = None
         # Entries are on the loop's clock; people have another.
         self._epoch = time.time() - time.perf_counter()
 
-    def follow(self, ledger: Sequence[Entry]) -> None:
-        """Take down what ``ledger`` has that it had not before."""
-        for entry in _newer(ledger, self._seen):
+    def follow(self, event_log: Sequence[LogEntry]) -> None:
+        """Take down what ``event_log`` has that it had not before."""
+        for entry in _newer(event_log, self._seen):
             when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
-            self._lines.append(Line(entry, when))
+            self._lines.append(LogLine(entry, when))
             if entry.began:
-                log.info("%s%s", _credit(entry), told(entry.finding))
-        if ledger:
-            self._seen = ledger[-1]
+                log.info("%s%s", _credit(entry), finding_text(entry.finding))
+        if event_log:
+            self._seen = event_log[-1]
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[LogLine, ...]:
         """The oldest first."""
         return tuple(self._lines)
 
 
-def _credit(entry: Entry) -> str:
+def _credit(entry: LogEntry) -> str:
     """Return who did what on what grounds, as the beginning of a log line."""
     actor = entry.actor
     if actor is None or actor.grounds is None:
@@ -83,9 +83,9 @@ def _credit(entry: Entry) -> str:
     return f"{actor.name} ({actor.channel.value}, {actor.grounds.value}), {entry.command}: "
 
 
-def _newer(ledger: Sequence[Entry], seen: Entry | None) -> list[Entry]:
-    newer: list[Entry] = []
-    for entry in reversed(ledger):
+def _newer(event_log: Sequence[LogEntry], seen: LogEntry | None) -> list[LogEntry]:
+    newer: list[LogEntry] = []
+    for entry in reversed(event_log):
         if entry is seen:
             break
         newer.append(entry)

@@ -1,4 +1,4 @@
-"""When each participant last gave a sign of life, by the time its message was received."""
+"""When each participant last gave a heartbeat, by the time its message was received."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import socket
 import time
 from collections.abc import Callable
 
-from katana450.arm.runtime.readiness import Line, data_age, readable
+from katana450.arm.runtime.readiness import SocketChannel, data_age, readable
 
 KEEPALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
 """[s, s, probes] A host that is gone without a word is noticed within 11 s."""
 
 
 class LastHeartbeat:
-    """The newest sign of life of one participant, stamped as it is handled."""
+    """The newest heartbeat of one participant, stamped as it is handled."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """``clock``: in seconds; the participant is alive now."""
@@ -26,7 +26,7 @@ class LastHeartbeat:
 
     @property
     def newest(self) -> float:
-        """Time of the newest sign of life [s], on the clock."""
+        """Time of the newest heartbeat [s], on the clock."""
         return self._newest
 
     def _age(self) -> float:
@@ -35,13 +35,15 @@ class LastHeartbeat:
 
 
 class Arrival(LastHeartbeat):
-    """The newest sign of life on one TCP connection, stamped by the kernel on arrival.
+    """The newest heartbeat on one TCP connection, stamped by the kernel on arrival.
 
-    A message counts from when it arrived: one that is handled late is no later sign of life, and
+    A message counts from when it arrived: one that is handled late is no later heartbeat, and
     one that waits because the server is late is no silence.
     """
 
-    def __init__(self, line: Line | None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, line: SocketChannel | None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """``line``: the socket; None where there is none, so that handling counts."""
         self._line = line
         super().__init__(clock)

@@ -17,13 +17,13 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.command_gate import CommandGate
-from katana450.server.service.event_log import Journal
+from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import Arm, Behind
+from katana450.server.service.interfaces import ArmInterface, MeasuresAge
 from katana450.server.service.runner import Runner, guarded
 from katana450.server.service.scenes import Scenes
-from katana450.server.service.stop_state import Presses, Stopped
+from katana450.server.service.stop_state import Presses, StopRecord
 from katana450.settings import Settings
 
 TICK = 0.02
@@ -35,7 +35,7 @@ REMEMBERED = 256
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """One open page; ``tell`` leaves it a notice, ``heartbeat`` is its newest sign of life."""
+    """One open page; ``tell`` leaves it a notice, ``heartbeat`` is its newest heartbeat."""
 
     person: Person
     number: int
@@ -72,21 +72,21 @@ class Hub:
         self.clock = clock
         self._hold_after = hold_after
         self.gate = CommandGate(clock)
-        self.journal = Journal()
+        self.event_log = EventLog()
         self.runner = Runner(self, Namespace()) if runner is None else runner(self)
         self.requests = RequestDecoder(self.runner.request_types)
         self.gate.on_stop = guarded(self.runner.stopped)
         self.meshes = Meshes() if meshes is None else meshes
         self.scenes = Scenes(self.meshes)
         self._windows: dict[str, Window] = {}
-        self._pictures: dict[Behind, str] = {}
+        self._pictures: dict[MeasuresAge, str] = {}
         self._remembered: dict[str, tuple[Person, int]] = {}
         self._numbers = 0
         self._presses = Presses()
         self._takeover: Takeover | None = None
 
     @property
-    def arm(self) -> Arm | None:
+    def arm(self) -> ArmInterface | None:
         """The arm; None until it is there."""
         return self.gate.arm
 
@@ -96,7 +96,7 @@ class Hub:
         return self.gate.lease
 
     @property
-    def stopped(self) -> Stopped | None:
+    def stopped(self) -> StopRecord | None:
         """Why nothing moves; None while the arm is not stopped."""
         return self.gate.stopped
 
@@ -104,7 +104,7 @@ class Hub:
 
     def join(
         self,
-        visitor: Identity,
+        identity: Identity,
         page: str,
         tell: Callable[[dict[str, Any]], None],
         heartbeat: LastHeartbeat | None = None,
@@ -112,14 +112,14 @@ class Hub:
     ) -> Window:
         """A page opens its control socket; one that comes back is who it was.
 
-        ``heartbeat``: its newest sign of life; without one, what ``beat`` says. ``channel``: where
+        ``heartbeat``: its newest heartbeat; without one, what ``beat`` says. ``channel``: where
         it gives its commands.
         """
-        key = key_of(visitor, page)
-        person, number = self._known(key, visitor)
+        key = key_of(identity, page)
+        person, number = self._known(key, identity)
         window = Window(person, number, tell, heartbeat or LastHeartbeat(self.clock), channel)
         self._windows[key] = window
-        self.beat(window)
+        self.heartbeat(window)
         return window
 
     def leave(self, window: Window, *, for_good: bool = False) -> None:
@@ -138,7 +138,7 @@ class Hub:
                 self.gate.protect(f"{person.name} left while the arm moved.")
             self.release_lease(window)
 
-    def present(self) -> Arm:
+    def present(self) -> ArmInterface:
         """The arm. Raises LeaseError while there is none yet."""
         return self.gate.present()
 
@@ -157,11 +157,11 @@ class Hub:
             raise LeaseError("Open the front page to drive the arm.")
         return Actor(window.person, CommandChannel.SCENE, seen)
 
-    def show(self, key: str, picture: Behind) -> None:
+    def show(self, key: str, picture: MeasuresAge) -> None:
         """A page opens its way to viser; ``picture``: how far it is behind."""
         self._pictures[picture] = key
 
-    def hide(self, picture: Behind) -> None:
+    def hide(self, picture: MeasuresAge) -> None:
         """It is closed."""
         del self._pictures[picture]
 
@@ -251,8 +251,8 @@ class Hub:
             raise LeaseError("That window or program is gone.")
         return found
 
-    def beat(self, window: Window) -> None:
-        """A message of the window is being handled: a sign of life as of when it was received."""
+    def heartbeat(self, window: Window) -> None:
+        """A message of the window is being handled: a heartbeat as of when it was received."""
         window.heartbeat.note()
         self._hear()
 
@@ -270,21 +270,21 @@ class Hub:
         if arm is not None:
             # The arm stops by itself where nobody answers for whoever drives.
             if not silent:
-                arm.beat()
+                arm.heartbeat()
             self._watch(arm)
-            self.journal.follow(arm.ledger)
+            self.event_log.follow(arm.event_log)
             self.gate.reconcile()
             self.runner.tick()
 
     def _hear(self) -> None:
-        """Take over the newest sign of life of whoever drives, by when it was received."""
+        """Take over the newest heartbeat of whoever drives, by when it was received."""
         holder = self.lease.holder
         window = None if holder is None else self._windows.get(holder.key)
         if window is not None:
             newest = window.heartbeat.newest
             self.gate.change(lambda lease, _: lease.hear(window.person, newest))
 
-    def _watch(self, arm: Arm) -> None:
+    def _watch(self, arm: ArmInterface) -> None:
         """Stop an arm whose process does not answer: it stops once it is there again."""
         age, due = arm.age, self.gate.moves() or not arm.caught_up
         if self.stopped is None and due and age > 2 * self._hold_after:
@@ -303,34 +303,34 @@ class Hub:
         self.gate.change(lambda lease, t: lease.expire(t))
         return silent and self.lease.holder is not None
 
-    def person_of(self, visitor: Identity, page: str) -> Person:
+    def person_of(self, identity: Identity, page: str) -> Person:
         """Return who speaks for ``page``, whether or not its control socket is open now."""
-        return self._known(key_of(visitor, page), visitor)[0]
+        return self._known(key_of(identity, page), identity)[0]
 
-    def _known(self, key: str, visitor: Identity) -> tuple[Person, int]:
+    def _known(self, key: str, identity: Identity) -> tuple[Person, int]:
         """Return person and number of the page of that key; a new page gets new ones."""
-        known = self._remembered.pop(key, None) or self._meet(key, visitor)
+        known = self._remembered.pop(key, None) or self._meet(key, identity)
         self._remembered[key] = known
         while len(self._remembered) > REMEMBERED:
             self._remembered.pop(next(iter(self._remembered)))
         return known
 
-    def _meet(self, key: str, visitor: Identity) -> tuple[Person, int]:
+    def _meet(self, key: str, identity: Identity) -> tuple[Person, int]:
         self._numbers += 1
         number = self._numbers
-        name = visitor.name or f"Window {number}"
+        name = identity.name or f"Window {number}"
         known = [person for person, _ in self._remembered.values()]
         if any(person.name == name for person in known):
             name = f"{name} ({number})"
-        return Person(key, name, visitor.role), number
+        return Person(key, name, identity.role), number
 
 
-def visiting(visitor: Identity, channel: CommandChannel) -> Actor:
+def actor_of(identity: Identity, channel: CommandChannel) -> Actor:
     """Return ``visitor`` as a giver of commands without a window of its own."""
-    person = Person(visitor.session, visitor.name or "Somebody", visitor.role)
+    person = Person(identity.session, identity.name or "Somebody", identity.role)
     return Actor(person, channel)
 
 
-def key_of(visitor: Identity, page: str) -> str:
+def key_of(identity: Identity, page: str) -> str:
     """What ties the sockets of one page together."""
-    return f"{visitor.session}/{page}"
+    return f"{identity.session}/{page}"

@@ -8,13 +8,13 @@ from typing import Protocol
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.choices import Choice
-from katana450.arm.control.event_log import Entry
+from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome, State
-from katana450.arm.control.things import Environment
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -23,7 +23,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.nodes import Nodes
 
 
-class Arm(Protocol):
+class ArmInterface(Protocol):
     """What the gateway asks of the arm; ``ArmHandle`` is one."""
 
     @property
@@ -48,10 +48,10 @@ class Arm(Protocol):
     def session(self) -> Session: ...
 
     @property
-    def lateness(self) -> LoopTiming: ...
+    def loop_timing(self) -> LoopTiming: ...
 
     @property
-    def surroundings(self) -> Environment: ...
+    def environment(self) -> Environment: ...
 
     @property
     def pouring(self) -> Pouring | None: ...
@@ -63,7 +63,7 @@ class Arm(Protocol):
     def margins(self) -> Margins: ...
 
     @property
-    def ledger(self) -> Sequence[Entry]: ...
+    def event_log(self) -> Sequence[LogEntry]: ...
 
     @property
     def caught_up(self) -> bool: ...
@@ -74,16 +74,16 @@ class Arm(Protocol):
     @property
     def age(self) -> float: ...
 
-    def beat(self) -> None: ...
+    def heartbeat(self) -> None: ...
 
     def deliver(self, command: cmd.Command, actor: Actor) -> int: ...
 
     def outcome(self, ticket: int) -> Future[Outcome]: ...
 
-    def choices(self) -> tuple[Choice, ...]: ...
+    def choices(self) -> tuple[BranchOption, ...]: ...
 
 
-class Behind(Protocol):
+class MeasuresAge(Protocol):
     """How far a window's picture is behind; ``Flow`` is one."""
 
     def age(self, t: float) -> float: ...

@@ -29,11 +29,11 @@ class Nodes:
         """Return all nodes with their present values."""
         return answers.World(nodes=[])
 
-    def read(self, state: State, asked: Iterable[requests.Named]) -> tuple[answers.Value, ...]:  # noqa: ARG002
+    def read(self, state: State, asked: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:  # noqa: ARG002
         """Return what the fields are now. Raises InputError for a name that there is not."""
         raise _not_installed()
 
-    def command(self, state: State, settings: Iterable[requests.Setting]) -> cmd.Command:  # noqa: ARG002
+    def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:  # noqa: ARG002
         """Return what sets all of these. Raises InputError if one of them cannot be set."""
         raise _not_installed()
 

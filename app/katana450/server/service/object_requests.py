@@ -1,4 +1,4 @@
-"""What is asked of the things around: put, fixed to the hand, taken away, filled."""
+"""What is asked of the objects around: put, fixed to the hand, taken away, filled."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.placement import free_place
 from katana450.arm.control.pouring import BASIN, CUP
-from katana450.arm.control.solid import PLAIN, Look
+from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, named
+from katana450.arm.control.solid import PLAIN, ObjectAppearance
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
-from katana450.arm.control.things import MOST, Form, Mount, Thing, named
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.water.units import ML
@@ -29,7 +29,7 @@ class ObjectRequests:
         """What the arm is told; None for a request about something else."""
         match request:
             case requests.Place():
-                return cmd.Place(self._thing(request))
+                return cmd.PlaceObject(self._object(request))
             case requests.Attach():
                 return self._attached(request)
             case requests.Load(scene=key):
@@ -41,41 +41,41 @@ class ObjectRequests:
                 return cmd.Remove(name)
         return None
 
-    def _thing(self, asked: requests.Place) -> Thing:
+    def _object(self, asked: requests.Place) -> SceneObject:
         """What is to be put where; what is not said of it stays as it is."""
         arm = self._hub.present()
         known = self._out_of_the_hand(asked.name)
-        if known is None and len(arm.state.things) >= MOST:
-            raise InputError(f"There are {MOST} things already: take one away.")
-        thing = self._shaped(asked, known)
+        if known is None and len(arm.state.objects) >= MAX_OBJECTS:
+            raise InputError(f"There are {MAX_OBJECTS} objects already: take one away.")
+        scene_object = self._shaped(asked, known)
         if asked.T is None:
             return (
-                thing
+                scene_object
                 if known is not None
-                else replace(thing, T=free_place(thing, arm.state.things))
+                else replace(scene_object, T=free_place(scene_object, arm.state.objects))
             )
         T = se3.printed(asked.T, f"The pose of {asked.name!r}")
         if asked.frame is requests.Frame.SHOULDER:
             T = arm.arm.T_base_shoulder @ T
-        if thing.fixed:
-            T = arm.surroundings.into_hand(T, arm.state.x)
-        placed = replace(thing, T=T)
+        if scene_object.fixed:
+            T = arm.environment.into_hand(T, arm.state.x)
+        placed = replace(scene_object, T=T)
         if is_loose(placed):
-            check_carried(arm.surroundings.table, arm.state.things, placed)
+            check_carried(arm.environment.table, arm.state.objects, placed)
         return placed
 
-    def _shaped(self, asked: requests.Place, known: Thing | None) -> Thing:
+    def _shaped(self, asked: requests.Place, known: SceneObject | None) -> SceneObject:
         """What it is, wherever that is."""
-        form = None if known is None else known.form
+        form = None if known is None else known.shape
         size = None if known is None else known.size
         solid = None if known is None else known.solid
-        if asked.form is not None:
-            form = Form(asked.form.value)
+        if asked.shape is not None:
+            form = Shape(asked.shape.value)
         if asked.mesh is not None:
             solid = self._hub.meshes.need(asked.mesh).solid
         if asked.size is not None:
             size = tuple(asked.size)
-        if form is Form.MESH:
+        if form is Shape.MESH:
             if solid is None:
                 raise InputError(f"Say the mesh of {asked.name!r}: the key that the upload told.")
             size = solid.size
@@ -93,7 +93,7 @@ class ObjectRequests:
         can_be_held = known is not None and known.can_be_held
         if asked.can_be_held is not None:
             can_be_held = asked.can_be_held
-        return Thing(
+        return SceneObject(
             asked.name,
             form,
             size,
@@ -101,38 +101,38 @@ class ObjectRequests:
             can_be_held,
             solid=solid,
             scale=scale,
-            look=_look(asked, PLAIN if known is None else known.look),
+            appearance=_look(asked, PLAIN if known is None else known.appearance),
             fixed=known is not None and known.fixed,
         )
 
     def _attached(self, asked: requests.Attach) -> cmd.Command:
         """Where it is, or where on the hand it is to be."""
         arm = self._hub.present()
-        thing = self._out_of_the_hand(asked.name)
-        if thing is None:
+        scene_object = self._out_of_the_hand(asked.name)
+        if scene_object is None:
             raise InputError(f"There is no {asked.name!r}.")
-        to = Mount(asked.to.value)
-        hand = arm.surroundings.hand
+        to = Attachment(asked.to.value)
+        hand = arm.environment.hand
         if asked.T is None or hand is None:
-            check_mounted(arm.surroundings, arm.state.things, thing, to, arm.state.x)
+            check_mounted(arm.environment, arm.state.objects, scene_object, to, arm.state.x)
             return cmd.Attach(asked.name, to)
-        if to is not Mount.HAND:
+        if to is not Attachment.HAND:
             raise InputError("T is where on the hand it is to be; to put it elsewhere, `place` it.")
         T = hand.T_palm_tool @ se3.printed(asked.T)
-        return cmd.Place(replace(thing, T=T, fixed=True))
+        return cmd.PlaceObject(replace(scene_object, T=T, fixed=True))
 
-    def _out_of_the_hand(self, name: str) -> Thing | None:
-        """The thing of that name, if there is one. Raises InputError when it is held."""
+    def _out_of_the_hand(self, name: str) -> SceneObject | None:
+        """The object of that name, if there is one. Raises InputError when it is held."""
         arm = self._hub.present()
         if any(link.name == name for link in arm.robot.links) or name == "table":
-            raise InputError(f"{name!r} is no thing that can be put elsewhere.")
-        known = named(arm.state.things, name)
+            raise InputError(f"{name!r} is no object that can be put elsewhere.")
+        known = named(arm.state.objects, name)
         if known is not None and known.held:
             raise InputError(f"{name!r} is held: open the gripper first.")
         return known
 
 
-def _look(asked: requests.Place, known: Look) -> Look:
+def _look(asked: requests.Place, known: ObjectAppearance) -> ObjectAppearance:
     """How it is to be drawn."""
     colour = known.colour
     if asked.colour is not None:
@@ -140,7 +140,7 @@ def _look(asked: requests.Place, known: Look) -> Look:
         if asked.colour != "own":
             red, green, blue = bytes.fromhex(asked.colour[1:])
             colour = (red, green, blue)
-    return Look(
+    return ObjectAppearance(
         colour,
         known.opacity if asked.opacity is None else asked.opacity,
         known.hidden if asked.hidden is None else asked.hidden,

@@ -6,20 +6,20 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, NamedTuple
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import MAX_OBJECTS
 from katana450.arm.control.state import State
-from katana450.arm.control.things import MOST
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError, LeaseError
 
 if TYPE_CHECKING:
-    from katana450.server.service.interfaces import Arm
+    from katana450.server.service.interfaces import ArmInterface
 
-KEPT = 4
+MAX_WAITING_SCENES = 4
 """Scenes that were brought and not loaded yet."""
 
 
 class _Waiting(NamedTuple):
-    command: cmd.Furnish
+    command: cmd.ReplaceScene
     meshes: tuple[Mesh, ...]
 
 
@@ -30,7 +30,9 @@ class Scenes:
         self._meshes = meshes
         self._waiting: dict[str, _Waiting] = {}
 
-    def keep(self, key: str, command: cmd.Furnish, meshes: Collection[Mesh], arm: Arm) -> None:
+    def keep(
+        self, key: str, command: cmd.ReplaceScene, meshes: Collection[Mesh], arm: ArmInterface
+    ) -> None:
         """Keep a scene under ``key``; the oldest gives way.
 
         Raises InputError if ``arm`` cannot have it, or there is no room for ``meshes``.
@@ -38,10 +40,10 @@ class Scenes:
         arm.session.check(command)
         self._meshes.put(meshes, used_in(arm.state))
         self._waiting[key] = _Waiting(command, tuple(meshes))
-        while len(self._waiting) > KEPT:
+        while len(self._waiting) > MAX_WAITING_SCENES:
             self._waiting.pop(next(iter(self._waiting)))
 
-    def furnishing(self, key: str, arm: Arm) -> cmd.Furnish:
+    def furnishing(self, key: str, arm: ArmInterface) -> cmd.ReplaceScene:
         """What loads the scene. Raises InputError, LeaseError with the reason why not."""
         waiting = self._waiting.get(key)
         if waiting is None:
@@ -55,11 +57,13 @@ class Scenes:
 
 def used_in(state: State | None) -> frozenset[str]:
     """Return the keys of the meshes of the objects in ``state``."""
-    things = () if state is None else state.things
-    return frozenset(thing.solid.key for thing in things if thing.solid is not None)
+    objects = () if state is None else state.objects
+    return frozenset(
+        scene_object.solid.key for scene_object in objects if scene_object.solid is not None
+    )
 
 
 def free_name(name: str, taken: set[str]) -> str:
     """Return ``name``, with a number behind it if it is ``taken``."""
-    tried = [name, *(f"{name[:36]} {number}" for number in range(2, MOST + 3))]
+    tried = [name, *(f"{name[:36]} {number}" for number in range(2, MAX_OBJECTS + 3))]
     return next(each for each in tried if each not in taken)

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import msgspec
 
 from katana450.arm.control import state as control
-from katana450.arm.control.choices import Choice
+from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
-from katana450.arm.control.messages import sentence, told
+from katana450.arm.control.messages import finding_text, sentence
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
@@ -27,9 +27,9 @@ from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
 from katana450.server.api.fields import tag_of
 from katana450.server.service.derived import once
-from katana450.server.service.event_log import UNITS, Line
+from katana450.server.service.event_log import UNITS, LogLine
 from katana450.server.service.hub import Hub
-from katana450.server.service.interfaces import Arm
+from katana450.server.service.interfaces import ArmInterface
 
 
 def finding(found: control.Finding) -> answers.Finding:
@@ -37,7 +37,7 @@ def finding(found: control.Finding) -> answers.Finding:
     unit = UNITS.get(found.reason)
     return answers.Finding(
         reason=found.reason.value,
-        said=told(found),
+        text=finding_text(found),
         amount=None if unit is None else found.amount,
         unit=unit,
         axis=None if found.axis is None else found.axis + 1,
@@ -67,7 +67,7 @@ def state(hub: Hub) -> answers.State:
     snapshot, holder, stopped = arm.snapshot, hub.lease.holder, hub.stopped
     return msgspec.structs.replace(
         once(snapshot, "state", lambda: _state(arm, snapshot)),
-        told=hub.clock(),
+        sent=hub.clock(),
         moving=snapshot.state.moving or arm.busy,
         holder=None if holder is None else holder.name,
         stopped=None if stopped is None else stopped.why,
@@ -79,13 +79,13 @@ def state(hub: Hub) -> answers.State:
     )
 
 
-def _state(arm: Arm, snapshot: Snapshot) -> answers.State:
+def _state(arm: ArmInterface, snapshot: Snapshot) -> answers.State:
     """What follows from ``snapshot`` alone; the rest is filled in for each answer."""
     now = snapshot.state
     tool = None if arm.robot.arm is None else _Tool.of(arm.robot.arm, now)
     return answers.State(
         t=now.t,
-        told=now.t,
+        sent=now.t,
         ticket=snapshot.ticket,
         q=now.q.tolist(),
         setpoint=now.setpoint.tolist(),
@@ -100,10 +100,10 @@ def _state(arm: Arm, snapshot: Snapshot) -> answers.State:
         tool_speed=None if tool is None else tool.speed,
         margins=None if tool is None else margins(arm.margins),
         holding=None if arm.holding is None else arm.holding.tolist(),
-        touching=list(touching(arm.surroundings.hand, now)),
+        touching=list(touching(arm.environment.hand, now)),
         held=None if now.held is None else now.held.name,
         branch=None if tool is None else (now.branch.shoulder, now.branch.elbow),
-        reading=None if tool is None else now.reading.value,
+        priority=None if tool is None else now.priority.value,
         status=now.status.value,
         moving=now.moving,
         why=sentence(now),
@@ -158,7 +158,7 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
         basin_ml=water.basin / MILLILITRE,
         air_ml=water.air / MILLILITRE,
         spilled_ml=water.spilled / MILLILITRE,
-        margin_to_rim=pouring.margin_to_rim(now.poured, now.things),
+        margin_to_rim=pouring.margin_to_rim(now.poured, now.objects),
     )
 
 
@@ -210,16 +210,16 @@ class _Jointed(NamedTuple):
         )
 
 
-def ledger(lines: Sequence[Line]) -> answers.Ledger:
+def event_log(lines: Sequence[LogLine]) -> answers.EventLog:
     """What held the arm back of late."""
-    return answers.Ledger(lines=[line(each) for each in lines])
+    return answers.EventLog(lines=[line(each) for each in lines])
 
 
-def line(line: Line) -> answers.Line:
+def line(line: LogLine) -> answers.LogLine:
     """One of the journal's."""
     actor = line.entry.actor
     grounds = None if actor is None or actor.grounds is None else actor.grounds.value
-    return answers.Line(
+    return answers.LogLine(
         when=line.when.isoformat(timespec="milliseconds"),
         who=line.who,
         command=line.entry.command,
@@ -229,44 +229,46 @@ def line(line: Line) -> answers.Line:
     )
 
 
-def choice(choice: Choice) -> answers.Choice:
+def branch_option(choice: BranchOption) -> answers.BranchOption:
     """One that a person could take."""
-    badge, contact = choice.badge, choice.contact
-    return answers.Choice(
-        shoulder=badge.branch.shoulder,
-        elbow=badge.branch.elbow,
-        q=badge.q.tolist(),
-        within_limits=badge.within_limits,
-        position_error=badge.position_error,
-        rotation_error=badge.rotation_error,
-        distance=badge.distance,
-        time=badge.time,
-        smallest_singular_value=badge.smallest_singular_value,
+    metrics, contact = choice.metrics, choice.contact
+    return answers.BranchOption(
+        shoulder=metrics.branch.shoulder,
+        elbow=metrics.branch.elbow,
+        q=metrics.q.tolist(),
+        within_limits=metrics.within_limits,
+        position_error=metrics.position_error,
+        rotation_error=metrics.rotation_error,
+        distance=metrics.distance,
+        time=metrics.time,
+        smallest_singular_value=metrics.smallest_singular_value,
         contact=None if contact is None else contact.parts,
     )
 
 
-def things(arm: Arm) -> answers.Things:
+def objects(arm: ArmInterface) -> answers.Objects:
     """What stands around or is held."""
     now = arm.state
     x = now.x
-    return answers.Things(
-        things=[
-            answers.Thing(
+    return answers.Objects(
+        objects=[
+            answers.SceneObject(
                 name=each.name,
-                form=each.form.value,
+                shape=each.shape.value,
                 size=list(each.size),
-                T=arm.surroundings.pose(each, x).tolist(),
+                T=arm.environment.pose(each, x).tolist(),
                 can_be_held=each.can_be_held,
                 held=each.held,
                 mesh=None if each.solid is None else each.solid.key,
                 scale=each.scale,
-                colour=None if each.look.colour is None else hexadecimal(each.look.colour),
-                opacity=each.look.opacity,
-                hidden=each.look.hidden,
+                colour=None
+                if each.appearance.colour is None
+                else hexadecimal(each.appearance.colour),
+                opacity=each.appearance.opacity,
+                hidden=each.appearance.hidden,
                 fixed=each.fixed,
             )
-            for each in now.things
+            for each in now.objects
         ]
     )
 
@@ -277,13 +279,13 @@ def hexadecimal(colour: Colour) -> str:
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
-def loop(lateness: LoopTiming) -> answers.Loop:
+def loop(loop_timing: LoopTiming) -> answers.Loop:
     """How well the loop keeps its period."""
     return answers.Loop(
-        period=lateness.period,
-        ticks=lateness.count,
-        late_p50=lateness.p50,
-        late_p99=lateness.p99,
-        late_most=lateness.most,
-        lost=lateness.lost,
+        period=loop_timing.period,
+        ticks=loop_timing.count,
+        late_p50=loop_timing.p50,
+        late_p99=loop_timing.p99,
+        late_max=loop_timing.maximum,
+        lost=loop_timing.lost,
     )

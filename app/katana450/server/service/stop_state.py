@@ -13,7 +13,7 @@ REMEMBERED = 256
 
 
 @dataclass(frozen=True)
-class Stopped:
+class StopRecord:
     """Why nothing moves.
 
     Attributes:

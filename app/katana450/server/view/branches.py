@@ -13,9 +13,9 @@ from html import escape
 
 import viser
 
-from katana450.arm.control.choices import Choice
+from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.commands import TakeBranch
-from katana450.arm.control.messages import BRANCH_HEADINGS, badge
+from katana450.arm.control.messages import BRANCH_HEADINGS, branch_cells
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.maths.kinematics.branch import BRANCHES, Branch
@@ -34,7 +34,7 @@ INTERVAL = 1.0
 """[s] Between two looks at the branches while the arm moves and none is shown: a look costs more
 than several pictures."""
 
-Find = Callable[[State], tuple[Choice, ...]]
+Find = Callable[[State], tuple[BranchOption, ...]]
 """The choice on each of BRANCHES."""
 
 
@@ -99,11 +99,11 @@ class BranchList:
             # Made when first wanted: three more arms are half of what a page loads.
             self._ghosts = [self._ghost(number) for number in range(len(BRANCHES))]
         for ghost, choice in zip(self._ghosts, found, strict=False):
-            branch = choice.badge.branch
+            branch = choice.metrics.branch
             visible = wanted in (OTHERS, str(branch)) and branch != state.branch
             ghost.root.visible = visible
             if visible:
-                ghost.move(self._robot.joint_values(choice.badge.q, state.gripper))
+                ghost.move(self._robot.joint_values(choice.metrics.q, state.gripper))
 
     def _ghost(self, number: int) -> GhostNodes:
         branch = BRANCHES[number]
@@ -114,14 +114,14 @@ class BranchList:
         return ghost
 
 
-def _rows(found: tuple[Choice, ...], now: Branch) -> str:
+def _rows(found: tuple[BranchOption, ...], now: Branch) -> str:
     """A row a branch, that of ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
     rows = "".join(
-        f"<tr data-branch='{choice.badge.branch}'"
-        f"{' aria-current=true' if choice.badge.branch == now else ''}>"
-        f"<th><i style='background:rgb{colour}'></i>{choice.badge.branch}</th>"
-        + "".join(f"<td>{escape(said)}</td>" for said in badge(choice))
+        f"<tr data-branch='{choice.metrics.branch}'"
+        f"{' aria-current=true' if choice.metrics.branch == now else ''}>"
+        f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
+        + "".join(f"<td>{escape(said)}</td>" for said in branch_cells(choice))
         + "</tr>"
         for choice, colour in zip(found, COLOURS, strict=True)
     )

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from katana450.arm.robot.conduit import Stretch
+from katana450.arm.robot.conduit import ConduitStretch
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -38,7 +38,7 @@ ANGLE_WORTH_SENDING = 2e-3
 class _Hung:
     """A stretch as it is drawn: the poses of its rings for a row of angles, and the one shown."""
 
-    def __init__(self, server: viser.ViserServer, stretch: Stretch, path: str) -> None:
+    def __init__(self, server: viser.ViserServer, stretch: ConduitStretch, path: str) -> None:
         """``path``: of its node in the scene."""
         self.stretch = stretch
         self._poses = poses(stretch, round(stretch.length / PITCH))
@@ -63,8 +63,8 @@ class _Hung:
 
     def _at(self, angle: float) -> Floats:
         """(count, 7) the rings' poses in between those worked out."""
-        low, share = self.stretch.between(angle)
-        rings: Floats = self._poses[low] + np.float32(share) * self._steps[low]
+        low, fraction = self.stretch.between(angle)
+        rings: Floats = self._poses[low] + np.float32(fraction) * self._steps[low]
         return rings
 
 
@@ -83,7 +83,7 @@ class Conduits:
             hung.bend(angles[hung.stretch.hinge.joint])
 
 
-def poses(stretch: Stretch, count: int) -> Floats:
+def poses(stretch: ConduitStretch, count: int) -> Floats:
     """(A, count, 7) wxyz and position [m] of the rings for each of its angles.
 
     From angle to angle every ring turns the shortest way, so that a pose in between is to be had

@@ -14,13 +14,13 @@ from katana450.maths.kinematics.velocity import velocity_ellipsoid
 SCALE = 0.2
 """[rad] Drawn is how far the tool point gets while the joints turn by this much together."""
 
-THINNEST = 1e-3
+MIN_RADIUS = 1e-3
 """[m] Flat in a singularity, but still to be seen."""
 
 COLOUR = (124, 77, 219)
 
 
-class Ellipsoid:
+class EllipsoidNode:
     """Hidden until a person asks for it."""
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
@@ -50,5 +50,5 @@ class Ellipsoid:
         T_base_tool = T_base_shoulder @ forward(chain, state.q)
         self._node.position = T_base_tool[:3, 3]
         self._node.wxyz = so3.to_quaternion(T_base_shoulder[:3, :3] @ ellipsoid.axes)
-        x, y, z = np.maximum(SCALE * ellipsoid.radii, THINNEST).tolist()
+        x, y, z = np.maximum(SCALE * ellipsoid.radii, MIN_RADIUS).tolist()
         self._node.scale = (x, y, z)

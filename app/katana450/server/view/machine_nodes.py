@@ -9,7 +9,7 @@ import viser
 
 from katana450.arm.robot.link import Joint
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Shape
+from katana450.arm.robot.surfaces import VisualMesh
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.scene import add_shape
@@ -44,7 +44,7 @@ class MachineNodes:
                 for each, shape in enumerate(link.shapes)
             ]
 
-    def surfaces(self, link: str) -> Sequence[Shape]:
+    def surfaces(self, link: str) -> Sequence[VisualMesh]:
         """What its shapes are."""
         return self._surfaces[link]
 

@@ -8,8 +8,8 @@ from html import escape
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.event_log import Entry
-from katana450.arm.control.joints import Joints
+from katana450.arm.control.event_log import LogEntry
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.messages import headline, mood, sentence, signed
 from katana450.arm.control.state import State
 from katana450.server.view.controls import (
@@ -20,10 +20,10 @@ from katana450.server.view.controls import (
     listener,
     set_slider,
 )
-from katana450.server.view.follower import READOUT_INTERVAL
-from katana450.server.view.ledger import LedgerList
-from katana450.server.view.looks import add_themes
+from katana450.server.view.display_options import add_themes
+from katana450.server.view.event_list import LedgerList
 from katana450.server.view.readout import style
+from katana450.server.view.view_updater import READOUT_INTERVAL
 
 GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
 
@@ -37,7 +37,7 @@ class MachinePanel:
     def __init__(
         self,
         gui: viser.GuiApi,
-        joints: Joints,
+        joints: JointSet,
         gestures: GestureGate,
         state: State,
     ) -> None:
@@ -65,7 +65,7 @@ class MachinePanel:
             self._why = LedgerList(gui)
 
     def follow(
-        self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool
+        self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
     ) -> None:
         """Show ``state`` at time ``now`` [s]; see ``Panel.follow``."""
         if now - self._told_at < READOUT_INTERVAL:
@@ -78,7 +78,7 @@ class MachinePanel:
         told = page(self._joints, state)
         if told != self._told:
             self._told = self._readout.content = told
-        self._why.follow(ledger)
+        self._why.follow(event_log)
 
     def _slider(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
         joints = self._joints
@@ -101,12 +101,12 @@ class MachinePanel:
         return slider
 
 
-def shown(joints: Joints, axis: int, value: float) -> float:
+def shown(joints: JointSet, axis: int, value: float) -> float:
     """A joint's value as people read it: [rad] in degrees, [m] in mm."""
     return 1e3 * value if joints.slides[axis] else math.degrees(value)
 
 
-def page(joints: Joints, state: State) -> str:
+def page(joints: JointSet, state: State) -> str:
     """The read-out for ``state``, as HTML."""
     rows = "".join(
         f"<tr><th>{axis + 1}. {escape(name)}</th>"

@@ -8,34 +8,34 @@ from collections.abc import Callable
 import viser
 
 from katana450.arm.control.messages import title
-from katana450.arm.robot.camera import camera
+from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.follower import Follower
 from katana450.server.view.machine_nodes import MachineNodes
 from katana450.server.view.machine_panel import MachinePanel
 from katana450.server.view.paint import PaintNodes
-from katana450.server.view.room import furnish
+from katana450.server.view.room import set_up_room
+from katana450.server.view.view_updater import ViewUpdater
 
 
-class MachineView(Follower):
+class MachineView(ViewUpdater):
     """Its links, and a panel of its joints. There is nothing to be dragged."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         robot: Robot,
-        board: StatePublisher,
+        state_publisher: StatePublisher,
         gestures: GestureGate,
         last_ticket: Callable[[], int],
         frame_rate: float,
     ) -> None:
         """``last_ticket``: of the newest command. ``frame_rate``: most updates a second [Hz]."""
-        super().__init__(server, board, frame_rate)
+        super().__init__(server, state_publisher, frame_rate)
         self._robot = robot
         self._last_ticket = last_ticket
-        furnish(server)
+        set_up_room(server)
         server.gui.set_panel_label(title(robot.name))
         look = camera(robot)
         server.initial_camera.position = look.eye
@@ -43,8 +43,8 @@ class MachineView(Follower):
         self._nodes = MachineNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
         joints = robot.joint_group
-        self._panel = MachinePanel(server.gui, joints, gestures, board.snapshot.state)
-        self.show(board.snapshot)
+        self._panel = MachinePanel(server.gui, joints, gestures, state_publisher.snapshot.state)
+        self.show(state_publisher.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
         state = snapshot.state
@@ -54,7 +54,7 @@ class MachineView(Follower):
             self._panel.follow(
                 state,
                 time.perf_counter(),
-                self._board.ledger,
+                self._state_publisher.event_log,
                 caught_up=snapshot.ticket == self._last_ticket(),
             )
         self._server.flush()

@@ -9,11 +9,11 @@ import numpy as np
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.event_log import Entry
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import (
     AXIS_NAMES,
-    READING_HINTS,
-    READINGS,
+    PRIORITIES,
+    PRIORITY_HINTS,
     UNCHECKED,
     degrees,
     millimetres,
@@ -23,7 +23,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.reading import Reading
+from katana450.maths.kinematics.priority import Priority
 from katana450.server.view import readout
 from katana450.server.view.branches import BranchList, Find
 from katana450.server.view.controls import (
@@ -34,11 +34,11 @@ from katana450.server.view.controls import (
     set_slider,
     set_value,
 )
-from katana450.server.view.follower import READOUT_INTERVAL
-from katana450.server.view.ledger import LedgerList
-from katana450.server.view.looks import Shows, add_shows, add_views
+from katana450.server.view.display_options import DisplayOptions, add_shows, add_views
+from katana450.server.view.event_list import LedgerList
+from katana450.server.view.view_updater import READOUT_INTERVAL
 
-FARTHEST = 1000.0
+MAX_TYPED_POSITION = 1000.0
 """[mm] Beyond any tool point of the arm: what a typed position may hold."""
 
 
@@ -58,7 +58,7 @@ class Panel:
         robot: Robot,
         gestures: GestureGate,
         find: Find,
-        shows: Shows,
+        shows: DisplayOptions,
         state: State,
     ) -> None:
         """``state``: what the panel shows first."""
@@ -94,9 +94,9 @@ class Panel:
         self._gui.add_html(readout.style())
 
     def follow(
-        self, state: State, now: float, ledger: tuple[Entry, ...], *, caught_up: bool
+        self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
     ) -> None:
-        """Show ``state`` at time ``now`` [s], and ``ledger``, what held the arm back so far.
+        """Show ``state`` at time ``now`` [s], and ``event_log``, what held the arm back so far.
 
         ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
         that an older state never takes a slider out of the hand that moves it.
@@ -110,7 +110,7 @@ class Panel:
         if page != self._told:
             self._told = self._readout.content = page
         self._branches.follow(state, now)
-        self._why.follow(ledger)
+        self._why.follow(event_log)
 
     def _set_controls(self, state: State) -> None:
         for slider, angle in zip(self._sliders, state.goal, strict=True):
@@ -119,8 +119,8 @@ class Panel:
             set_slider(self._gripper, self._opening(state.gripper_goal))
         set_slider(self._speed, 100.0 * state.speed)
         set_value(self._tool, state.tool)
-        set_value(self._reading, READINGS[state.reading])
-        meaning = _meaning(state.reading)
+        set_value(self._priority, PRIORITIES[state.priority])
+        meaning = _meaning(state.priority)
         if meaning != self._meaning.content:
             self._meaning.content = meaning
 
@@ -166,19 +166,19 @@ class Panel:
             hint="The frame that the gizmo, the numbers and the read-out are of",
         )
         self._on_person(self._tool, lambda: cmd.SetTool(self._tool.value))
-        self._reading = self._gui.add_dropdown(
-            "Reading",
-            tuple(READINGS.values()),
-            initial_value=READINGS[state.reading],
+        self._priority = self._gui.add_dropdown(
+            "Priority",
+            tuple(PRIORITIES.values()),
+            initial_value=PRIORITIES[state.priority],
             hint="What counts when five axes cannot do it all",
         )
-        self._meaning = self._gui.add_html(_meaning(state.reading))
-        self._on_person(self._reading, lambda: cmd.SetReading(_reading(self._reading.value)))
+        self._meaning = self._gui.add_html(_meaning(state.priority))
+        self._on_person(self._priority, lambda: cmd.SetPriority(_priority(self._priority.value)))
         position = self._gui.add_vector3(
             "x, y, z",
             np.round(1e3 * T[:3, 3]) + 0.0,
-            min=(-FARTHEST, -FARTHEST, -FARTHEST),
-            max=(FARTHEST, FARTHEST, FARTHEST),
+            min=(-MAX_TYPED_POSITION, -MAX_TYPED_POSITION, -MAX_TYPED_POSITION),
+            max=(MAX_TYPED_POSITION, MAX_TYPED_POSITION, MAX_TYPED_POSITION),
             step=1.0,
             hint="Tool position in mm, in the frame {S} at the shoulder",
         )
@@ -213,9 +213,9 @@ def typed_pose(
     return se3.from_rotation_translation(R, 1e-3 * np.array(position))
 
 
-def _meaning(reading: Reading) -> str:
-    return f"<div class='k450'><p class='hint'>{escape(READING_HINTS[reading])}</p></div>"
+def _meaning(priority: Priority) -> str:
+    return f"<div class='k450'><p class='hint'>{escape(PRIORITY_HINTS[priority])}</p></div>"
 
 
-def _reading(name: str) -> Reading:
-    return next(reading for reading, text in READINGS.items() if text == name)
+def _priority(name: str) -> Priority:
+    return next(priority for priority, text in PRIORITIES.items() if text == name)

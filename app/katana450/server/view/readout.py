@@ -10,8 +10,8 @@ from katana450.arm.control.messages import (
     condition,
     degrees,
     headline,
+    limit_text,
     mood,
-    room,
     sentence,
     signed,
 )
@@ -55,7 +55,7 @@ def _at_once(chain: Chain, q: FloatArray) -> str:
         ("singular", "smallest singular value", f"{values[-1]:.3f}"),
         ("manipulability", "manipulability", f"{math.prod(values):.3f}"),
         ("condition", "condition", condition(values)),
-        ("limit", "nearest limit", room(nearest, float(distances[nearest]))),
+        ("limit", "nearest limit", limit_text(nearest, float(distances[nearest]))),
     )
     every = "".join(
         f"<td{' class=nearest' if number == nearest else ''}>{degrees(angle, 0)}</td>"

@@ -10,7 +10,7 @@ FLOOR_AT = -0.0255
 """[m] The table lies on the floor, a hair above it so that nothing flickers."""
 
 
-def furnish(server: viser.ViserServer) -> None:
+def set_up_room(server: viser.ViserServer) -> None:
     """Light the scene and give it the light theme; a dark window's page changes it to its own."""
     scene = server.scene
     scene.configure_default_lights(enabled=False)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import viser
 
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Shape
+from katana450.arm.robot.surfaces import VisualMesh
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -120,7 +120,7 @@ class ArmNodes(FrameTree):
         """Of each link, as they are made."""
         self._links = {link.name: link for link in robot.links}
 
-    def surfaces(self, link: str) -> Sequence[Shape]:
+    def surfaces(self, link: str) -> Sequence[VisualMesh]:
         """Return the surfaces of a link, one per material."""
         return self._links[link].shapes
 
@@ -200,13 +200,13 @@ class Gap:
             "/target/gap", np.zeros((1, 2, 3)), self.COLOUR, thickness=0.004, visible=False
         )
 
-    def show(self, wished: FloatArray | None, goal: FloatArray) -> None:
+    def show(self, desired: FloatArray | None, goal: FloatArray) -> None:
         """Draw it between two points (3,) [m] in the base frame; hide it where there is no gap."""
-        visible = wished is not None and bool(np.abs(wished - goal).max() > GAP_WORTH_SEEING)
+        visible = desired is not None and bool(np.abs(desired - goal).max() > GAP_WORTH_SEEING)
         if visible != self._line.visible:
             self._line.visible = visible
         if visible:
-            ends = np.array([[wished, goal]], dtype=np.float32)
+            ends = np.array([[desired, goal]], dtype=np.float32)
             if not np.array_equal(ends, self._line.points):
                 self._line.points = ends
 
@@ -229,8 +229,8 @@ def coarse(
     """
     _, into = np.unique(np.round(vertices / cell), axis=0, return_inverse=True)
     into = into.ravel()
-    share = np.bincount(into)
-    merged = np.stack([np.bincount(into, weights=x) / share for x in vertices.T], axis=1)
+    fraction = np.bincount(into)
+    merged = np.stack([np.bincount(into, weights=x) / fraction for x in vertices.T], axis=1)
     left = into[faces]
     left = left[(left != np.roll(left, 1, axis=1)).all(axis=1)]
     _, first = np.unique(np.sort(left, axis=1), axis=0, return_index=True)
@@ -238,7 +238,7 @@ def coarse(
 
 
 def add_shape(
-    server: viser.ViserServer, name: str, shape: Shape, colour: tuple[float, float, float]
+    server: viser.ViserServer, name: str, shape: VisualMesh, colour: tuple[float, float, float]
 ) -> viser.MeshHandle:
     """A shape in one colour, sRGB 0..1."""
     faces = shape.faces.astype(np.uint32)

@@ -1,4 +1,4 @@
-"""All of a state that can be seen and is no control: arm, conduit, table, things, water."""
+"""All of a state that can be seen and is no control: arm, conduit, table, objects, water."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.server.view.conduit import Conduits
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.room import furnish
+from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
-from katana450.server.view.things import ThingNodes
+from katana450.server.view.scene_objects import ThingNodes
 from katana450.server.view.water import WaterNodes
 from katana450.server.view.workcell import Workcell
 
@@ -31,26 +31,26 @@ class Scenery:
         gestures: GestureGate,
         meshes: Meshes,
     ) -> None:
-        """``session``: knows where things are. ``gestures``: takes those with their handles.
-        ``meshes``: those that things are of."""
+        """``session``: knows where objects are. ``gestures``: takes those with their handles.
+        ``meshes``: those that objects are of."""
         self._server = server
         self._robot = robot
         self._session = session
-        furnish(server)
+        set_up_room(server)
         Workcell(server, props)
-        self.things = ThingNodes(server, props, session.surroundings, gestures, meshes)
+        self.objects = ThingNodes(server, props, session.environment, gestures, meshes)
         self.arm = ArmNodes(server, robot)
         self._conduits = Conduits(server, robot.require_arm(), self.arm)
         # Made when there is water.
         self._water: WaterNodes | None = None
-        self._around: WaterEnvironment | None = None
+        self._water_environment: WaterEnvironment | None = None
 
     def show(self, state: State) -> None:
         """Everything as ``state`` has it."""
         angles = self._robot.joint_values(state.q, state.gripper)
         self.arm.move(angles)
         self._conduits.move(angles)
-        self.things.follow(state)
+        self.objects.follow(state)
         self._show_water(state)
 
     def _show_water(self, state: State) -> None:
@@ -59,10 +59,10 @@ class Scenery:
             if self._water is not None:
                 self._water.hide()
             return
-        around = pouring.around(state.things)
+        water_environment = pouring.water_environment(state.objects)
         if self._water is None:
-            self._water = WaterNodes(self._server, around)
-        elif around is not self._around:
-            self._water.stand(around)
-        self._around = around
+            self._water = WaterNodes(self._server, water_environment)
+        elif water_environment is not self._water_environment:
+            self._water.stand(water_environment)
+        self._water_environment = water_environment
         self._water.show(state.poured.water)

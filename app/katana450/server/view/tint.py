@@ -1,4 +1,4 @@
-"""The parts that are about to touch, links and things alike, coated in a warning colour."""
+"""The parts that are about to touch, links and objects alike, coated in a warning colour."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from katana450.server.view.scene import surface
 
 
 class Tint:
-    """Coats links in the shapes that stand for them where contacts are looked for, things in their
+    """Coats links in the shapes that stand for them where contacts are looked for, objects in their
     own."""
 
     COLOUR = (224, 49, 49)
@@ -29,7 +29,7 @@ class Tint:
         path: Mapping[str, str],
         props: Props,
     ) -> None:
-        """``path``: the scene node of each link; a thing's is its name."""
+        """``path``: the scene node of each link; an object's is its name."""
         self._server = server
         self._shapes = {link.name: (path[link.name], link.collisions) for link in robot.links} | {
             name: (f"/{name}", (Visual(frozen(np.eye(4)), frozen(np.ones(3)), mesh),))

@@ -18,19 +18,19 @@ from katana450.maths.planning.tool_path import ToolPath
 DESIRED = (90, 100, 115)
 """Of the path that is to be followed."""
 
-GOOD, BAD = np.array((22.0, 163.0, 74.0)), np.array((220.0, 38.0, 38.0))
+GOOD_COLOUR, BAD_COLOUR = np.array((22.0, 163.0, 74.0)), np.array((220.0, 38.0, 38.0))
 """Of what was followed: without error, and with WORST or more."""
 
-WORST = 1e-3
+WORST_ERROR = 1e-3
 """[m]"""
 
-PLACES = 240
+PATH_SAMPLES = 240
 """Pieces that a path is drawn with."""
 
-EVERY = 0.1
+SEND_INTERVAL = 0.1
 """[s] Between two messages: what was followed is appended in batches."""
 
-MOST = 4000
+MAX_PIECES = 4000
 """Pieces of a trace; then the oldest half is forgotten."""
 
 Colours = npt.NDArray[np.uint8]
@@ -70,12 +70,12 @@ class Traces:
             return
         point = forward(path.chain, state.q)[:3, 3]
         sigma = following.segment.scaling.pace(following.local).sigma
-        wished = np.array([each.c0 for each in path.curve.at(Jet.variable(sigma))[:3]])
+        desired = np.array([each.c0 for each in path.curve.at(Jet.variable(sigma))[:3]])
         seen = self._seen(point)
         if not self._points or float(np.abs(seen - self._points[-1]).max()) > 0.0:
             self._points.append(seen)
-            self._errors.append(float(np.linalg.norm(point - wished)))
-        if state.t - self._told_at >= EVERY or not state.moving:
+            self._errors.append(float(np.linalg.norm(point - desired)))
+        if state.t - self._told_at >= SEND_INTERVAL or not state.moving:
             self._told_at = state.t
             self._show()
 
@@ -92,7 +92,7 @@ class Traces:
 
     def _way(self, segment: Segment) -> FloatArray:
         """(PLACES, 2, 3) in the base frame [m]."""
-        points = point_derivatives(segment.path, np.linspace(0.0, 1.0, PLACES + 1))[0]
+        points = point_derivatives(segment.path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
         seen = points @ self._T_base_shoulder[:3, :3].T + self._T_base_shoulder[:3, 3]
         return np.stack((seen[:-1], seen[1:]), axis=1)
 
@@ -104,9 +104,9 @@ class Traces:
     def _show(self) -> None:
         if len(self._points) < 2 or len(self._points) == self._shown:
             return
-        if len(self._points) > MOST:
-            self._points = self._points[MOST // 2 :]
-            self._errors = self._errors[MOST // 2 :]
+        if len(self._points) > MAX_PIECES:
+            self._points = self._points[MAX_PIECES // 2 :]
+            self._errors = self._errors[MAX_PIECES // 2 :]
         self._shown = len(self._points)
         points = np.array(self._points, dtype=np.float32)
         colours = coloured(np.array(self._errors))
@@ -117,5 +117,5 @@ class Traces:
 
 def coloured(errors: FloatArray) -> Colours:
     """(N, 3) from green without error to red at WORST and beyond, for `errors` (N,) [m]."""
-    share = np.clip(errors / WORST, 0.0, 1.0)[:, None]
-    return np.asarray(np.rint(GOOD + share * (BAD - GOOD)), dtype=np.uint8)
+    fraction = np.clip(errors / WORST_ERROR, 0.0, 1.0)[:, None]
+    return np.asarray(np.rint(GOOD_COLOUR + fraction * (BAD_COLOUR - GOOD_COLOUR)), dtype=np.uint8)

@@ -20,12 +20,11 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.ellipsoid import Ellipsoid
-from katana450.server.view.follower import Follower
+from katana450.server.view.display_options import DisplayOptions
+from katana450.server.view.ellipsoid import EllipsoidNode
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.looks import Shows
-from katana450.server.view.objects import ObjectsPanel
+from katana450.server.view.objects_panel import ObjectsPanel
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
 from katana450.server.view.panel_folder import PanelFolder
@@ -33,12 +32,13 @@ from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.tint import Tint
 from katana450.server.view.traces import Traces
+from katana450.server.view.view_updater import ViewUpdater
 from katana450.server.viser_bridge.presets import Preset
 
 GHOST_COLOURS: dict[Status, Colour] = {
     Status.OK: (64, 156, 255),
     Status.LIMITED: (255, 153, 0),
-    Status.HELD: (234, 88, 12),
+    Status.GAP: (234, 88, 12),
     Status.BLOCKED: (255, 153, 0),
     Status.PAUSED: (120, 130, 145),
     Status.STOPPED: (230, 45, 45),
@@ -55,62 +55,65 @@ GHOST_FROM = np.deg2rad(0.2)
 class ViewOptions:
     """What is shown besides the arm.
 
-    layers: what extensions show. meshes: those that things are of.
+    layers: what extensions show. meshes: those that objects are of.
     """
 
     layers: tuple[ViewLayer, ...] = ()
     meshes: Meshes = field(default_factory=Meshes)
 
 
-class View(Follower):
+class View(ViewUpdater):
     """Shows each new snapshot to every browser; submits what people do."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         robot: Robot,
-        board: StatePublisher,
+        state_publisher: StatePublisher,
         gestures: GestureGate,
         last_ticket: Callable[[], int],
         session: Session,
         frame_rate: float,
-        besides: ViewOptions | None = None,
+        view_options: ViewOptions | None = None,
     ) -> None:
-        """``last_ticket``: of the newest command. ``session``: knows the branches, and where things
-        are. ``frame_rate``: most updates a second [Hz].
+        """``last_ticket``: of the newest command. ``session``: knows the branches, and where
+        objects are. ``frame_rate``: most updates a second [Hz].
 
         Raises KatanaError where a layer cannot be shown.
         """
-        super().__init__(server, board, frame_rate)
-        besides = ViewOptions() if besides is None else besides
+        super().__init__(server, state_publisher, frame_rate)
+        view_options = ViewOptions() if view_options is None else view_options
         server.gui.set_panel_label(title(robot.name))
         self._robot, self._arm = robot, robot.require_arm()
         self._last_ticket = last_ticket
         props = load_props()
-        self._scenery = Scenery(server, robot, session, props, gestures, besides.meshes)
-        state = board.snapshot.state
+        self._scenery = Scenery(server, robot, session, props, gestures, view_options.meshes)
+        state = state_publisher.snapshot.state
         self._paint = PaintNodes(server, self._scenery.arm)
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
         self._ghost = GhostNodes(server, robot, "/ghost", GHOST_COLOURS[Status.OK], GHOST_OPACITY)
         self._gap = Gap(server)
         self._traces = Traces(server, self._arm)
-        self._gizmo = Gizmo(server, self._arm, gestures, lambda: board.snapshot.state)
-        self._ellipsoid = Ellipsoid(server, self._arm)
-        for layer in besides.layers:
+        self._gizmo = Gizmo(server, self._arm, gestures, lambda: state_publisher.snapshot.state)
+        self._ellipsoid = EllipsoidNode(server, self._arm)
+        for layer in view_options.layers:
             layer.attach(server, robot)
         self._cameras = Cameras(server, self._arm)
-        shows = Shows(
-            self._show_ellipsoid, self._scenery.things.show_handles, self._look_from, besides.layers
+        shows = DisplayOptions(
+            self._show_ellipsoid,
+            self._scenery.objects.show_handles,
+            self._look_from,
+            view_options.layers,
         )
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
         self._panel = Panel(server, robot, gestures, session.choices, shows, state)
         self._objects = ObjectsPanel(
-            server, gestures, lambda: board.snapshot.state, session.surroundings
+            server, gestures, lambda: state_publisher.snapshot.state, session.environment
         )
         self._folders: list[PanelFolder] = []
-        self.show(board.snapshot)
+        self.show(state_publisher.snapshot)
 
     def add(self, folder: PanelFolder) -> None:
         """Have ``folder`` show each state too; before ``start``."""
@@ -118,10 +121,10 @@ class View(Follower):
         folder.follow()
 
     def _show_ellipsoid(self, visible: bool) -> None:
-        self._ellipsoid.show(visible, self._board.snapshot.state)
+        self._ellipsoid.show(visible, self._state_publisher.snapshot.state)
 
     def _look_from(self, client: viser.ClientHandle, preset: Preset) -> None:
-        self._cameras.give(client, preset, self._board.snapshot.state)
+        self._cameras.give(client, preset, self._state_publisher.snapshot.state)
 
     def show(self, snapshot: Snapshot) -> None:
         """Send every browser what has changed."""
@@ -135,7 +138,9 @@ class View(Follower):
             self._traces.follow(state)
             self._cameras.follow(state)
             caught_up = snapshot.ticket == self._last_ticket()
-            self._panel.follow(state, time.perf_counter(), self._board.ledger, caught_up=caught_up)
+            self._panel.follow(
+                state, time.perf_counter(), self._state_publisher.event_log, caught_up=caught_up
+            )
             self._objects.follow(state, caught_up=caught_up)
             for folder in self._folders:
                 folder.follow()
@@ -154,9 +159,9 @@ class View(Follower):
             self._T_base_goal = self._arm.T_base_shoulder @ forward(chain, state.goal)
             self._gizmo.aim(state, self._T_base_goal)
         self._gizmo.follow()
-        self._gap.show(self._wished(state), self._T_base_goal[:3, 3])
+        self._gap.show(self._desired(state), self._T_base_goal[:3, 3])
 
-    def _wished(self, state: State) -> FloatArray | None:
+    def _desired(self, state: State) -> FloatArray | None:
         """The tool point that was wished, (3,) [m] in the base frame, if one was."""
         match state.target:
             case ToolTarget(position=position):

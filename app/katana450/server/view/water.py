@@ -13,7 +13,7 @@ from trimesh.visual.material import PBRMaterial
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Flow, Water
+from katana450.maths.water.flow import Water, WaterFlow
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
@@ -51,29 +51,29 @@ TWIST = 2.4
 class WaterNodes:
     """Sends what changed enough to be seen, and nothing of water at rest."""
 
-    def __init__(self, server: viser.ViserServer, around: WaterEnvironment) -> None:
+    def __init__(self, server: viser.ViserServer, water_environment: WaterEnvironment) -> None:
         self._server = server
-        self._around = around
-        self._flow = Flow(around)
+        self._water_environment = water_environment
+        self._flow = WaterFlow(water_environment)
         self._shown: Water | None = None
         self._body: FloatArray | None = None
         self._level = 0.0
-        inside = around.cup.inside
+        inside = water_environment.cup.inside
         self._root = server.scene.add_frame("/water", show_axes=False, visible=False)
         surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
         self._cup = self._add("cup", body(inside, surface), BODY_FACES, IN_VESSEL)
         corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
         self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
         self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
-        self.stand(around)
+        self.stand(water_environment)
         # Made when they are first needed: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
 
-    def stand(self, around: WaterEnvironment) -> None:
+    def stand(self, water_environment: WaterEnvironment) -> None:
         """From now on cup and basin are as ``around`` says."""
-        self._around, self._flow = around, Flow(around)
-        x, y, z = around.basin.at
-        self._basin.position = (x, y, z + around.basin.floor)
+        self._water_environment, self._flow = water_environment, WaterFlow(water_environment)
+        x, y, z = water_environment.basin.at
+        self._basin.position = (x, y, z + water_environment.basin.floor)
 
     def show(self, water: Water) -> None:
         """Draw ``water``."""
@@ -91,7 +91,7 @@ class WaterNodes:
         _reveal(self._root, False)
 
     def _show_cup(self, water: Water) -> None:
-        cup, T = self._around.cup, water.T_base_cup
+        cup, T = self._water_environment.cup, water.T_base_cup
         _reveal(self._cup, water.cup >= WORTH_SHOWING)
         if not self._cup.visible:
             return
@@ -105,13 +105,13 @@ class WaterNodes:
     def _show_stream(self, water: Water) -> None:
         _reveal(self._stream, bool(water.parcels))
         if water.parcels:
-            level = self._around.basin.level(water.basin * FEMTOLITRE)
-            end = landing(water.parcels[0], self._around, level).age
-            corners = stream(water.parcels, self._around.cup.inside.radius, end)
+            level = self._water_environment.basin.level(water.basin * FEMTOLITRE)
+            end = landing(water.parcels[0], self._water_environment, level).age
+            corners = stream(water.parcels, self._water_environment.cup.inside.radius, end)
             self._stream.vertices = corners.astype(np.float32)
 
     def _show_basin(self, water: Water) -> None:
-        basin = self._around.basin
+        basin = self._water_environment.basin
         _reveal(self._basin, water.basin >= WORTH_SHOWING)
         level = max(basin.level(water.basin * FEMTOLITRE), CLEAR)
         if self._basin.visible and abs(level - self._level) > WORTH_SENDING:

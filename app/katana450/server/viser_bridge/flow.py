@@ -17,14 +17,14 @@ OVERDUE = 0.3
 FORGET = 0.005
 """[s/s] What a line needs at its best may grow so fast."""
 
-LEAST, FIRST, MOST = 2_048, 8_192, 262_144
+MIN_IN_FLIGHT_BYTES, FIRST_IN_FLIGHT_BYTES, MAX_IN_FLIGHT_BYTES = 2_048, 8_192, 262_144
 """Bytes that may be on the way: at least, at first, at most. More while all is seen in time, half
 as many when not."""
 
-LONGEST_LINE = 1.0
+MAX_LINE_DELAY = 1.0
 """[s] What a line may need at its best and still be waited for."""
 
-LONGEST = 4096
+MAX_REMEMBERED_FRAMES = 4096
 """Frames that are kept in mind: a minute of them, for a browser that never says what it sees."""
 
 
@@ -33,13 +33,13 @@ class _Sent(NamedTuple):
     size: int
 
 
-class Flow:
+class FlowControl:
     """The frames on their way to one browser. Times are arguments, in seconds."""
 
     def __init__(self) -> None:
-        self._on_the_way: deque[_Sent] = deque(maxlen=LONGEST)
+        self._on_the_way: deque[_Sent] = deque(maxlen=MAX_REMEMBERED_FRAMES)
         self._bytes = 0
-        self._window = FIRST
+        self._window = FIRST_IN_FLIGHT_BYTES
         self._quickest: float | None = None
         self._told_at = 0.0
         self._sent = 0
@@ -70,14 +70,14 @@ class Flow:
             known = (
                 took if self._quickest is None else self._quickest + FORGET * (t - self._told_at)
             )
-            self._quickest = min(known, took, LONGEST_LINE)
+            self._quickest = min(known, took, MAX_LINE_DELAY)
             self._told_at = t
             if t - seen[0].t > self._quickest + OVERDUE:
-                self._window = max(self._window // 2, LEAST)
+                self._window = max(self._window // 2, MIN_IN_FLIGHT_BYTES)
             elif filled:
                 # A window that was never filled has not been tried: should the line grow thin, all
                 # of it would be on the way at once (RFC 7661, congestion window validation).
-                self._window = min(self._window + size // 2, MOST)
+                self._window = min(self._window + size // 2, MAX_IN_FLIGHT_BYTES)
         return True
 
     def age(self, t: float) -> float:

@@ -20,16 +20,16 @@ import msgspec
 import zstandard
 from viser.infra import _infra
 
-KEPT = 4
+MAX_KEPT_FRAMES = 4
 """Frames: browsers that keep up are sent the same within a turn of viser's loop."""
 
-FRESH = 0.03
+FRESH_SECONDS = 0.03
 """[s] A browser that comes later is sent what the messages say by then."""
 
 ALIGNED = 8
 """Bytes: arrays begin at multiples of it."""
 
-HATCH_HEADER = "X-Katana450-Hatch"
+FRAME_SLOT_HEADER = "X-Katana450-Hatch"
 """Header in which the gateway names the hatch of a browser's line."""
 
 
@@ -59,7 +59,7 @@ class FrameSlot:
         self._giver: asyncio.AbstractEventLoop | None = None
         self._came = asyncio.Event()
         self._wanted = asyncio.Event()
-        _hatches[self.name] = self
+        _slots[self.name] = self
 
     def refuse(self, why: str) -> None:
         """Say why a gesture was refused; in any thread."""
@@ -92,12 +92,12 @@ def _signal(loop: asyncio.AbstractEventLoop, event: asyncio.Event) -> None:
         loop.call_soon_threadsafe(event.set)
 
 
-_hatches: WeakValueDictionary[str, FrameSlot] = WeakValueDictionary()
+_slots: WeakValueDictionary[str, FrameSlot] = WeakValueDictionary()
 
 
 def slot_of(headers: Mapping[str, str]) -> FrameSlot | None:
     """Return the slot that a connection's ``headers`` name; None without one."""
-    return _hatches.get(headers.get(HATCH_HEADER, ""))
+    return _slots.get(headers.get(FRAME_SLOT_HEADER, ""))
 
 
 class _Packed(NamedTuple):
@@ -119,9 +119,9 @@ class Packer:
         now = time.perf_counter()
         key = tuple(map(id, window))
         known = self._packed.get(key)
-        if known is not None and now - known.at < FRESH:
+        if known is not None and now - known.at < FRESH_SECONDS:
             return known.frame
-        while len(self._packed) >= KEPT:
+        while len(self._packed) >= MAX_KEPT_FRAMES:
             del self._packed[next(iter(self._packed))]
         frame = self._pack(window, now)
         self._packed[key] = _Packed(now, frame, window)
@@ -150,11 +150,11 @@ class Packer:
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
     """Send a browser the windows of a buffer, as viser's own producer of this name does."""
     packer = buffer.__dict__.setdefault("packer", Packer())
-    hatch = slot_of(line.request.headers)
+    slot = slot_of(line.request.headers)
     send = line.send
-    if hatch is not None:
-        hatch.open()
-        send = hatch.give
+    if slot is not None:
+        slot.open()
+        send = slot.give
     windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
     try:
         async for window in windows:

@@ -22,7 +22,7 @@ WORKSPACE = 1.5
 QUATERNION_SLACK = 1e-3
 """How far the length of a browser's quaternion may be from 1."""
 
-LONGEST_TEXT = 200
+MAX_TEXT_LENGTH = 200
 """Characters of a text field."""
 
 
@@ -154,8 +154,8 @@ class Guard:
                     return "a vector has three numbers"
                 return _range(value, handle.min or [None] * 3, handle.max or [None] * 3)
             case viser.GuiTextHandle():
-                short = isinstance(value, str) and len(value) <= LONGEST_TEXT
-                return None if short else f"a text has at most {LONGEST_TEXT} characters"
+                short = isinstance(value, str) and len(value) <= MAX_TEXT_LENGTH
+                return None if short else f"a text has at most {MAX_TEXT_LENGTH} characters"
         return "that control cannot be changed"
 
 

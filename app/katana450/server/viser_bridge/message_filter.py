@@ -20,13 +20,13 @@ from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
-LARGEST = 16_384
+MAX_MESSAGE_BYTES = 16_384
 """Bytes of a message: a typed text of 200 characters is the longest there is."""
 
 RATE, BURST = 150.0, 300.0
 """Messages a second, and at once. viser's page sends each kind at most 20 times a second."""
 
-PATIENCE, FORGIVEN = 100.0, 1.0
+MAX_BAD_MESSAGES, FORGIVEN_PER_SECOND = 100.0, 1.0
 """Bad messages until their sender is closed, and how many a second are forgotten."""
 
 NO_MESSAGE = 25.0
@@ -35,7 +35,7 @@ NO_MESSAGE = 25.0
 SEEN = "Seen"
 """What our script says of frames on the screen, on the same line; not for viser."""
 
-TOLD = 20
+MAX_LOGGED_MESSAGES = 20
 """Bad messages of one browser that are logged one by one; a flood must not fill the log."""
 
 
@@ -61,7 +61,7 @@ class FilterResult:
     seen: int | None = None
 
 
-class Firewall:
+class MessageFilter:
     """In front of viser, for one connection."""
 
     def __init__(self, guard: Guard, who: str, t: float) -> None:
@@ -69,7 +69,7 @@ class Firewall:
         self._guard = guard
         self._who = who
         self._flood = TokenBucket(RATE, BURST, t)
-        self._patience = TokenBucket(FORGIVEN, PATIENCE, t)
+        self._patience = TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_MESSAGES, t)
         self.dropped: Counter[str] = Counter()
         """Bad messages by their type."""
 
@@ -77,7 +77,7 @@ class Firewall:
         """Of a message that came at ``t`` [s]; ``data`` is None for one of text."""
         if not self._flood.take(t):
             return self._drop("flood", "it comes too fast", t)
-        if data is None or len(data) > LARGEST:
+        if data is None or len(data) > MAX_MESSAGE_BYTES:
             return self._drop("none", "it is too long or no bytes", t, NO_MESSAGE)
         seen = _seen(data)
         if seen is not None:
@@ -95,9 +95,9 @@ class Firewall:
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
         self.dropped[kind] += 1
         told = self.dropped.total()
-        if told <= TOLD:
+        if told <= MAX_LOGGED_MESSAGES:
             log.warning("Dropped a %s of %s: %s.", kind, self._who, objection)
-        if told == TOLD:
+        if told == MAX_LOGGED_MESSAGES:
             log.warning("More of %s is dropped without a word.", self._who)
         patient = self._patience.take(t, weight)
         return FilterResult(Ruling.DROP if patient else Ruling.CLOSE)

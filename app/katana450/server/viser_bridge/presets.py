@@ -12,7 +12,7 @@ FOV = np.deg2rad(40.0)
 
 
 @dataclass(frozen=True)
-class Look:
+class CameraPose:
     """A camera at ``position``, turned to ``target``; both [m] in the base frame."""
 
     position: tuple[float, float, float]
@@ -29,11 +29,11 @@ class Preset(Enum):
     TOOL = "Tool"
 
 
-LOOKS = {
-    Preset.FREE: Look((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
-    Preset.FRONT: Look((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
-    Preset.SIDE: Look((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
+CAMERA_POSES = {
+    Preset.FREE: CameraPose((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
+    Preset.FRONT: CameraPose((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
+    Preset.SIDE: CameraPose((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
     # Not from straight above: a camera that looks along up has no up.
-    Preset.TOP: Look((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
+    Preset.TOP: CameraPose((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
 }
 """As near as all of the arm is in the picture, however it is posed; cup and basin in the first."""

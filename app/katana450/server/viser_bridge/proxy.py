@@ -14,14 +14,14 @@ from websockets.typing import Subprotocol
 
 from katana450.server.service.hub import Hub, key_of
 from katana450.server.service.identity import Identity
-from katana450.server.viser_bridge.flow import Flow
-from katana450.server.viser_bridge.frames import HATCH_HEADER, FrameSlot
+from katana450.server.viser_bridge.flow import FlowControl
+from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot
 from katana450.server.viser_bridge.guard import Guard
-from katana450.server.viser_bridge.message_filter import FilterResult, Firewall, Ruling
+from katana450.server.viser_bridge.message_filter import FilterResult, MessageFilter, Ruling
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
-from katana450.server.web.authenticator import NOT_YOU, Authenticator
+from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
+from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.control_socket import PAGE
-from katana450.server.web.places import Places
 
 log = logging.getLogger(__name__)
 
@@ -47,37 +47,39 @@ REFUSALS_EVERY = 0.5
 class Proxy:
     """Joins browsers to viser, each by a connection of its own."""
 
-    def __init__(self, hub: Hub, door: Authenticator, guard: Guard, port: int, key: str) -> None:
+    def __init__(
+        self, hub: Hub, authenticator: Authenticator, guard: Guard, port: int, key: str
+    ) -> None:
         """``port`` of viser on this machine, and the ``key`` to it."""
         self._hub = hub
-        self._door = door
+        self._authenticator = authenticator
         self._guard = guard
         self._port = port
         self._key = key
-        self._places = Places(BROWSERS, BROWSERS_EACH)
+        self._places = ConnectionLimit(BROWSERS, BROWSERS_EACH)
 
     async def serve(self, browser: WebSocket) -> None:
         """Answer a request for viser's socket."""
-        visitor = self._door.visitor(browser.cookies)
-        if visitor is None or SUBPROTOCOL not in browser.scope["subprotocols"]:
+        identity = self._authenticator.identity(browser.cookies)
+        if identity is None or SUBPROTOCOL not in browser.scope["subprotocols"]:
             await browser.close(1008)
             return
-        with self._places.taken(visitor.session) as free:
+        with self._places.taken(identity.session) as free:
             if free:
-                await self._serve(browser, visitor)
+                await self._serve(browser, identity)
             else:
                 await browser.close(1013)
 
-    async def _serve(self, browser: WebSocket, visitor: Identity) -> None:
+    async def _serve(self, browser: WebSocket, identity: Identity) -> None:
         page = browser.query_params.get("page", "")
         # Without our page around it viser can be looked at, and no more.
-        key = key_of(visitor, page) if PAGE.fullmatch(page) else ""
+        key = key_of(identity, page) if PAGE.fullmatch(page) else ""
         line = _Line(self._hub, self._guard, browser, key)
         try:
             async with connect(
                 f"ws://127.0.0.1:{self._port}",
                 subprotocols=[SUBPROTOCOL],
-                additional_headers={KEY_HEADER: self._key, HATCH_HEADER: line.slot.name},
+                additional_headers={KEY_HEADER: self._key, FRAME_SLOT_HEADER: line.slot.name},
                 user_agent_header=None,
                 compression=None,
                 max_size=None,
@@ -85,10 +87,10 @@ class Proxy:
                 ping_interval=None,
             ) as upstream:
                 await browser.accept(SUBPROTOCOL)
-                if not await self._door.while_welcome(
-                    lambda: self._door.visitor(browser.cookies), line.run(upstream)
+                if not await self._authenticator.while_welcome(
+                    lambda: self._authenticator.identity(browser.cookies), line.run(upstream)
                 ):
-                    await browser.close(NOT_YOU, "Your link is no good any more.")
+                    await browser.close(SIGN_IN_CLOSE_CODE, "Your link is no good any more.")
         except OSError as error:
             log.warning("viser does not answer: %s", str(error) or type(error).__name__)
             # Who has left meanwhile needs no farewell.
@@ -105,7 +107,7 @@ class _Line:
         self.slot = FrameSlot(key, self._refuse)
         self._browser = browser
         self._key = key
-        self._flow = Flow()
+        self._flow = FlowControl()
         self._room = asyncio.Event()
         self._told_at = float("-inf")
         self._due = float("-inf")
@@ -150,17 +152,17 @@ class _Line:
     def _pause(self, t: float) -> float:
         """[s] Before the next picture, so that a crowd leaves time for whoever drives."""
         holder = self._hub.lease.holder
-        share = self._hub.watching / PICTURES
-        if share <= FRAME or (holder is not None and holder.key == self._key):
+        fraction = self._hub.watching / PICTURES
+        if fraction <= FRAME or (holder is not None and holder.key == self._key):
             return 0.0
-        self._due = max(self._due + share, t)
+        self._due = max(self._due + fraction, t)
         return self._due - t
 
     async def _up(self, upstream: ClientConnection) -> None:
-        """What the firewall lets pass."""
+        """What the message filter lets pass."""
         window = self._hub.window(self._key)
         who = window.person.name if window is not None else "a window without our page"
-        firewall = Firewall(self._guard, who, self._hub.clock())
+        message_filter = MessageFilter(self._guard, who, self._hub.clock())
         while True:
             # One message a turn of the loop, as in a conversation.
             await asyncio.sleep(0)
@@ -168,7 +170,7 @@ class _Line:
             if message["type"] == "websocket.disconnect":
                 return
             data = message.get("bytes")
-            verdict = firewall.judge(data, self._hub.clock())
+            verdict = message_filter.judge(data, self._hub.clock())
             if verdict.ruling is Ruling.PASS and data is not None:
                 self.slot.stamps.append(self._hub.gate.revocations)
                 await upstream.send(data)

@@ -11,7 +11,7 @@ import viser
 
 from katana450.server.viser_bridge import frames
 from katana450.server.viser_bridge.brand import dress
-from katana450.server.viser_bridge.presets import FOV, LOOKS, Preset
+from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 KEY_HEADER = "X-Katana450-Key"
 """Header in which the gateway shows the key."""
@@ -82,7 +82,7 @@ def _dress(server: viser.ViserServer) -> None:
     server.gui.set_panel_label("Katana450")
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")
-    look = LOOKS[Preset.FREE]
+    look = CAMERA_POSES[Preset.FREE]
     server.initial_camera.position = look.position
     server.initial_camera.look_at = look.target
     server.initial_camera.fov = FOV

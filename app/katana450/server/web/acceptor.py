@@ -22,17 +22,17 @@ from katana450.platform_support import raise_open_file_limit
 
 log = logging.getLogger(__name__)
 
-WAITING = 64
+MAX_WAITING = 64
 """Connections that may wait at a time, of everybody together."""
 
-SILENCE = 10.0
+WAITING_TIMEOUT = 10.0
 """[s] After which a waiting connection is closed: nothing said, half a request, half a handshake
 of TLS, or nothing more."""
 
-SENDING = 120.0
+SEND_TIMEOUT = 120.0
 """[s] In which an answer has left for a slow reader, or is given up."""
 
-AT_ONCE = 8
+ACCEPT_BATCH = 8
 """Connections accepted in one turn of the event loop: STOP waits for this many at most."""
 
 CHECK_EVERY = 0.5
@@ -50,7 +50,7 @@ are allowed, and a reserve for libraries, files and pipes."""
 
 WANTED_DESCRIPTORS = 4096
 
-NO_ROOM = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
+NO_DESCRIPTOR_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 
 
 def raise_descriptor_limit() -> None:
@@ -91,10 +91,10 @@ class _Connection:
 class Acceptor:
     """Accepts the connections of one listening socket and hands each to a protocol."""
 
-    def __init__(self, listening: socket.socket, waiting: int = WAITING) -> None:
+    def __init__(self, listening: socket.socket, waiting: int = MAX_WAITING) -> None:
         """``waiting``: connections that may wait at a time."""
         self._listening = listening
-        self._most = waiting
+        self._maximum = waiting
         self._waiting: dict[tuple[str, int], _Connection] = {}
         self._busy: dict[tuple[str, int], _Connection] = {}
         self._tasks: list[asyncio.Task[None]] = []
@@ -141,21 +141,21 @@ class Acceptor:
     ) -> None:
         loop = asyncio.get_running_loop()
         while True:
-            for _ in range(AT_ONCE):
+            for _ in range(ACCEPT_BATCH):
                 try:
                     sock, address = await loop.sock_accept(self._listening)
                 except OSError as error:
                     self._report(f"A connection could not be accepted: {error.strerror}.")
                     # A client that disconnected in the queue leaves room for the next.
-                    if error.errno in NO_ROOM:
-                        self._make_room(self._most // 2)
+                    if error.errno in NO_DESCRIPTOR_ERRORS:
+                        self._make_room(self._maximum // 2)
                         await asyncio.sleep(BACK_OFF)
                     break
                 connection = _Connection(sock, (address[0], address[1]), loop.time())
                 connection.opening = asyncio.create_task(self._open(connection, protocol, tls))
                 self._wait(connection)
-                if len(self._waiting) > self._most:
-                    self._make_room(self._most)
+                if len(self._waiting) > self._maximum:
+                    self._make_room(self._maximum)
             # An accept that need not wait gives nobody else a turn.
             await asyncio.sleep(0)
 
@@ -166,7 +166,7 @@ class Acceptor:
         tls: ssl.SSLContext | None,
     ) -> None:
         loop = asyncio.get_running_loop()
-        patience = None if tls is None else SILENCE
+        patience = None if tls is None else WAITING_TIMEOUT
         with suppress(OSError):
             connection.transport, _ = await loop.connect_accepted_socket(
                 protocol, connection.sock, ssl=tls, ssl_handshake_timeout=patience
@@ -182,12 +182,12 @@ class Acceptor:
         if self._waiting.get(connection.client) is connection:
             del self._waiting[connection.client]
 
-    def _make_room(self, most: int) -> None:
+    def _make_room(self, maximum: int) -> None:
         """Close the oldest of the address with most of them, if more than ``most`` wait."""
         for connection in tuple(self._waiting.values()):
             if not connection.open:
                 self._forget(connection)
-        if len(self._waiting) <= most:
+        if len(self._waiting) <= maximum:
             return
         peers = Counter(address for address, _ in self._waiting)
         crowded, _ = peers.most_common(1)[0]
@@ -210,7 +210,7 @@ class Acceptor:
                 unsent = transport is not None and transport.get_write_buffer_size() > 0
                 if not connection.open:
                     self._forget(connection)
-                elif t - connection.since > (SENDING if unsent else SILENCE):
+                elif t - connection.since > (SEND_TIMEOUT if unsent else WAITING_TIMEOUT):
                     self._forget(connection)
                     connection.close()
             for connection in tuple(self._busy.values()):
@@ -218,7 +218,7 @@ class Acceptor:
                 if connection.transport is not None and connection.transport.is_closing():
                     if not connection.closing:
                         connection.closing, connection.since = True, t
-                    elif t - connection.since > SILENCE:
+                    elif t - connection.since > WAITING_TIMEOUT:
                         connection.close()
 
     def _report(self, what: str) -> None:

@@ -22,8 +22,8 @@ from katana450.platform_support import readable_by_others
 log = logging.getLogger(__name__)
 
 SALT = "katana450 access link"
-LONGEST_NAME = 40
-LONGEST_TOKEN = 400
+MAX_NAME_LENGTH = 40
+MAX_TOKEN_LENGTH = 400
 
 
 class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -73,8 +73,8 @@ class AccessFile:
 
     def give(self, name: str, role: Role, expires: float) -> str:
         """A token for a new link, good until ``expires`` [s since the epoch]."""
-        if not (name.isprintable() and 0 < len(name) <= LONGEST_NAME):
-            raise InputError(f"A name has 1 to {LONGEST_NAME} characters that can be printed.")
+        if not (name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH):
+            raise InputError(f"A name has 1 to {MAX_NAME_LENGTH} characters that can be printed.")
         self._refresh()
         number = secrets.token_hex(8)
         grants = self._content.grants | {number: Grant(name, role, expires)}
@@ -92,7 +92,7 @@ class AccessFile:
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """The number and grant of a token that is good at ``now`` [s since the epoch], or None."""
-        if len(token) > LONGEST_TOKEN:
+        if len(token) > MAX_TOKEN_LENGTH:
             return None
         self._refresh_or_keep()
         try:

@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket
 from katana450.server.api.fields import ROOT
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
-from katana450.server.web.places import Places
+from katana450.server.web.connection_limit import ConnectionLimit
 
 SOCKETS, SOCKETS_EACH = 256, 32
 """Websockets at a time, of all together and of one identity; a page has two, a program one."""
@@ -27,23 +27,23 @@ STOP_PATHS = ("/stop", f"{ROOT}/stop")
 
 TOO_MANY = 429
 
-TOO_MUCH = 4429
+LIMIT_CLOSE_CODE = 4429
 """Close code of a websocket whose client exceeds a limit."""
 
 RETRY = {"Retry-After": "1"}
 
 
-def identity(door: Authenticator, asked: HTTPConnection) -> str | None:
+def identity(authenticator: Authenticator, asked: HTTPConnection) -> str | None:
     """Whose budget and places ``asked`` takes from: of a link or cookie, else of an address.
 
-    None for a stranger where the door asks for a link.
+    None for a stranger where the server asks for a link.
     """
-    found = door.visitor(asked.cookies)
-    if found is None and door.asks:
-        found = door.program("", asked.headers.get("authorization", ""))
+    found = authenticator.identity(asked.cookies)
+    if found is None and authenticator.asks:
+        found = authenticator.program("", asked.headers.get("authorization", ""))
     if found is not None:
         return found.session
-    return None if door.asks else address_of(asked)
+    return None if authenticator.asks else address_of(asked)
 
 
 def address_of(asked: HTTPConnection) -> str:
@@ -57,22 +57,22 @@ async def refuse(socket: WebSocket, why: str) -> None:
     It is accepted first: browsers and our client show nobody the answer to a handshake that fails.
     """
     await socket.accept()
-    await socket.close(TOO_MUCH, why)
+    await socket.close(LIMIT_CLOSE_CODE, why)
 
 
 class Admission:
     """Middleware that refuses more than there are places for."""
 
-    def __init__(self, app: ASGIApp, door: Authenticator, acceptor: Acceptor) -> None:
+    def __init__(self, app: ASGIApp, authenticator: Authenticator, acceptor: Acceptor) -> None:
         self._app = app
-        self._door = door
+        self._authenticator = authenticator
         self._acceptor = acceptor
-        self._requests = Places(REQUESTS, REQUESTS_EACH)
-        self._sockets = Places(SOCKETS, SOCKETS_EACH)
+        self._requests = ConnectionLimit(REQUESTS, REQUESTS_EACH)
+        self._sockets = ConnectionLimit(SOCKETS, SOCKETS_EACH)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         asked = HTTPConnection(scope)
-        who = identity(self._door, asked)
+        who = identity(self._authenticator, asked)
         socket = scope["type"] == "websocket"
         if who is None or (not socket and scope["path"] in STOP_PATHS):
             await self._app(scope, receive, send)

@@ -17,7 +17,7 @@ from starlette.responses import Response
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
-from katana450.server.web.access_links import LONGEST_NAME, AccessFile
+from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile
 
 SESSION_SIZE = 22
 """Characters of a session's name: 16 random bytes."""
@@ -25,7 +25,7 @@ SESSION_SIZE = 22
 CHECK_EVERY = 1.0
 """[s] Between two looks at whether somebody is still welcome."""
 
-NOT_YOU = 4401
+SIGN_IN_CLOSE_CODE = 4401
 """Close code for who must come in (again) by the front page."""
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
@@ -101,7 +101,7 @@ class Authenticator:
         """Whether one needs a link."""
         return self._access is not None
 
-    def visitor(self, cookies: Mapping[str, str]) -> Identity | None:
+    def identity(self, cookies: Mapping[str, str]) -> Identity | None:
         """Who sends these cookies, if they may come in."""
         value = cookies.get(self._cookie, "")
         if self._access is not None:
@@ -118,7 +118,7 @@ class Authenticator:
 
         ``name``: what the program calls itself; behind that of the link where one is asked for.
         """
-        name = name if name.isprintable() and 0 < len(name) <= LONGEST_NAME else "Program"
+        name = name if name.isprintable() and 0 < len(name) <= MAX_NAME_LENGTH else "Program"
         if self._access is None:
             return Identity(secrets.token_urlsafe(16), name, Role.ADMIN)
         scheme, _, token = authorization.partition(" ")
@@ -126,11 +126,11 @@ class Authenticator:
             known = self._access.check(token.strip(), time.time())
             found = None if known is None else Identity(known[0], known[1].name, known[1].role)
         else:
-            found = self.visitor(cookies or {})
+            found = self.identity(cookies or {})
         return None if found is None else replace(found, name=f"{found.name}, {name}")
 
     async def while_welcome(
-        self, visitor: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
+        self, identity: Callable[[], Identity | None], work: Coroutine[Any, Any, None]
     ) -> bool:
         """Do ``work`` as long as there is a ``visitor``; whether it came to its own end."""
         task = asyncio.create_task(work)
@@ -140,7 +140,7 @@ class Authenticator:
                 if done:
                     await task
                     return True
-                if visitor() is None:
+                if identity() is None:
                     return False
         finally:
             task.cancel()

@@ -22,7 +22,7 @@ from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub, Window
-from katana450.server.web.admission import TOO_MUCH
+from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -30,13 +30,13 @@ log = logging.getLogger(__name__)
 ARRIVAL = "katana450.arrival"
 """Where a websocket's scope has its ``Arrival``."""
 
-NOTICES = 64
+MAX_WAITING_ANSWERS = 64
 """Answers that may wait for a slow line; of more, the oldest are forgotten."""
 
-NONSENSE = 1008
+BAD_REQUEST_CLOSE_CODE = 1008
 """Close code for who says what is no request, again and again."""
 
-FAREWELL = 1.0
+CLOSE_FRAME_TIMEOUT = 1.0
 """[s] That who is sent away has for being told so: who reads nothing cannot be told."""
 
 
@@ -44,7 +44,7 @@ class GoneError(Exception):
     """The other side has hung up."""
 
 
-class Line(Protocol):
+class JsonChannel(Protocol):
     """Texts both ways. Each method raises GoneError once the other side is."""
 
     @property
@@ -57,7 +57,7 @@ class Line(Protocol):
     async def close(self, code: int, why: str, /) -> None: ...
 
 
-class SocketLine:
+class WebSocketJsonChannel:
     """A websocket, accepted."""
 
     def __init__(self, socket: WebSocket) -> None:
@@ -87,17 +87,17 @@ class Channel(ABC):
     """One window's; what is told unasked is its kind's."""
 
     def __init__(
-        self, hub: Hub, line: Line, budget: Budget, *, often: TokenBucket, bad: TokenBucket
+        self, hub: Hub, line: JsonChannel, budget: Budget, *, often: TokenBucket, bad: TokenBucket
     ) -> None:
         """``budget``: of whoever asks, and of all their other windows. ``often``: how much may be
         asked here. ``bad``: how much of it may be nonsense."""
         self.hub = hub
         self.budget = budget
-        self._desk = Dispatcher(hub)
+        self._dispatcher = Dispatcher(hub)
         self._line = line
         self._often = often
         self._bad = bad
-        self._notices: deque[Any] = deque(maxlen=NOTICES)
+        self._notices: deque[Any] = deque(maxlen=MAX_WAITING_ANSWERS)
         self._news = asyncio.Event()
         self._concluding: set[asyncio.Task[None]] = set()
 
@@ -112,9 +112,9 @@ class Channel(ABC):
 
     def answer(self, window: Window, request: requests.Request) -> None:
         """Do it and tell the answer, if the request has an id or is a question."""
-        answer = self._desk.do(window, request, self.budget)
+        answer = self._dispatcher.handle(window, request, self.budget)
         told = request.id is not None or request.traits.answered
-        if self._desk.is_pending(answer):
+        if self._dispatcher.is_pending(answer):
             task = asyncio.ensure_future(self._conclude(answer, told=told))
             self._concluding.add(task)
             task.add_done_callback(self._concluding.discard)
@@ -123,7 +123,7 @@ class Channel(ABC):
 
     async def _conclude(self, pending: answers.Answer, *, told: bool) -> None:
         """Tell what became of a command, or only that it is refused."""
-        answer = await self._desk.concluded(pending)
+        answer = await self._dispatcher.concluded(pending)
         if told or isinstance(answer, answers.Refused):
             self.tell(answer)
 
@@ -149,21 +149,21 @@ class Channel(ABC):
             except InputError as error:
                 log.warning("A bad request of %s: %s", window.person.name, error)
                 if not self._bad.take(self.hub.clock()):
-                    await self._send_away(NONSENSE, "Too many bad requests.")
+                    await self._send_away(BAD_REQUEST_CLOSE_CODE, "Too many bad requests.")
                     return
                 self.refuse(str(error), requests.id_of(text))
                 continue
             # A hand that hammers on STOP is never too fast.
             if not self._often.take(self.hub.clock()) and not request.traits.safety:
                 log.warning("%s asks too much at once and is sent away.", window.person.name)
-                await self._send_away(TOO_MUCH, "Too many requests.")
+                await self._send_away(LIMIT_CLOSE_CODE, "Too many requests.")
                 return
             try:
                 self.answer(window, request)
             except BusyError as error:
                 if error.gone:
                     log.warning("%s asks on regardless and is sent away.", window.person.name)
-                    await self._send_away(TOO_MUCH, str(error))
+                    await self._send_away(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)
             except (LeaseError, InputError) as error:
@@ -171,7 +171,7 @@ class Channel(ABC):
 
     async def _send_away(self, code: int, why: str) -> None:
         with suppress(TimeoutError):
-            async with asyncio.timeout(FAREWELL):
+            async with asyncio.timeout(CLOSE_FRAME_TIMEOUT):
                 await self._line.close(code, why)
 
     def refuse(self, why: str, named: Id, **more: float) -> None:

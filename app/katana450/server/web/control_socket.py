@@ -1,4 +1,4 @@
-"""The page's own socket: STOP, signs of life, the lease, jogging and knobs up, the status down.
+"""The page's own socket: STOP, heartbeats, the lease, jogging and knobs up, the status down.
 
 States come down only as they are asked for, a few at a time, so a slow line has no backlog of them.
 """
@@ -14,35 +14,35 @@ from katana450.server.api import requests
 from katana450.server.service import status
 from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub, Window
-from katana450.server.web.authenticator import NOT_YOU, Authenticator
-from katana450.server.web.channel import Channel, Line, SocketLine
+from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
+from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
 from katana450.server.web.token_bucket import TokenBucket
 
 PAGE = re.compile(r"[A-Za-z0-9_-]{16,64}")
 """The name a page gives itself; nobody else can guess it."""
 
 RATE, BURST = 160.0, 320.0
-"""Requests a second, and at once: ten signs of life, 25 jogs, 30 looks, and hands on knobs and
+"""Requests a second, and at once: ten heartbeats, 25 jogs, 30 looks, and hands on knobs and
 buttons."""
 
 PUSH_EVERY = 0.1
 """[s] Between two looks at whether there is news."""
 
-BAD_AT_MOST = 4
+MAX_BAD_REQUESTS = 4
 """Requests that are none; at one more the socket is closed."""
 
 
 class ControlSocket(Channel):
     """One page's: it is told what is new of the status, on a slow line less often."""
 
-    def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
+    def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
         t = hub.clock()
         super().__init__(
             hub,
             line,
             budget,
             often=TokenBucket(RATE, BURST, t),
-            bad=TokenBucket(0.0, BAD_AT_MOST, t),
+            bad=TokenBucket(0.0, MAX_BAD_REQUESTS, t),
         )
         self._told: dict[str, Any] = {}
         self._looked_at = float("-inf")
@@ -68,19 +68,23 @@ class ControlSocket(Channel):
         return {"is": "status", **news}, PUSH_EVERY
 
 
-async def serve(hub: Hub, door: Authenticator, budgets: Budgets, socket: WebSocket) -> None:
+async def serve(
+    hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
+) -> None:
     """Answer a request for a control socket."""
-    visitor = door.visitor(socket.cookies)
+    identity = authenticator.identity(socket.cookies)
     page = socket.query_params.get("page", "")
     await socket.accept()
-    if visitor is None or not PAGE.fullmatch(page):
-        await socket.close(NOT_YOU, "Come in by the front page.")
+    if identity is None or not PAGE.fullmatch(page):
+        await socket.close(SIGN_IN_CLOSE_CODE, "Come in by the front page.")
         return
-    line = SocketLine(socket)
-    control = ControlSocket(hub, line, budgets.of(visitor.session))
-    control.window = window = hub.join(visitor, page, control.tell, line.arrival)
+    line = WebSocketJsonChannel(socket)
+    control = ControlSocket(hub, line, budgets.of(identity.session))
+    control.window = window = hub.join(identity, page, control.tell, line.arrival)
     try:
-        if not await door.while_welcome(lambda: door.visitor(socket.cookies), control.run(window)):
-            await line.close(NOT_YOU, "Your link is no good any more.")
+        if not await authenticator.while_welcome(
+            lambda: authenticator.identity(socket.cookies), control.run(window)
+        ):
+            await line.close(SIGN_IN_CLOSE_CODE, "Your link is no good any more.")
     finally:
         hub.leave(window)

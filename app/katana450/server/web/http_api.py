@@ -16,13 +16,13 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.lease import LOST_AFTER
+from katana450.arm.control.lease import LEASE_TIMEOUT
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests, schema
 from katana450.server.api.fields import ROOT, Id
-from katana450.server.service.budget import FIXED_HTTP, Budget, Budgets, BusyError
+from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
-from katana450.server.service.hub import Hub, Window, visiting
+from katana450.server.service.hub import Hub, Window, actor_of
 from katana450.server.service.identity import Identity
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
@@ -31,7 +31,7 @@ from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_MANY, as_js
 
 log = logging.getLogger(__name__)
 
-QUESTIONS = ("state", "arm", "ledger", "branches", "loop", "things", "world", "links")
+QUESTIONS = ("state", "arm", "event_log", "branches", "loop", "objects", "world", "links")
 """Each is a path of its own."""
 
 PROGRAM = re.compile(r"[A-Za-z0-9_-]{16,64}")
@@ -41,9 +41,9 @@ is shown it. The name that others see is in NAME."""
 KEY, NAME = "x-program", "x-name"
 """Headers of the key and the name of a program."""
 
-TOO_SOON = 503
+RETRY_STATUS = 503
 
-LONGEST_PAUSE = 0.5
+MAX_PAUSE = 0.5
 """[s] Before too frequent a request is refused."""
 
 
@@ -57,8 +57,8 @@ class RouteContext(NamedTuple):
     """
 
     hub: Hub
-    door: Authenticator
-    visitor: Callable[[Request], Identity]
+    authenticator: Authenticator
+    identity: Callable[[Request], Identity]
 
 
 RouteProvider = Callable[[RouteContext], list[BaseRoute]]
@@ -71,16 +71,16 @@ class Api:
     def __init__(
         self,
         hub: Hub,
-        door: Authenticator,
+        authenticator: Authenticator,
         budgets: Budgets,
         provided: Sequence[RouteProvider] = (),
     ) -> None:
         """``provided``: routes of the extensions."""
         self._hub = hub
         self._budgets = budgets
-        self._door = door
-        self._desk = Dispatcher(hub)
-        context = RouteContext(hub, door, self._visitor)
+        self._authenticator = authenticator
+        self._dispatcher = Dispatcher(hub)
+        context = RouteContext(hub, authenticator, self._identity)
         self._provided = [route for provider in provided for route in provider(context)]
         self._posting: dict[str, tuple[Window, asyncio.TimerHandle]] = {}
 
@@ -92,7 +92,7 @@ class Api:
             return Response(described, media_type="application/json")
 
         async def socket(socket: WebSocket) -> None:
-            await program_socket.serve_socket(self._hub, self._door, self._budgets, socket)
+            await program_socket.serve_socket(self._hub, self._authenticator, self._budgets, socket)
 
         return [
             *(Route(f"{ROOT}/{at}", self._read(at)) for at in QUESTIONS),
@@ -105,17 +105,17 @@ class Api:
 
     def _read(self, at: str) -> Callable[[Request], Awaitable[Response]]:
         async def read(request: Request) -> Response:
-            visitor, driver = self._visitor(request), ""
-            if self._key(request, visitor) in self._posting:
+            identity, driver = self._identity(request), ""
+            if self._key(request, identity) in self._posting:
                 # A program that looks is alive; a stranger's look is nothing.
-                window = self._window(request, visitor)
+                window = self._window(request, identity)
                 driver = driver_key(self._hub, window)
-                self._hub.beat(window)
+                self._hub.heartbeat(window)
             try:
-                with self._budget(request).charged(driver, fixed=FIXED_HTTP):
-                    return as_json(self._desk.query(at))
+                with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
+                    return as_json(self._dispatcher.query(at))
             except LeaseError as error:
-                raise HTTPException(TOO_SOON, str(error)) from error
+                raise HTTPException(RETRY_STATUS, str(error)) from error
             except BusyError as error:
                 return await _too_much(error)
             except InputError as error:
@@ -124,26 +124,26 @@ class Api:
         return read
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.stop(visiting(self._visitor(request), CommandChannel.API))
+        self._hub.stop(actor_of(self._identity(request), CommandChannel.API))
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
-        visitor = self._visitor(request)
+        identity = self._identity(request)
         if not PROGRAM.fullmatch(request.headers.get(KEY, "")):
             why = (
                 "A header X-Program with a key of 16 to 64 letters and digits of your own tells "
                 "you apart. Keep it to yourself; X-Name has the name that others see."
             )
             return as_json(answers.Refused(why=why), NOT_UNDERSTOOD)
-        body = await body_of(request, requests.LARGEST)
+        body = await body_of(request, requests.MAX_REQUEST_BYTES)
         try:
             asked = self._hub.requests.decoded(body)
             if isinstance(asked, requests.Hello | requests.Watch):
                 raise InputError("That is for a connection that lasts: the socket or the TCP port.")
-            window = self._window(request, visitor)
-            answer = self._desk.do(window, asked, self._budget(request))
-            if self._desk.is_pending(answer):
-                answer = await self._desk.concluded(answer)
+            window = self._window(request, identity)
+            answer = self._dispatcher.handle(window, asked, self._budget(request))
+            if self._dispatcher.is_pending(answer):
+                answer = await self._dispatcher.concluded(answer)
             return as_json(answer, NOT_NOW if isinstance(answer, answers.Refused) else 200)
         except BusyError as error:
             return await _too_much(error, requests.id_of(body))
@@ -154,36 +154,38 @@ class Api:
             return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
 
     def _budget(self, request: Request) -> Budget:
-        return self._budgets.of(identity(self._door, request) or address_of(request))
+        return self._budgets.of(identity(self._authenticator, request) or address_of(request))
 
-    def _visitor(self, request: Request) -> Identity:
+    def _identity(self, request: Request) -> Identity:
         headers = request.headers
-        visitor = self._door.program(
+        identity = self._authenticator.program(
             headers.get(NAME, ""), headers.get("authorization", ""), request.cookies
         )
-        if visitor is None:
+        if identity is None:
             raise HTTPException(401, "A token is asked for; `katana450 access give` makes one.")
-        return visitor
+        return identity
 
-    def _window(self, request: Request, visitor: Identity) -> Window:
+    def _window(self, request: Request, identity: Identity) -> Window:
         """That of the program that asks; it closes when nothing is heard of it for a while."""
-        key = self._key(request, visitor)
+        key = self._key(request, identity)
         known = self._posting.pop(key, None)
         if known is None:
             session, _, page = key.partition("/")
-            visitor = Identity(session, visitor.name, visitor.role)
-            window = self._hub.join(visitor, page, lambda _notice: None, channel=CommandChannel.API)
+            identity = Identity(session, identity.name, identity.role)
+            window = self._hub.join(
+                identity, page, lambda _notice: None, channel=CommandChannel.API
+            )
             assert window.person.key == key
         else:
             window, timer = known
             timer.cancel()
-        timer = asyncio.get_running_loop().call_later(LOST_AFTER, self._forget, key)
+        timer = asyncio.get_running_loop().call_later(LEASE_TIMEOUT, self._forget, key)
         self._posting[key] = (window, timer)
         return window
 
-    def _key(self, request: Request, visitor: Identity) -> str:
+    def _key(self, request: Request, identity: Identity) -> str:
         """What ties the requests of one program together."""
-        session = visitor.session if self._door.asks else "programs"
+        session = identity.session if self._authenticator.asks else "programs"
         return f"{session}/{request.headers.get(KEY, '')}"
 
     def _forget(self, key: str) -> None:
@@ -193,7 +195,7 @@ class Api:
 
 async def _too_much(error: BusyError, id: Id = None) -> Response:
     # Who asks again at once is slowed down; STOP comes by another route.
-    await asyncio.sleep(min(error.retry, LONGEST_PAUSE))
+    await asyncio.sleep(min(error.retry, MAX_PAUSE))
     answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)
     answer.headers["Retry-After"] = str(math.ceil(error.retry))
     return answer

@@ -11,7 +11,7 @@ from katana450.platform_support import claim_port
 
 BACKLOG = 128
 
-HERE = "127.0.0.1"
+LOOPBACK = "127.0.0.1"
 """This machine alone."""
 
 

@@ -15,7 +15,7 @@ import msgspec
 from starlette.websockets import WebSocket
 
 from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.lease import BEAT
+from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
@@ -24,12 +24,18 @@ from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub, Window
 from katana450.server.service.identity import Identity
-from katana450.server.service.interfaces import Arm
+from katana450.server.service.interfaces import ArmInterface
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import address_of, identity, refuse
-from katana450.server.web.authenticator import NOT_YOU, Authenticator
-from katana450.server.web.channel import NONSENSE, Channel, GoneError, Line, SocketLine
-from katana450.server.web.places import Places
+from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
+from katana450.server.web.channel import (
+    BAD_REQUEST_CLOSE_CODE,
+    Channel,
+    GoneError,
+    JsonChannel,
+    WebSocketJsonChannel,
+)
+from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -37,16 +43,16 @@ log = logging.getLogger(__name__)
 RATE, BURST = 400.0, 800.0
 """Requests a second, and at once: a stream of joint angles may come quicker than the arm ticks."""
 
-MISTAKES, FORGIVEN = 20, 1.0
+MAX_BAD_REQUESTS, FORGIVEN_PER_SECOND = 20, 1.0
 """Requests that are none: so many at once, and so many more a second."""
 
-COMPLAINED_EVERY = 5.0
+COMPLAINT_INTERVAL = 5.0
 """[s] Between two words to a program that watches more than its budget allows."""
 
 HELLO_SECONDS = 5.0
 """[s] A line that says nothing for so long is closed."""
 
-UNSENT = 4096
+MAX_UNSENT_BYTES = 4096
 """Bytes that may wait to be sent: a state or two, so that what is told is new."""
 
 LINES, LINES_EACH = 16, 8
@@ -56,18 +62,21 @@ LINES, LINES_EACH = 16, 8
 TOO_MUCH_ASKED = "Too much is asked by your programs together. Wait a moment, and ask less often."
 
 
-class Program(Channel):
+class ProgramChannel(Channel):
     """One program's: it is told the state as often as it wants."""
 
-    def __init__(self, hub: Hub, line: Line, budget: Budget) -> None:
+    def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
         t = hub.clock()
-        often, bad = TokenBucket(RATE, BURST, t), TokenBucket(FORGIVEN, MISTAKES, t)
+        often, bad = (
+            TokenBucket(RATE, BURST, t),
+            TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, t),
+        )
         super().__init__(hub, line, budget, often=often, bad=bad)
         self._window: Window | None = None
         self._complained = -math.inf
         self._period: float | None = None
         self._due = 0.0
-        self._watched: tuple[requests.Named, ...] = ()
+        self._watched: tuple[requests.FieldName, ...] = ()
 
     def answer(self, window: Window, request: requests.Request) -> None:
         if isinstance(request, requests.Watch):
@@ -93,14 +102,14 @@ class Program(Channel):
                 return self._state(self.hub.arm), self._due - t
         except BusyError as error:
             self._due = max(self._due, t + error.retry)
-            if t - self._complained < COMPLAINED_EVERY:
+            if t - self._complained < COMPLAINT_INTERVAL:
                 return None, self._due - t
             self._complained = t
             why = f"States come less often than they are watched. {error}"
             return answers.Refused(why=why, retry=error.retry), self._due - t
 
-    def _state(self, arm: Arm) -> answers.State:
-        """With the fields that are watched; those of a thing that is gone are left out."""
+    def _state(self, arm: ArmInterface) -> answers.State:
+        """With the fields that are watched; those of an object that is gone are left out."""
         now = serialize.state(self.hub)
         values: list[answers.Value] = []
         for each in self._watched:
@@ -113,35 +122,40 @@ class Program(Channel):
         self._window, person = window, window.person
         self.tell(
             answers.Welcome(
-                name=person.name, number=window.number, role=person.role.value, heartbeat=BEAT
+                name=person.name,
+                number=window.number,
+                role=person.role.value,
+                heartbeat=HEARTBEAT_INTERVAL,
             )
         )
 
 
-async def serve_socket(hub: Hub, door: Authenticator, budgets: Budgets, socket: WebSocket) -> None:
+async def serve_socket(
+    hub: Hub, authenticator: Authenticator, budgets: Budgets, socket: WebSocket
+) -> None:
     """Answer a program that asks for a websocket."""
     name = socket.query_params.get("name", "")
 
-    def visitor() -> Identity | None:
-        return door.program(name, socket.headers.get("authorization", ""), socket.cookies)
+    def current_identity() -> Identity | None:
+        return authenticator.program(name, socket.headers.get("authorization", ""), socket.cookies)
 
-    budget = budgets.of(identity(door, socket) or address_of(socket))
+    budget = budgets.of(identity(authenticator, socket) or address_of(socket))
     if budget.is_exhausted():
         await refuse(socket, TOO_MUCH_ASKED)
         return
     await socket.accept()
-    await _serve(hub, door, budget, SocketLine(socket), visitor)
+    await _serve(hub, authenticator, budget, WebSocketJsonChannel(socket), current_identity)
 
 
-class Lines:
+class LineServer:
     """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
     the connection, so that a page's request, which begins otherwise, gets nowhere."""
 
-    def __init__(self, hub: Hub, door: Authenticator, budgets: Budgets) -> None:
+    def __init__(self, hub: Hub, authenticator: Authenticator, budgets: Budgets) -> None:
         self._hub = hub
-        self._door = door
+        self._authenticator = authenticator
         self._budgets = budgets
-        self._places = Places(LINES, LINES_EACH)
+        self._places = ConnectionLimit(LINES, LINES_EACH)
         self._acceptor: Acceptor | None = None
         self._writers: set[asyncio.StreamWriter] = set()
 
@@ -162,12 +176,12 @@ class Lines:
                 writer.close()
 
     def _protocol(self) -> asyncio.Protocol:
-        reader = asyncio.StreamReader(limit=requests.LARGEST)
+        reader = asyncio.StreamReader(limit=requests.MAX_REQUEST_BYTES)
         return asyncio.StreamReaderProtocol(reader, self.serve)
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One connection, to its end."""
-        writer.transport.set_write_buffer_limits(high=UNSENT)
+        writer.transport.set_write_buffer_limits(high=MAX_UNSENT_BYTES)
         line = _TcpLine(reader, writer)
         self._writers.add(writer)
         try:
@@ -185,18 +199,18 @@ class Lines:
     async def _converse(
         self, line: _TcpLine, hello: requests.Hello, client: tuple[str, int]
     ) -> None:
-        def visitor() -> Identity | None:
-            return self._door.program(hello.name, f"Bearer {hello.token}")
+        def current_identity() -> Identity | None:
+            return self._authenticator.program(hello.name, f"Bearer {hello.token}")
 
-        found = visitor()
+        found = current_identity()
         session = "" if found is None else found.session
         # Without links all programs of this machine are one to the budget, but have places enough.
-        budget = self._budgets.of(session if self._door.asks else client[0])
+        budget = self._budgets.of(session if self._authenticator.asks else client[0])
         acceptor = self._acceptor
         kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
         with self._places.taken(session) as free, kept:
             if free:
-                await _serve(self._hub, self._door, budget, line, visitor)
+                await _serve(self._hub, self._authenticator, budget, line, current_identity)
             else:
                 why = f"No more than {LINES} programs at a time, and {LINES_EACH} of one link."
                 await line.close(0, why)
@@ -218,22 +232,24 @@ class Lines:
 
 async def _serve(
     hub: Hub,
-    door: Authenticator,
+    authenticator: Authenticator,
     budget: Budget,
-    line: Line,
-    visitor: Callable[[], Identity | None],
+    line: JsonChannel,
+    current_identity: Callable[[], Identity | None],
 ) -> None:
-    found = visitor()
+    found = current_identity()
     if found is None:
-        await line.close(NOT_YOU, "A token is asked for; `katana450 access give` makes one.")
+        await line.close(
+            SIGN_IN_CLOSE_CODE, "A token is asked for; `katana450 access give` makes one."
+        )
         return
-    program = Program(hub, line, budget)
+    program = ProgramChannel(hub, line, budget)
     page = secrets.token_hex(16)
     window = hub.join(found, page, program.tell, line.arrival, CommandChannel.API)
     program.greet(window)
     try:
-        if not await door.while_welcome(visitor, program.run(window)):
-            await line.close(NOT_YOU, "The token is no good any more.")
+        if not await authenticator.while_welcome(current_identity, program.run(window)):
+            await line.close(SIGN_IN_CLOSE_CODE, "The token is no good any more.")
     finally:
         hub.leave(window, for_good=True)
 
@@ -253,7 +269,9 @@ class _TcpLine:
             raise GoneError from error
         except ValueError as error:
             # The reader's word for a line that does not end.
-            await self.close(NONSENSE, f"A request has at most {requests.LARGEST} bytes.")
+            await self.close(
+                BAD_REQUEST_CLOSE_CODE, f"A request has at most {requests.MAX_REQUEST_BYTES} bytes."
+            )
             raise GoneError from error
         if not line:
             raise GoneError

@@ -16,37 +16,37 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts, file_name
 from katana450.extensions.programs.server.preview import Preview
 from katana450.extensions.programs.server.state_line import RUNS
-from katana450.extensions.programs.taught import taught
+from katana450.extensions.programs.teach import script_from_postures
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api.answers import Progress
 from katana450.server.view.controls import GestureGate, refuse
 
-STEP = 0.1
+FOLLOW_INTERVAL = 0.1
 """[s] Between two times to look at."""
 
-MOST_TAUGHT = 200
+MAX_TAUGHT_POSTURES = 200
 
 ORDERS = {
-    "Run": Order.RUN,
-    "Step": Order.STEP,
-    "Wait": Order.PAUSE,
-    "End": Order.END,
+    "Run": ProgramOrder.RUN,
+    "Step": ProgramOrder.STEP,
+    "Wait": ProgramOrder.PAUSE,
+    "End": ProgramOrder.END,
 }
 
 
 class Steering(Protocol):
     """What the panel asks of whoever runs programs. Each raises KatanaError with the reason."""
 
-    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
+    def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
         """Plan a script for ``actor``, and then run it."""
         ...
 
-    def steer(self, order: Order, actor: Actor) -> None:
+    def steer(self, order: ProgramOrder, actor: Actor) -> None:
         """Steer the one that runs."""
         ...
 
@@ -110,7 +110,7 @@ class ProgramsPanel:
                 "Look at",
                 min=0.0,
                 max=1.0,
-                step=STEP,
+                step=FOLLOW_INTERVAL,
                 initial_value=0.0,
                 disabled=True,
                 hint="Seconds of what is previewed, at full speed: the arm as it will stand then",
@@ -179,8 +179,8 @@ class ProgramsPanel:
     def _on_teach(self, _actor: Actor, client: viser.ClientHandle | None = None) -> None:
         match self._teach.value:
             case "Add pose":
-                if len(self._taught) >= MOST_TAUGHT:
-                    raise InputError(f"No more than {MOST_TAUGHT} poses; save these first.")
+                if len(self._taught) >= MAX_TAUGHT_POSTURES:
+                    raise InputError(f"No more than {MAX_TAUGHT_POSTURES} poses; save these first.")
                 self._taught.append(self._state().goal)
             case "Forget":
                 self._taught.clear()
@@ -192,7 +192,7 @@ class ProgramsPanel:
     def _save(self, client: viser.ClientHandle | None) -> None:
         """Save the poses in the folder; where there is none, as a download of ``client``."""
         name = self._name.value.strip()
-        text = taught(name, self._taught)
+        text = script_from_postures(name, self._taught)
         if client is not None and not self._scripts.keeps:
             # The poses stay: a browser may refuse the file.
             client.send_file_download(file_name(name), text.encode(), save_immediately=True)
@@ -221,7 +221,7 @@ class ProgramsPanel:
 
 def shown_seconds(duration: float) -> float:
     """``duration`` [s] as the panel shows it, in words and as the end of its slider."""
-    return math.ceil(round(duration / STEP, 6)) * STEP
+    return math.ceil(round(duration / FOLLOW_INTERVAL, 6)) * FOLLOW_INTERVAL
 
 
 def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
@@ -240,14 +240,14 @@ def _page(told: Progress | None, poses: int) -> str:
         if told.status in RUNS:
             lines.append(
                 f"Step {told.step} of {told.steps}, line {told.line}: {escape(told.task)}, "
-                f"{told.share:.0%}"
+                f"{told.fraction:.0%}"
             )
         elif told.status == "planning":
             lines.append("All of it is planned before anything moves, which may take a while.")
             if told.steps:
                 at = f"Step {told.step} of {told.steps}: {escape(told.task)}"
                 lines.append(
-                    f"{at}, {told.share:.0%}<progress value='{told.share:.2f}'></progress>"
+                    f"{at}, {told.fraction:.0%}<progress value='{told.fraction:.2f}'></progress>"
                 )
         elif told.status == "ready":
             seconds = shown_seconds(told.seconds)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from katana450.arm.control.actor import Actor
 from katana450.errors import LeaseError
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.api import answers
 from katana450.server.service.hub import Hub, Window
@@ -34,18 +34,18 @@ class PanelAccess:
         """The program that is planned."""
         return self._runner.program
 
-    def plan(self, text: str, then: Order | None, actor: Actor) -> None:
+    def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
         """Plan ``text`` for ``actor``, and do ``then`` once it is planned. Raises KatanaError."""
         self._call(lambda: self._plan(text, then, actor))
 
-    def steer(self, order: Order, actor: Actor) -> None:
+    def steer(self, order: ProgramOrder, actor: Actor) -> None:
         """Steer the program for ``actor``. Raises LeaseError with the reason why not."""
         self._call(lambda: self._steer(order, actor))
 
-    def _steer(self, order: Order, actor: Actor) -> None:
+    def _steer(self, order: ProgramOrder, actor: Actor) -> None:
         self._runner.steer(self._window_of(actor), order)
 
-    def _plan(self, text: str, then: Order | None, actor: Actor) -> None:
+    def _plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
         window = self._window_of(actor)
         if then is not None:
             self._hub.gate.check_not_stopped()

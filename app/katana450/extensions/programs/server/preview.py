@@ -9,7 +9,7 @@ import viser
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.programs.order import Go, Use
+from katana450.extensions.programs.actions import FollowPlan, UseTool
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.geometry import so3
@@ -20,7 +20,7 @@ from katana450.server.viser_bridge.posing import arrange
 
 COLOUR: Colour = (64, 156, 255)
 
-PLACES = 60
+PATH_SAMPLES = 60
 """Pieces that the way of each plan is drawn with."""
 
 GHOSTS = 7
@@ -150,11 +150,11 @@ def _ways(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
     """Of each plan the way of the tool, (PLACES, 2, 3) in the base frame [m]."""
     ways: list[FloatArray] = []
     for task in program.tasks:
-        if isinstance(task.order, Use):
+        if isinstance(task.order, UseTool):
             tool = task.order.name
-        elif isinstance(task.order, Go):
+        elif isinstance(task.order, FollowPlan):
             chain = arm.chain_to(tool)
-            postures = task.order.plan.postures(PLACES + 1)
+            postures = task.order.plan.postures(PATH_SAMPLES + 1)
             points = [(arm.T_base_shoulder @ forward(chain, q))[:3, 3] for q in postures]
             ways.append(np.stack((points[:-1], points[1:]), axis=1))
     return ways

@@ -9,8 +9,8 @@ from enum import Enum
 
 from katana450.arm.control.state import State
 from katana450.errors import CancelledError, KatanaError
-from katana450.extensions.programs.bench import PlanContext
-from katana450.extensions.programs.layout import PlanningStage
+from katana450.extensions.programs.compiler import PlanningStage
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.situation import Situation
@@ -19,11 +19,11 @@ from katana450.server.api import answers
 
 log = logging.getLogger(__name__)
 
-LONGEST_PLANNING = 120.0
+MAX_PLANNING_TIME = 120.0
 """[s]"""
 
 
-class Stage(Enum):
+class PlanningPhase(Enum):
     """How far a program is that has not begun."""
 
     PLANNING = "planning"
@@ -49,7 +49,7 @@ class Planning:
         self,
         text: str,
         speed: float,
-        rig: PlanContext,
+        plan_context: PlanContext,
         state: State,
         clock: Callable[[], float],
         note: str = "",
@@ -67,7 +67,7 @@ class Planning:
         self._began = clock()
         self._program: Program | None = None
         self.thread = threading.Thread(
-            target=self._plan, args=(rig, state), name="planner", daemon=True
+            target=self._plan, args=(plan_context, state), name="planner", daemon=True
         )
         self.thread.start()
 
@@ -99,35 +99,35 @@ class Planning:
         """How a program stands that has not begun; ``by``: its owner's name."""
         program, now = self.program, self.stage
         if self.cancelled is not None or self.refused is not None:
-            stage = Stage.REFUSED if self.cancelled is None else Stage.CANCELLED
+            stage = PlanningPhase.REFUSED if self.cancelled is None else PlanningPhase.CANCELLED
             why = self.cancelled or self.refused or ""
             return answers.Progress(name=self.name, by=by, status=stage.value, why=why)
         if program is None:
             return answers.Progress(
                 name=self.name,
                 by=by,
-                status=Stage.PLANNING.value,
+                status=PlanningPhase.PLANNING.value,
                 step=0 if now is None else now.step,
                 steps=0 if now is None else now.steps,
                 task="" if now is None else now.phase,
-                share=0.0 if now is None else now.share,
+                fraction=0.0 if now is None else now.fraction,
                 why=self.note,
             )
         return answers.Progress(
             name=program.name,
             by=by,
-            status=Stage.READY.value,
+            status=PlanningPhase.READY.value,
             steps=program.steps,
             seconds=program.duration,
             why=self.note,
         )
 
-    def _plan(self, rig: PlanContext, state: State) -> None:
+    def _plan(self, plan_context: PlanContext, state: State) -> None:
         try:
             script = parse(self.text)
             self.name = script.name
             with checked_by(self._check):
-                self._program = compiled(script, rig, state, self.speed, self._report)
+                self._program = compiled(script, plan_context, state, self.speed, self._report)
         except CancelledError as error:
             if self.cancelled is None:
                 self.refused = str(error)
@@ -143,8 +143,8 @@ class Planning:
     def _check(self) -> None:
         if self.cancelled is not None:
             raise CancelledError(self.cancelled)
-        if self._clock() - self._began > LONGEST_PLANNING:
+        if self._clock() - self._began > MAX_PLANNING_TIME:
             at = "" if self.stage is None else f" (it is at step {self.stage.step})"
             raise CancelledError(
-                f"Planning takes longer than {LONGEST_PLANNING:g} s{at}. Make the script shorter."
+                f"Planning takes longer than {MAX_PLANNING_TIME:g} s{at}. Make the script shorter."
             )

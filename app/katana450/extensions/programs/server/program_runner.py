@@ -15,13 +15,13 @@ from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.state import State, Verdict
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
-from katana450.extensions.programs.bench import PlanContext
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.requests import Order
+from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_planning import Planning
-from katana450.extensions.programs.source import LARGEST
+from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.command_gate import RunningProgram
@@ -33,7 +33,7 @@ from katana450.server.service.runner import Runner, StatusLine
 log = logging.getLogger(__name__)
 
 
-class _Here(LastHeartbeat):
+class _MeasuresOwnerAge(LastHeartbeat):
     """A program runs in this thread and so is always there; its owner is watched instead."""
 
     @property
@@ -55,7 +55,7 @@ class ProgramRunner(Runner):
         self._parts: dict[str, str] = {}
         self._planning: Planning | None = None
         self._owner: Window | None = None
-        self._then: Order | None = None
+        self._then: ProgramOrder | None = None
         self._seen = 0.0
         self._self: Window | None = None
         self._run: Run | None = None
@@ -96,7 +96,7 @@ class ProgramRunner(Runner):
                 return answers.Done(outcome=Verdict.ACCEPTED.value)
         return answers.Done()
 
-    def then(self, order: Order | None) -> None:
+    def then(self, order: ProgramOrder | None) -> None:
         """Do ``order`` as soon as the present script is planned."""
         self._then = order
 
@@ -108,8 +108,8 @@ class ProgramRunner(Runner):
         """
         key = window.person.key
         text = self._parts.pop(key, "") + text
-        if len(text.encode()) > LARGEST:
-            raise InputError(f"A script has at most {LARGEST // 1024} KB.")
+        if len(text.encode()) > MAX_BYTES:
+            raise InputError(f"A script has at most {MAX_BYTES // 1024} KB.")
         if more:
             self._parts[key] = text
             return
@@ -140,7 +140,7 @@ class ProgramRunner(Runner):
         self._owner, self._run, self._then = window, None, None
         self._seen = self.hub.clock()
 
-    def steer(self, window: Window, order: Order) -> int | None:
+    def steer(self, window: Window, order: ProgramOrder) -> int | None:
         """Run, step, pause, resume or end it. Raises LeaseError with the reason why not.
 
         While it is planned, RUN and STEP are done as soon as it is, PAUSE and RESUME decide whether
@@ -153,32 +153,34 @@ class ProgramRunner(Runner):
         if planning is not None and planning.busy:
             self._check_owns(window.person)
             return self._steer_planning(planning, window, order)
-        if order in (Order.RUN, Order.STEP) and not self.running:
+        if order in (ProgramOrder.RUN, ProgramOrder.STEP) and not self.running:
             return self._begin(window, order)
         if not self.running or self._run is None:
             raise LeaseError("No program runs.")
         self._check_owns(window.person)
         match order:
-            case Order.RUN | Order.RESUME:
+            case ProgramOrder.RUN | ProgramOrder.RESUME:
                 return self._tell(cmd.Resume())
-            case Order.STEP:
+            case ProgramOrder.STEP:
                 self._run, commands = runner.stepping(self._run)
                 return self._tell(*commands)
-            case Order.PAUSE:
+            case ProgramOrder.PAUSE:
                 return self._tell(cmd.Pause())
-            case Order.END:
+            case ProgramOrder.END:
                 return self._end(f"{window.person.name} ended it.")
 
-    def _steer_planning(self, planning: Planning, window: Window, order: Order) -> int | None:
+    def _steer_planning(
+        self, planning: Planning, window: Window, order: ProgramOrder
+    ) -> int | None:
         match order:
-            case Order.RUN | Order.STEP:
+            case ProgramOrder.RUN | ProgramOrder.STEP:
                 self.hub.gate.check_not_stopped()
                 self._then, planning.note = order, ""
-            case Order.PAUSE:
+            case ProgramOrder.PAUSE:
                 return self.hub.move(window, cmd.Pause())
-            case Order.RESUME:
+            case ProgramOrder.RESUME:
                 return self.hub.move(window, cmd.Resume())
-            case Order.END:
+            case ProgramOrder.END:
                 self._then = None
                 planning.cancel(f"{window.person.name} cancelled the planning.")
         return None
@@ -253,7 +255,7 @@ class ProgramRunner(Runner):
             steps=now.steps,
             line=now.line,
             task=now.name,
-            share=now.share,
+            fraction=now.fraction,
             seconds=program.duration,
             why=now.why,
         )
@@ -281,7 +283,7 @@ class ProgramRunner(Runner):
             assert self._planning is not None
             self._planning.refused = str(error)
 
-    def _begin(self, window: Window, order: Order) -> int | None:
+    def _begin(self, window: Window, order: ProgramOrder) -> int | None:
         """Run the program that is planned; where the arm or the scene is not as it was planned for,
         plan it anew first."""
         planning, hub = self._planning, self.hub
@@ -301,9 +303,9 @@ class ProgramRunner(Runner):
             return None
         planning.refused, planning.note = None, ""
         program = planning.program
-        visitor = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
-        here = _Here(hub.clock)
-        joined = hub.join(visitor, "program", lambda _notice: None, here, CommandChannel.PROGRAM)
+        identity = Identity(f"program of {window.person.key}", program.name, Role.OPERATOR)
+        here = _MeasuresOwnerAge(hub.clock)
+        joined = hub.join(identity, "program", lambda _notice: None, here, CommandChannel.PROGRAM)
         try:
             if hub.lease.holder == window.person:
                 # In one step: nobody takes the lease in between.
@@ -320,7 +322,7 @@ class ProgramRunner(Runner):
         hub.gate.program = RunningProgram(joined.person, window.person.key)
         self._speed = self._commanded = arm.state.speed
         self._allowed = 1.0
-        self._run = Run(self._seen, single=order is Order.STEP)
+        self._run = Run(self._seen, single=order is ProgramOrder.STEP)
         log.info("%s runs the program %s.", window.person.name, program.name)
         return ticket
 

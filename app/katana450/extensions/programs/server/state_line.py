@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from katana450.arm.control.state import State
-from katana450.extensions.programs.requests import Order
-from katana450.extensions.programs.server.program_planning import Stage
+from katana450.extensions.programs.requests import ProgramOrder
+from katana450.extensions.programs.server.program_planning import PlanningPhase
 from katana450.server.api.answers import Progress
 from katana450.server.service.runner import StatusLine
 
@@ -29,15 +29,15 @@ def status_line(
         if state.paused:
             return line._replace(headline=f"{program.name}, paused", why=f"{step}. {line.why}")
         return line._replace(mood="moving", headline=f"{program.name}, {step.lower()}")
-    if program.status != Stage.PLANNING.value:
+    if program.status != PlanningPhase.PLANNING.value:
         return line
     said = f"Planning {program.name or 'the script'}"
     about = [program.why] if program.why else []
     if program.steps:
-        about.append(f"{step}: {program.task}, {program.share:.0%}.")
+        about.append(f"{step}: {program.task}, {program.fraction:.0%}.")
     if state.moving:
         return line._replace(why=" ".join((f"{said}.", *about)))
-    said += ", paused" if state.paused else f" {program.share:.0%}"
+    said += ", paused" if state.paused else f" {program.fraction:.0%}"
     if waits:
         about.append("Then it waits for Resume." if state.paused else "Then it runs.")
     else:
@@ -47,14 +47,14 @@ def status_line(
 
 def orders(
     state: State, program: Progress | None, *, stopped: bool, waits: bool
-) -> tuple[Order, ...]:
+) -> tuple[ProgramOrder, ...]:
     """Return the orders that the page offers to the owner of ``program``.
 
     ``waits``: whether the program runs as soon as it is planned.
     """
     if program is None:
         return ()
-    pause = () if stopped else (Order.RESUME if state.paused else Order.PAUSE,)
-    if program.status == Stage.PLANNING.value:
-        return (*(pause if waits else ()), Order.END)
-    return (*pause, Order.END) if program.status in RUNS else ()
+    pause = () if stopped else (ProgramOrder.RESUME if state.paused else ProgramOrder.PAUSE,)
+    if program.status == PlanningPhase.PLANNING.value:
+        return (*(pause if waits else ()), ProgramOrder.END)
+    return (*pause, ProgramOrder.END) if program.status in RUNS else ()

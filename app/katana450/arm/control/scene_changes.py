@@ -1,0 +1,127 @@
+"""Transforms of a state by the commands about objects: where they are, and how they look."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control import solid
+from katana450.arm.control.appearance import DisplayMode, LinkAppearance
+from katana450.arm.control.object_commands import MoveObject, SetAppearance
+from katana450.arm.control.pouring import Pouring
+from katana450.arm.control.scene_objects import (
+    Environment,
+    SceneObject,
+    named,
+    placed,
+    with_replaced,
+)
+from katana450.arm.control.state import State
+
+
+def with_scene_change(
+    environment: Environment, pouring: Pouring | None, state: State, command: cmd.Command
+) -> State:
+    """``state`` after a command about objects, the water, or how they are shown."""
+    x = state.x_setpoint
+    match command:
+        case cmd.PlaceObject(scene_object=scene_object):
+            return replace(state, objects=placed(state.objects, scene_object))
+        case cmd.Remove(name=name):
+            return removed(state, name)
+        case cmd.MoveObject():
+            return with_moved_object(state, command)
+        case cmd.SetAppearance():
+            return with_appearance(state, command)
+        case cmd.Attach(name=name, to=to):
+            mounted = tuple(
+                environment.mounted(each, to, x) if each.name == name else each
+                for each in state.objects
+            )
+            return replace(state, objects=mounted)
+        case cmd.ReplaceScene(objects=objects, volume=volume):
+            furnished = replace(state, objects=with_replaced(state.objects, objects))
+            return with_water(pouring, furnished, volume)
+        case cmd.Fill(volume=volume):
+            return with_water(pouring, state, volume)
+    raise AssertionError(f"The table of transitions has no rule for {command!r}.")
+
+
+def with_water(pouring: Pouring | None, state: State, volume: float | None) -> State:
+    """``state`` with ``volume`` [m^3] of water in the cup; None for no water."""
+    if volume is None:
+        return replace(state, poured=None)
+    assert pouring is not None
+    return replace(state, poured=pouring.fill(volume, state.objects, state.x_setpoint))
+
+
+def removed(state: State, name: str) -> State:
+    """Without the object of that name; what is held stays."""
+    objects = tuple(each for each in state.objects if each.held or each.name != name)
+    return replace(state, objects=objects)
+
+
+def with_moved_object(state: State, shift: MoveObject) -> State:
+    """With the object elsewhere, unless the hand has it."""
+
+    def there(scene_object: SceneObject) -> SceneObject:
+        if scene_object.name != shift.name or scene_object.carried:
+            return scene_object
+        T = np.array(scene_object.T)
+        if shift.position is not None:
+            T[:3, 3] = shift.position
+        if shift.R is not None:
+            T[:3, :3] = shift.R
+        return replace(scene_object, T=T)
+
+    return replace(state, objects=tuple(map(there, state.objects)))
+
+
+def appearance_of(state: State, name: str) -> LinkAppearance:
+    """How the link or object of that name is shown."""
+    scene_object = named(state.objects, name)
+    return state.appearance.of(name) if scene_object is None else _as_link(scene_object.appearance)
+
+
+def with_appearance(state: State, dress: SetAppearance) -> State:
+    """With one trait of a look changed. Objects bear theirs themselves."""
+
+    def changed(scene_object: SceneObject) -> SceneObject:
+        if scene_object.name != dress.name:
+            return scene_object
+        look = _as_link(scene_object.appearance).having(dress.trait, dress.value)
+        return replace(scene_object, appearance=_as_object(look))
+
+    if any(each.name == dress.name for each in state.objects):
+        return replace(state, objects=tuple(map(changed, state.objects)))
+    return replace(state, appearance=state.appearance.having(dress.name, dress.trait, dress.value))
+
+
+PAINT = (204, 204, 204)
+"""Of an object that is to be painted when nobody has mixed a colour."""
+
+
+def _as_link(look: solid.ObjectAppearance) -> LinkAppearance:
+    """An object's look in the words for a link's."""
+    painted = look.colour is not None or look.opacity < 1.0
+    choice = (
+        DisplayMode.HIDDEN if look.hidden else DisplayMode.PAINTED if painted else DisplayMode.MADE
+    )
+    if look.colour is None:
+        return LinkAppearance(choice, None, 1.0 - look.opacity)
+    red, green, blue = (part / 255.0 for part in look.colour)
+    return LinkAppearance(choice, (red, green, blue), 1.0 - look.opacity)
+
+
+def _as_object(look: LinkAppearance) -> solid.ObjectAppearance:
+    """The other way; an object as it is made has no paint to come back to."""
+    if look.choice is DisplayMode.MADE:
+        return solid.PLAIN
+    colour = None if look.choice is DisplayMode.HIDDEN else PAINT
+    if look.colour is not None:
+        red, green, blue = (round(255.0 * part) for part in look.colour)
+        colour = red, green, blue
+    opacity = max(1.0 - look.transparency, solid.MIN_OPACITY)
+    return solid.ObjectAppearance(colour, opacity, look.choice is DisplayMode.HIDDEN)

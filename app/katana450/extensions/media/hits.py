@@ -1,0 +1,117 @@
+"""What rays from the camera meet: a surface of an item, the floor, or nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from katana450.extensions.media.scene import Bools, Floats, Ints, RenderScene
+from katana450.extensions.media.tracer import NOTHING, Meeting, Tracer
+
+FLOOR, NOWHERE = -1, -2
+"""In place of the number of an item."""
+
+BACKGROUND_DISTANCE = 1e4
+"""[m] How far off what meets nothing is said to be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Of n rays.
+
+    Attributes:
+        directions: (n, 3) of the rays.
+        distance: (n,) [m].
+        points: (n, 3) where each ends, in the base frame [m].
+        normals, flat: (n, 3) unit normals towards the camera, as shaded and as they are.
+        item: (n,) numbers of items, FLOOR or NOWHERE.
+    """
+
+    directions: Floats
+    distance: Floats
+    points: Floats
+    normals: Floats
+    flat: Floats
+    item: Ints
+
+    @property
+    def solid(self) -> Bools:
+        """(n,) whether each meets an item."""
+        return np.asarray(self.item >= 0)
+
+    def some(self, which: Bools) -> Hits:
+        """Of the rays alone that ``which`` (n,) says."""
+        return Hits(
+            self.directions[which],
+            self.distance[which],
+            self.points[which],
+            self.normals[which],
+            self.flat[which],
+            self.item[which],
+        )
+
+
+def first_hits(
+    scene: RenderScene, tracer: Tracer, eye: Floats, directions: Floats, floor: float
+) -> Hits:
+    """From ``eye`` (3,) along ``directions`` (n, 3). floor: its height [m]."""
+    met = tracer.first(_from(eye, directions), directions)
+    down = directions[:, 2]
+    to_floor = np.full(len(directions), BACKGROUND_DISTANCE, dtype=np.float32)
+    np.divide(floor - eye[2], down, out=to_floor, where=down < -STEEPNESS)
+    nearest = np.minimum(met.distance, BACKGROUND_DISTANCE)
+    on_floor = (to_floor > 0.0) & (to_floor < nearest)
+    distance = np.where(on_floor, to_floor, nearest).astype(np.float32)
+    hit = np.flatnonzero(met.face != NOTHING)
+    normals = np.zeros_like(directions)
+    normals[:, 2] = 1.0
+    flat = normals.copy()
+    normals[hit], flat[hit] = _normals(scene, met, directions, hit)
+    item = np.where(on_floor, FLOOR, NOWHERE).astype(np.int32)
+    item[hit] = scene.item[met.face[hit]]
+    points = _ends(eye, distance, directions)
+    return Hits(directions, distance, points, normals, flat, item)
+
+
+def hits_behind(
+    scene: RenderScene, tracer: Tracer, eye: Floats, before: Hits
+) -> tuple[np.typing.NDArray[np.intp], Hits]:
+    """What rays meet in another scene ``before`` they end: numbers (m,) of those that do."""
+    met = tracer.first(_from(eye, before.directions), before.directions)
+    hit = np.flatnonzero(met.distance < before.distance)
+    directions, distance = before.directions[hit], met.distance[hit]
+    normals, flat = _normals(scene, met, before.directions, hit)
+    points = _ends(eye, distance, directions)
+    return hit, Hits(directions, distance, points, normals, flat, scene.item[met.face[hit]])
+
+
+def _from(eye: Floats, directions: Floats) -> Floats:
+    return np.tile(eye, (len(directions), 1))
+
+
+def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
+    return np.asarray(eye + distance[:, None] * directions, dtype=np.float32)
+
+
+def _normals(
+    scene: RenderScene, met: Meeting, directions: Floats, hit: np.typing.NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """Unit normals (m, 3) where the rays ``hit`` end: as shaded, and of the triangles."""
+    face = met.face[hit]
+    a, b, c = (scene.normals[scene.faces[face, corner]] for corner in range(3))
+    second, third = met.second[hit, None], met.third[hit, None]
+    smooth = a + second * (b - a) + third * (c - a)
+    size = np.sqrt(np.einsum("ni,ni->n", smooth, smooth))[:, None]
+    plane = scene.flat[face]
+    # An open surface is seen from either side.
+    inside = np.einsum("ni,ni->n", plane, directions[hit]) > 0.0
+    side = np.where(inside, np.float32(-1.0), np.float32(1.0))[:, None]
+    shaded = np.where(size > MIN_DENOMINATOR, smooth / np.maximum(size, MIN_DENOMINATOR), plane)
+    return side * shaded, side * plane
+
+
+STEEPNESS = 1e-6
+"""Sine below which a ray is level."""
+
+MIN_DENOMINATOR = np.float32(1e-6)

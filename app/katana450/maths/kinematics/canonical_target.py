@@ -1,0 +1,121 @@
+"""What is asked of the canonical arm: a point, and an orientation as the arm's plane sees it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from katana450 import tolerances
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import FiveAxisArm, Vector
+from katana450.maths.kinematics.branch import Shoulder
+from katana450.maths.kinematics.orientation import PlaneOrientation
+from katana450.maths.kinematics.priority import Priority
+
+
+class CanonicalTarget(NamedTuple):
+    """A wish in {C}; lengths in m, angles in rad.
+
+    x, y, z: where the point of {K} is to be, or one that is `beside` it as the plane sees it.
+    tool: where the tool point is to be. along: the roll axis asked for, or None where any plane
+    will do. orientation: of {K} with the plane at theta1 = 0, or in any where any will do.
+    inward: whether the roll axis points towards axis 1; None where the plane at theta1 shows it.
+    Counts only where the yaw does not.
+    """
+
+    x: float
+    y: float
+    z: float
+    beside: Vector
+    tool: Vector
+    along: Vector | None
+    orientation: PlaneOrientation
+    priority: Priority
+    inward: bool | None = None
+
+    @staticmethod
+    def pose(T_C_K: FloatArray, tool: Vector, priority: Priority) -> CanonicalTarget:
+        """The pose `T_C_K` (4, 4), with the place of its `tool` point."""
+        (a, _, _, x), (d, _, _, y), (g, _, _, z), _ = T_C_K.tolist()
+        orientation = PlaneOrientation.of(T_C_K[:3, :3])
+        return CanonicalTarget(x, y, z, (0.0, 0.0, 0.0), tool, (a, d, g), orientation, priority)
+
+    @staticmethod
+    def five(
+        arm: FiveAxisArm, tool: Vector, pitch: float, roll: float, priority: Priority
+    ) -> CanonicalTarget:
+        """The five freedoms: the `tool` point, and a pitch and roll in the arm's own plane."""
+        orientation = PlaneOrientation.turned(pitch, roll)
+        beside = arm.beside(pitch, roll)
+        return CanonicalTarget(*tool, beside, tool, None, orientation, priority)
+
+    def seen_from(self, theta1: float) -> PlaneOrientation:
+        """The orientation wanted in the plane at `theta1`."""
+        if self.along is None:
+            return self.orientation
+        seen = self.orientation.seen_from(theta1)
+        if self.priority is Priority.POSE:
+            return seen
+        pitch = self.pitch(theta1)
+        if seen.overlap(pitch) <= tolerances.TOUCHING:
+            # Half a turn away every roll is equally near, so take the one asked for.
+            seen = self.orientation.seen_from(theta1 + math.pi)
+        return PlaneOrientation.turned(pitch, seen.best_roll(pitch))
+
+    def heading(self, theta1: float) -> Vector:
+        """The roll axis asked for, as the plane at `theta1` sees it: outward, sideways and down."""
+        if self.along is None:
+            pitch = self.pitch(theta1)
+            return math.cos(pitch), 0.0, math.sin(pitch)
+        dx, dy, dz = self.along
+        c, s = math.cos(theta1), math.sin(theta1)
+        return c * dx + s * dy, c * dy - s * dx, -dz
+
+    def pitch(self, theta1: float) -> float:
+        """Of the roll axis below the horizontal, past the vertical when it points inwards.
+
+        As the plane at `theta1` sees it, or its true one if only that counts.
+        """
+        if self.along is None:
+            return self.orientation.best()[0]
+        outward, sideways, down = self.heading(theta1)
+        if self.priority is not Priority.POSE:
+            flat = math.hypot(outward, sideways)
+            inward = outward < 0.0 if self.inward is None else self.inward
+            outward = -flat if inward else flat
+        return math.atan2(down, outward)
+
+    @property
+    def on_axis(self) -> bool:
+        """Whether the point is on axis 1, which leaves theta1 free."""
+        return math.hypot(self.x, self.y) <= tolerances.ON_AXIS
+
+    def aside(self, arm: FiveAxisArm) -> float:
+        """Where the point is to be in the arm's plane, sideways from axis 1 [m]."""
+        return arm.d + self.beside[1]
+
+    def facing(self, arm: FiveAxisArm, shoulder: Shoulder) -> float | None:
+        """The theta1 of a plane that has the point on the side of `shoulder`; None on axis 1."""
+        if self.on_axis:
+            return None
+        d, rho = self.aside(arm), math.hypot(self.x, self.y)
+        u = math.sqrt(max(rho - abs(d), 0.0) * (rho + abs(d)))
+        return self.aligned(arm, u if shoulder == "front" else -u)
+
+    def aligned(self, arm: FiveAxisArm, u: float) -> float:
+        """The theta1 that turns a place `u` [m] outward in the plane towards the point."""
+        return math.atan2(self.y, self.x) - math.atan2(self.aside(arm), u)
+
+    def pitched(self, arm: FiveAxisArm, pitch: float) -> CanonicalTarget:
+        """The same five freedoms but for the `pitch`."""
+        return CanonicalTarget.five(
+            arm, self.tool, pitch, self.orientation.best()[1], self.priority
+        )
+
+    def faced(self, *, inward: bool) -> CanonicalTarget:
+        """The same with the roll axis pointing towards axis 1, or away from it."""
+        return self._replace(inward=inward)
+
+    def moved(self, dx: float, dy: float, dz: float) -> CanonicalTarget:
+        """With another point, and the tool point asked as before."""
+        return self._replace(x=self.x + dx, y=self.y + dy, z=self.z + dz)

@@ -1,0 +1,218 @@
+"""The panel of objects: choose one, colour, scale, turn, attach and remove it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import viser
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.scene_objects import (
+    MAX_SCALE,
+    MIN_SCALE,
+    Attachment,
+    Environment,
+    SceneObject,
+    named,
+)
+from katana450.arm.control.solid import MIN_OPACITY, ObjectAppearance
+from katana450.arm.control.state import State
+from katana450.arm.control.support import check_mounted
+from katana450.errors import InputError, KatanaError
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import frozen
+from katana450.server.view.controls import GestureGate, refuse, set_value
+from katana450.server.view.scene_objects import COLOUR
+
+NOTHING = "nothing yet"
+
+MOUNTS = {"Hand": Attachment.HAND, "Table": Attachment.TABLE, "Here": Attachment.WORLD}
+
+OWN, REMOVE = "Own colour", "Remove"
+
+
+class ObjectsPanel:
+    """A folder of controls, all of the one object that is chosen."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        gestures: GestureGate,
+        state: Callable[[], State],
+        environment: Environment,
+    ) -> None:
+        """``state``: the newest. ``surroundings``: what objects stand on and are fixed to."""
+        self._environment = environment
+        self._gestures = gestures
+        self._state = state
+        self._objects = state().objects
+        self._shown: SceneObject | None = None
+        gui = server.gui
+        names = _names(self._objects)
+        with gui.add_folder("Objects", expand_by_default=False):
+            self._choice = gui.add_dropdown(
+                "Object", names, hint="What the rest of this folder is about"
+            )
+            self._colour = gui.add_rgb("Colour", COLOUR)
+            self._opacity = gui.add_slider(
+                "Opacity",
+                min=100.0 * MIN_OPACITY,
+                max=100.0,
+                step=1.0,
+                initial_value=100.0,
+                hint="Percent; for contacts it counts whole whatever it looks like",
+            )
+            self._scale = gui.add_number(
+                "Scale",
+                1.0,
+                min=MIN_SCALE,
+                max=MAX_SCALE,
+                step=0.001,
+                hint="Times the size it came with",
+            )
+            self._turn = gui.add_slider(
+                "Turn",
+                min=-180.0,
+                max=180.0,
+                step=1.0,
+                initial_value=0.0,
+                hint="About the vertical, degrees",
+            )
+            self._hidden = gui.add_checkbox(
+                "Hidden",
+                initial_value=False,
+                hint="Not drawn; the arm keeps clear of it even so",
+            )
+            self._mounts = gui.add_button_group(
+                "Attach to",
+                tuple(MOUNTS),
+                hint="Hand: it goes with the hand and counts as a part of it. Table: it is set "
+                "down below. Here: it stays where it is, in the air too",
+            )
+            self._acts = gui.add_button_group("And", (OWN, REMOVE))
+        self._on(self._colour, lambda scene_object: _recoloured(scene_object, self._colour.value))
+        self._on(
+            self._opacity,
+            lambda scene_object: _looking(
+                scene_object, opacity=max(0.01 * self._opacity.value, MIN_OPACITY)
+            ),
+        )
+        self._on(self._scale, lambda scene_object: _scaled(scene_object, self._scale.value))
+        self._on(
+            self._turn, lambda scene_object: _turned(scene_object, math.radians(self._turn.value))
+        )
+        self._on(
+            self._hidden, lambda scene_object: _looking(scene_object, hidden=self._hidden.value)
+        )
+        self._on(self._mounts, self._mounted)
+        self._on(self._acts, self._acted)
+        self._choice.on_update(lambda _: self._show(self._chosen(), anew=True))
+        self._show(self._chosen(), anew=True)
+
+    def follow(self, state: State, *, caught_up: bool) -> None:
+        """Show what there is. ``caught_up``: see ``Panel``."""
+        if not caught_up:
+            return
+        self._objects = state.objects
+        names = _names(state.objects)
+        if names != tuple(self._choice.options):
+            new = [name for name in names if name not in self._choice.options]
+            chosen = self._choice.value
+            self._choice.options = names
+            if new or chosen not in names:
+                # What has just come is what one wants to touch.
+                chosen = new[-1] if new else names[0]
+            set_value(self._choice, chosen)
+        self._show(self._chosen())
+
+    def _chosen(self) -> SceneObject | None:
+        return named(self._objects, self._choice.value)
+
+    def _show(self, scene_object: SceneObject | None, *, anew: bool = False) -> None:
+        if scene_object is None or (scene_object is self._shown and not anew):
+            return
+        self._shown = scene_object
+        set_value(self._colour, scene_object.appearance.colour or COLOUR)
+        set_value(self._opacity, round(100.0 * scene_object.appearance.opacity, 1))
+        set_value(self._scale, scene_object.scale)
+        set_value(self._hidden, scene_object.appearance.hidden)
+        yaw = math.degrees(so3.to_rpy(scene_object.T[:3, :3])[2])
+        if abs(math.remainder(self._turn.value - yaw, 360.0)) > 0.5:
+            set_value(self._turn, round(yaw) + 0.0)
+
+    def _mounted(self, scene_object: SceneObject) -> cmd.Command:
+        to, state = MOUNTS[self._mounts.value], self._state()
+        check_mounted(self._environment, state.objects, scene_object, to, state.x)
+        return cmd.Attach(scene_object.name, to)
+
+    def _acted(self, scene_object: SceneObject) -> cmd.Command:
+        if self._acts.value == REMOVE:
+            if scene_object.held:
+                raise InputError(f"{scene_object.name!r} is held: open the gripper first.")
+            return cmd.Remove(scene_object.name)
+        return _looking(scene_object, colour=None)
+
+    def _on(self, handle: Any, say: Callable[[SceneObject], cmd.Command]) -> None:
+        """Send what ``say`` makes of the chosen object when a person changes ``handle``."""
+
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is None:
+                return
+            try:
+                # What is shown may be older than what was put there meanwhile.
+                self._objects = self._state().objects
+                scene_object = self._chosen()
+                if scene_object is None:
+                    raise InputError("There is no object: add one first.")
+                self._gestures.submit(say(scene_object), self._gestures.actor(event.client_id))
+            except KatanaError as error:
+                self._show(self._chosen(), anew=True)
+                refuse(event, error)
+
+        if isinstance(handle, viser.GuiButtonGroupHandle):
+            handle.on_click(changed)
+        else:
+            handle.on_update(changed)
+
+
+def _placed(scene_object: SceneObject, **changes: Any) -> cmd.Command:
+    if scene_object.held:
+        raise InputError(f"{scene_object.name!r} is held: open the gripper first.")
+    return cmd.PlaceObject(replace(scene_object, **changes))
+
+
+def _looking(scene_object: SceneObject, **changes: Any) -> cmd.Command:
+    return _placed(scene_object, appearance=replace(scene_object.appearance, **changes))
+
+
+def _recoloured(scene_object: SceneObject, value: tuple[int, int, int]) -> cmd.Command:
+    red, green, blue = (int(each) for each in value)
+    return _placed(
+        scene_object,
+        appearance=ObjectAppearance(
+            (red, green, blue), scene_object.appearance.opacity, scene_object.appearance.hidden
+        ),
+    )
+
+
+def _scaled(scene_object: SceneObject, scale: float) -> cmd.Command:
+    if scene_object.name in (CUP, BASIN):
+        raise InputError(f"The {scene_object.name} is as large as the water in it counts on.")
+    return _placed(scene_object, scale=float(scale))
+
+
+def _turned(scene_object: SceneObject, yaw: float) -> cmd.Command:
+    """About the z axis of the frame that it is in, where it stands."""
+    roll, pitch, _ = so3.to_rpy(scene_object.T[:3, :3])
+    T = np.array(scene_object.T)
+    T[:3, :3] = so3.from_rpy(roll, pitch, yaw)
+    return _placed(scene_object, T=frozen(T))
+
+
+def _names(objects: tuple[SceneObject, ...]) -> tuple[str, ...]:
+    return tuple(scene_object.name for scene_object in objects) or (NOTHING,)

@@ -1,0 +1,319 @@
+"""What stands around or is carried: where it is, and handles to put it elsewhere."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import trimesh
+import viser
+
+from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands import PlaceObject
+from katana450.arm.control.scene_objects import Environment, SceneObject, Shape
+from katana450.arm.control.solid import Solid
+from katana450.arm.control.state import State
+from katana450.arm.control.support import check_carried, is_loose
+from katana450.arm.robot.creases import Drawn, drawn, glb
+from katana450.arm.robot.object_meshes import Meshes
+from katana450.arm.robot.props import Props
+from katana450.arm.robot.visual import Visual
+from katana450.errors import InputError, KatanaError
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.server.view.controls import GestureGate, refuse
+from katana450.server.view.tint import Tint
+from katana450.server.viser_bridge.guard import WORKSPACE
+from katana450.server.viser_bridge.posing import place, turn
+
+HANDLE = 0.09
+"""[m] Length of a handle's arrows: they end outside cup and basin."""
+
+COLOUR = (148, 163, 184)
+"""Of what has none of its own."""
+
+COAT = 1.005
+"""[1] A coat is so much larger, that it does not flicker with what it coats."""
+
+FACETS = 48
+"""Of what is round."""
+
+
+class ThingNodes:
+    """A frame an object with its shape in it, made anew when that is another."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        props: Props,
+        environment: Environment,
+        gestures: GestureGate,
+        meshes: Meshes,
+    ) -> None:
+        """``meshes``: those that objects are of."""
+        self._server = server
+        self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
+        self._environment = environment
+        self._gestures = gestures
+        self._meshes = meshes
+        self._frames: dict[str, viser.FrameHandle] = {}
+        self._shapes: dict[str, _Shape] = {}
+        self._handles: dict[str, viser.TransformControlsHandle] = {}
+        self._made = 0
+        self._objects: dict[str, SceneObject] = {}
+        self._seen: tuple[SceneObject, ...] = ()
+        self._dragged: tuple[str, Actor] | None = None
+        self._wanted = False
+
+    def show_handles(self, visible: bool) -> None:
+        """Show or hide the handles."""
+        self._wanted = visible
+        for name, handle in self._handles.items():
+            scene_object = self._objects.get(name)
+            wanted = visible and scene_object is not None and not scene_object.carried
+            if handle.visible != wanted:
+                handle.visible = wanted
+
+    def follow(self, state: State) -> None:
+        """Put everything where ``state`` has it."""
+        changed = state.objects is not self._seen
+        if changed:
+            self._take_in(state.objects)
+        near = state.near
+        for scene_object in state.objects:
+            if changed or scene_object.carried:
+                self._pose(scene_object, state.x)
+            if scene_object.name not in self._props:
+                self._shapes[scene_object.name].warn(scene_object, near=scene_object.name in near)
+
+    def _take_in(self, objects: tuple[SceneObject, ...]) -> None:
+        self._seen = objects
+        self._objects = {scene_object.name: scene_object for scene_object in objects}
+        for name in set(self._frames) - set(self._objects):
+            self._take_away(name)
+        for scene_object in objects:
+            if scene_object.name not in self._frames:
+                self._add(scene_object.name)
+            frame, shape = self._frames[scene_object.name], self._shapes[scene_object.name]
+            shape.follow(scene_object)
+            if frame.visible == scene_object.appearance.hidden:
+                frame.visible = not scene_object.appearance.hidden
+        self.show_handles(self._wanted)
+
+    def _pose(self, scene_object: SceneObject, x: FloatArray) -> None:
+        T = self._environment.pose(scene_object, x)
+        px, py, pz = T[:3, 3].tolist()
+        w, i, j, k = so3.to_quaternion(T[:3, :3]).tolist()
+        place(self._frames[scene_object.name], (px, py, pz))
+        turn(self._frames[scene_object.name], (w, i, j, k))
+        if not self._holds(scene_object.name):
+            place(self._handles[scene_object.name], (px, py, pz))
+
+    def _add(self, name: str) -> None:
+        self._made += 1
+        path = f"/{name}" if name in self._props else f"/objects/{self._made}"
+        self._frames[name] = self._server.scene.add_frame(path, show_axes=False)
+        self._shapes[name] = _Shape(self._server, path, self._meshes, self._props.get(name))
+        self._handles[name] = self._handle(name)
+
+    def _take_away(self, name: str) -> None:
+        if name in self._props:
+            # Others hang shapes of their own on it.
+            self._frames[name].visible = False
+            return
+        del self._shapes[name]
+        self._frames.pop(name).remove()
+        self._handles.pop(name).remove()
+
+    def _handle(self, name: str) -> viser.TransformControlsHandle:
+        handle = self._server.scene.add_transform_controls(
+            f"/handles/{self._made}",
+            scale=HANDLE,
+            line_width=3.0,
+            active_axes=(True, True, False),
+            disable_rotations=True,
+            depth_test=False,
+            translation_limits=((-WORKSPACE, WORKSPACE),) * 2 + ((0.0, 0.0),),
+            visible=False,
+        )
+
+        @handle.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            self._moved(name, event)
+
+        return handle
+
+    def _moved(self, name: str, event: viser.TransformControlsEvent) -> None:
+        scene_object, actor = self._objects.get(name), self._gestures.actor(event.client_id)
+        if event.phase == "start":
+            self._dragged = name, actor
+        if scene_object is None or scene_object.carried or self._dragged != (name, actor):
+            return
+        if event.phase == "end":
+            self._dragged = None
+        x, y, _ = (float(each) for each in event.target.position)
+        T = se3.from_rotation_translation(
+            scene_object.T[:3, :3], (x, y, float(scene_object.T[2, 3]))
+        )
+        moved = replace(scene_object, T=T)
+        try:
+            if is_loose(moved):
+                check_carried(self._environment.table, self._seen, moved)
+        except InputError as error:
+            # It waits at the edge, and the handle comes back to it.
+            if event.phase == "end":
+                px, py, pz = scene_object.T[:3, 3].tolist()
+                place(self._handles[name], (px, py, pz))
+                refuse(event, error)
+            return
+        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        with suppress(KatanaError):
+            self._gestures.submit(PlaceObject(moved), actor)
+
+    def _holds(self, name: str) -> bool:
+        dragged = self._dragged
+        return dragged is not None and dragged[0] == name and self._gestures.is_current(dragged[1])
+
+
+class _Shape:
+    """What of an object is drawn: a file in its own colours, or a surface in one colour."""
+
+    def __init__(
+        self, server: viser.ViserServer, path: str, meshes: Meshes, prop: Any = None
+    ) -> None:
+        """``prop``: the GLB file of what has one and is no other form."""
+        self._scene = server.scene
+        self._path = f"{path}/shape"
+        self._coat_path = f"{path}/contact"
+        self._coat: viser.MeshHandle | None = None
+        self._meshes = meshes
+        self._prop = prop
+        self._node: Any = None
+        self._is: tuple[object, ...] = ()
+
+    def follow(self, scene_object: SceneObject) -> None:
+        """Look as ``scene_object`` does; sends only what is new."""
+        own = scene_object.appearance.colour is None and self._own(scene_object) is not None
+        key = None if scene_object.solid is None else scene_object.solid.key
+        # A file is sent anew for another opacity, a surface is not.
+        now = (
+            scene_object.shape,
+            scene_object.size,
+            key,
+            own,
+            scene_object.appearance.opacity if own else None,
+        )
+        if now != self._is:
+            self._is = now
+            self._node = self._made(scene_object, own=own)
+            if self._coat is not None:
+                self._coat.remove()
+                self._coat = None
+        if not own:
+            _set(self._node, "color", scene_object.appearance.colour or COLOUR)
+            _set(self._node, "opacity", _opacity(scene_object))
+        _set(self._node, "scale", scene_object.scale)
+
+    def warn(self, scene_object: SceneObject, *, near: bool) -> None:
+        """Coat it, as long as the arm is ``near``, in what it counts as."""
+        if self._coat is None and near:
+            body = _plain(scene_object) if scene_object.solid is None else _hull(scene_object.solid)
+            surface = _of(body)
+            self._coat = self._scene.add_mesh_simple(
+                self._coat_path,
+                (COAT * surface.vertices).astype(np.float32),
+                surface.faces.astype(np.uint32),
+                color=Tint.COLOUR,
+                opacity=Tint.OPACITY,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        if self._coat is not None:
+            _set(self._coat, "visible", near)
+            _set(self._coat, "scale", scene_object.scale)
+
+    def _made(self, scene_object: SceneObject, *, own: bool) -> Any:
+        # viser replaces the node of the name.
+        if own:
+            return self._scene.add_glb(
+                self._path, self._own(scene_object) or b"", scale=scene_object.scale
+            )
+        surface = self._surface(scene_object)
+        return self._scene.add_mesh_simple(
+            self._path,
+            surface.vertices.astype(np.float32),
+            surface.faces.astype(np.uint32),
+            color=scene_object.appearance.colour or COLOUR,
+            opacity=_opacity(scene_object),
+            side="double" if scene_object.shape is Shape.MESH else "front",
+            scale=scene_object.scale,
+        )
+
+    def _own(self, scene_object: SceneObject) -> bytes | None:
+        """A GLB file of it in its own colours; None where it has none."""
+        if scene_object.solid is not None:
+            mesh = self._meshes.get(scene_object.solid.key)
+            if mesh is None or mesh.colours is None:
+                return None
+            return glb(mesh.drawn, scene_object.appearance.opacity)
+        if self._prop is None or scene_object.appearance.opacity < 1.0:
+            return None
+        return bytes(self._prop.read_bytes())
+
+    def _surface(self, scene_object: SceneObject) -> Drawn:
+        if scene_object.solid is not None:
+            mesh = self._meshes.get(scene_object.solid.key)
+            if mesh is not None:
+                return mesh.drawn
+            # Known to the arm from before this process began.
+            return _of(_hull(scene_object.solid))
+        if self._prop is not None:
+            made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop).mesh
+            made.merge_vertices(merge_tex=True, merge_norm=True)
+            return _of(made)
+        return _of(_plain(scene_object))
+
+
+def _hull(solid: Solid) -> Any:
+    """What a mesh counts as."""
+    return trimesh.Trimesh(solid.corners).convex_hull
+
+
+def form(scene_object: SceneObject) -> Any:
+    """A trimesh of it as large as it is, on z = 0 of its own frame [m]; of a mesh, its hull."""
+    made = _hull(scene_object.solid) if scene_object.solid is not None else _plain(scene_object)
+    made.apply_scale(scene_object.scale)
+    return made
+
+
+def _plain(scene_object: SceneObject) -> Any:
+    """A trimesh of its form, at scale 1."""
+    match scene_object.shape:
+        case Shape.BOX:
+            made, height = trimesh.creation.box(scene_object.size), scene_object.size[2]
+        case Shape.CYLINDER:
+            radius, height = scene_object.size
+            made = trimesh.creation.cylinder(radius, height, sections=FACETS)
+        case _:
+            height = 2.0 * scene_object.size[0]
+            made = trimesh.creation.icosphere(subdivisions=3, radius=scene_object.size[0])
+    made.apply_translation((0.0, 0.0, 0.5 * height))
+    return made
+
+
+def _of(mesh: Any) -> Drawn:
+    return drawn(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def _opacity(scene_object: SceneObject) -> float | None:
+    return None if scene_object.appearance.opacity == 1.0 else scene_object.appearance.opacity
+
+
+def _set(node: Any, name: str, value: object) -> None:
+    known = getattr(node, name)
+    if isinstance(known, np.ndarray):
+        known = tuple(known.tolist())
+    if known != value:
+        setattr(node, name, value)

@@ -1,0 +1,103 @@
+"""The few corners that stand for a mesh hold all of it, and not much more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from katana450.errors import InputError
+from katana450.maths.collision.convex_body import (
+    MAX_CORNERS,
+    MIN_THICKNESS_FRACTION,
+    ConvexBody,
+    convex_body,
+)
+from katana450.maths.collision.shape import hull
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+
+
+def check_holds(found: ConvexBody, points: FloatArray) -> None:
+    """By the planes of another hull: that of trimesh, which asks qhull itself."""
+    assert 4 <= len(found.corners) <= MAX_CORNERS
+    mesh = trimesh.Trimesh(found.corners).convex_hull
+    heights = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles[:, 0])
+    assert (points @ mesh.face_normals.T - heights).max() <= 1e-6 * np.ptp(points, axis=0).max()
+    # What coal, which ends the program over bodies without a volume, takes.
+    hull(found.corners)
+
+
+@given(
+    st.integers(4, 300),
+    st.integers(0, 2**32 - 1),
+    st.tuples(*(st.sampled_from((0.0, 1e-4, 0.01, 0.3, 1.0)),) * 3).filter(any),
+    st.floats(0.01, 100.0),
+)
+@settings(max_examples=25, deadline=None)
+def test_any_points_are_held(
+    count: int, seed: int, stretch: tuple[float, ...], scale: float
+) -> None:
+    random = np.random.default_rng(seed)
+    points = random.normal(size=(count, 3)) * stretch * scale
+    points = points @ so3.exp(random.normal(size=3)).T + random.normal(size=3)
+    check_holds(convex_body(points), points)
+
+
+@pytest.mark.parametrize("count", [300, 30_000])
+def test_points_all_on_a_sphere_are_held(count: int) -> None:
+    """Every one is a corner of the true hull, and more than are looked for."""
+    points = np.random.default_rng(3).normal(size=(count, 3))
+    points = 0.1 * points / np.linalg.norm(points, axis=1, keepdims=True)
+    found = convex_body(points)
+    check_holds(found, points)
+    assert found.off < 0.02
+    assert found.volume == pytest.approx(4.0 / 3.0 * np.pi * 0.1**3, rel=0.07)
+
+
+def test_a_box_of_many_triangles_is_a_box() -> None:
+    box = trimesh.creation.box((0.1, 0.2, 0.3)).subdivide().subdivide()
+    points = box.vertices @ so3.exp((0.3, -0.2, 0.5)).T
+    found = convex_body(points)
+    check_holds(found, points)
+    assert len(found.corners) == 8
+    assert found.off == 0.0
+    assert not found.thickened
+    assert found.volume == pytest.approx(0.006, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "most"),
+    [
+        (trimesh.creation.icosphere(3, radius=0.05), 0.1 * 0.05),
+        (trimesh.creation.cylinder(0.05, 0.2, sections=64), 0.02 * 0.05),
+        (trimesh.creation.torus(0.1, 0.03, 40, 30), 0.1 * 0.13),
+    ],
+    ids=["ball", "cylinder", "ring"],
+)
+def test_what_is_round_is_held_nearly(mesh: trimesh.Trimesh, most: float) -> None:
+    found = convex_body(mesh.vertices)
+    check_holds(found, mesh.vertices)
+    assert 0.0 < found.off < most
+    assert found.volume == pytest.approx(mesh.convex_hull.volume, rel=0.02)
+    # How far it stands off is measured anew, from the hull that trimesh finds.
+    true = mesh.convex_hull
+    heights = np.einsum("ij,ij->i", true.face_normals, true.triangles[:, 0])
+    assert (found.corners @ true.face_normals.T - heights).max() >= found.off - 1e-9
+
+
+@pytest.mark.parametrize("flat", [(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)], ids=["sheet", "wire"])
+def test_what_is_flat_is_given_a_thickness(flat: tuple[float, ...]) -> None:
+    points = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 3)) * flat
+    found = convex_body(points @ so3.exp((0.3, 0.4, 0.5)).T)
+    assert found.thickened
+    spread = np.linalg.svd(found.corners - found.corners.mean(axis=0))[1]
+    assert spread[-1] > 0.1 * MIN_THICKNESS_FRACTION
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.ones((7, 3)), [[np.nan, 0.0, 0.0]]])
+def test_invalid_body_is_refused(points: FloatArray) -> None:
+    with pytest.raises(InputError):
+        convex_body(points)

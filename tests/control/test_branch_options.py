@@ -1,0 +1,251 @@
+"""Readings and branches: what a person chooses, and what the arm makes of it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.branch_options import branch_options
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import JointTarget, PoseTarget, Reason, State, Status, ToolTarget
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.priority import Priority
+
+TICK = 0.01
+SPLIT = np.array([0.4353, 0.0, 0.0323])
+"""A place that front-up reaches with pitches in two ranges, and the way across its edge."""
+SPLIT_PITCH = -0.205
+ACROSS = np.array([-0.81, 0.0, -0.586])
+OUT, _, UP = np.eye(3)
+
+
+def take(session: Session, state: State, *commands: cmd.Command) -> State:
+    return session.step(state, commands, state.t + TICK)
+
+
+def reasons(state: State) -> list[Reason]:
+    return [finding.reason for finding in state.findings]
+
+
+def point(arm: ArmModel, q: FloatArray) -> FloatArray:
+    return forward(arm.chain, q)[:3, 3]
+
+
+def at_the_edge(session: Session, state: State) -> State:
+    """Dragged slowly until the limits let the pitch go no further."""
+    T = se3.from_rotation_translation(so3.rotation_y(SPLIT_PITCH), SPLIT - 0.02 * ACROSS)
+    before = take(session, state, cmd.SetPose(T), cmd.EndDrag())
+    assert before.status is Status.OK
+    for along in np.arange(-0.02, 0.02, 5e-4):
+        before = take(session, before, cmd.MoveTool(SPLIT + along * ACROSS))
+    return before
+
+
+def test_held_at_the_edge_of_a_gap_the_panel_can_say_why(session: Session, state: State) -> None:
+    held = at_the_edge(session, state)
+    assert held.status is Status.GAP
+    first = held.findings[0]
+    assert first.reason is Reason.ACROSS_GAP
+    assert first.axis in (1, 3)
+    assert first.amount > 1.0
+    # The place itself is not out of reach, and it is not said to be.
+    assert Reason.OUT_OF_REACH not in reasons(held)
+
+
+def test_a_person_may_ask_for_the_other_side_of_a_gap(
+    arm: ArmModel, session: Session, state: State
+) -> None:
+    held = at_the_edge(session, state)
+    across = take(session, held, cmd.TakeBranch(held.branch))
+    assert across.branch == held.branch
+    assert np.abs(across.goal - held.goal).max() > 1.0
+    wish = SPLIT + 0.0195 * ACROSS
+    assert np.allclose(point(arm, across.goal), wish, atol=1e-9)
+    assert across.status is Status.LIMITED
+    assert isinstance(across.target, ToolTarget)
+    # From there the drag goes on.
+    on = take(session, across, cmd.MoveTool(wish + 0.001 * ACROSS))
+    assert np.abs(on.goal - across.goal).max() < 0.1
+    assert on.status is not Status.GAP
+
+
+def test_typed_poses_and_joints_leap_at_joint_speed(
+    arm: ArmModel, session: Session, state: State
+) -> None:
+    held = at_the_edge(session, state)
+    R = so3.rotation_y(SPLIT_PITCH)
+    T = se3.from_rotation_translation(R, SPLIT + 0.0195 * ACROSS)
+    typed = take(session, held, cmd.SetPose(T))
+    assert np.allclose(point(arm, typed.goal), T[:3, 3], atol=1e-9)
+    assert np.abs(typed.goal - held.goal).max() > 1.0
+    assert (np.abs(typed.setpoint - held.setpoint) <= arm.chain.speed * TICK * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("branch", BRANCHES, ids=str)
+def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
+    arm: ArmModel, session: Session, state: State, branch: Branch
+) -> None:
+    """From a place that all four branches reach: high over the base."""
+    T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
+    state = take(session, state, cmd.SetPose(T), cmd.EndDrag())
+    metrics = branch_options(arm, state)[BRANCHES.index(branch)].metrics
+    taken = take(session, state, cmd.TakeBranch(branch))
+    assert taken.branch == branch
+    assert isinstance(taken.target, JointTarget)
+    assert np.allclose(taken.goal, metrics.q, atol=1e-12)
+    while taken.moving:
+        before = taken.setpoint
+        taken = take(session, taken)
+        step = np.abs(taken.setpoint - before)
+        assert (step <= arm.chain.speed * TICK * (1 + 1e-9)).all()
+        assert arm.chain.within_limits(taken.setpoint, slack=0.0)
+    on = branch_of(arm.chain, taken.setpoint)
+    assert on == branch
+    # Dragging keeps to it from now on.
+    dragged = take(session, taken, cmd.MoveTool(point(arm, taken.goal) - 0.01 * UP))
+    assert dragged.branch == branch
+    assert branch_of(arm.chain, dragged.goal) == branch
+
+
+def test_target_is_kept_on_the_other_shoulder(
+    arm: ArmModel, session: Session, state: State
+) -> None:
+    """Pitch and roll are counted in the arm's plane, which then faces the other way."""
+    wish = np.array([0.05, 0.02, 0.40])
+    for fraction in np.linspace(0.05, 1.0, 20):
+        start = point(arm, session.ready)
+        state = take(session, state, cmd.MoveTool(start + fraction * (wish - start)))
+    assert isinstance(state.target, ToolTarget)
+    back = take(session, state, cmd.TakeBranch(Branch("back", "up")))
+    assert isinstance(back.target, ToolTarget)
+    for each in (state, back):
+        assert isinstance(each.target, ToolTarget)
+    T, T_back = (
+        each.pose(arm.chain, each.facing(arm.chain, branch, 0.0))
+        for each, branch in ((state.target, state.branch), (back.target, back.branch))
+    )
+    assert np.allclose(T, T_back, atol=1e-12)
+
+
+def test_target_pose_is_kept_on_another_branch(
+    arm: ArmModel, session: Session, state: State
+) -> None:
+    T = se3.from_rotation_translation(so3.rotation_y(0.4), np.array([0.35, 0.0, 0.1]))
+    posed = take(session, state, cmd.SetPose(T))
+    down = take(session, posed, cmd.TakeBranch(Branch("front", "down")))
+    assert isinstance(down.target, PoseTarget)
+    assert down.goal[2] <= 0.0
+    assert np.allclose(point(arm, down.goal), T[:3, 3], atol=1e-9) == (
+        Reason.OUT_OF_REACH not in reasons(down)
+    )
+
+
+def test_branch_options_predict_the_result_of_taking_them(
+    arm: ArmModel, session: Session, state: State
+) -> None:
+    state = take(session, state, cmd.MoveTool(point(arm, state.goal) + 0.05 * UP))
+    for branch, found in zip(BRANCHES, branch_options(arm, state), strict=True):
+        metrics = found.metrics
+        assert found.contact is None
+        taken = take(session, state, cmd.TakeBranch(branch))
+        assert metrics.branch == branch
+        assert np.allclose(taken.goal, metrics.q, atol=1e-12)
+        assert metrics.within_limits
+        assert metrics.distance == np.abs(metrics.q - state.q).max()
+
+
+# A target whose pitch the arm cannot have where it is, whose yaw it cannot have anywhere.
+SIDEWAYS = so3.rotation_z(0.5) @ so3.rotation_y(1.2)
+FAR_OUT = np.array([0.55, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("priority", "kept", "given_up"),
+    [
+        (Priority.POSE, "position", {Reason.YAW_FIXED, Reason.PITCH_CHANGED}),
+        (Priority.PITCH, "pitch", {Reason.YAW_FIXED, Reason.POSITION_CHANGED}),
+        (Priority.POSITION, "position", {Reason.YAW_FIXED, Reason.PITCH_CHANGED}),
+    ],
+)
+def test_each_priority_keeps_its_part_and_reports_what_is_lost(
+    arm: ArmModel,
+    session: Session,
+    state: State,
+    priority: Priority,
+    kept: str,
+    given_up: set[Reason],
+) -> None:
+    T = se3.from_rotation_translation(SIDEWAYS, FAR_OUT)
+    state = take(session, state, cmd.SetPriority(priority), cmd.SetPose(T))
+    assert state.priority is priority
+    assert given_up <= set(reasons(state))
+    assert set(reasons(state)) <= given_up | {Reason.AXIS_LIMIT, Reason.LINKS}
+    if kept == "position":
+        assert np.allclose(point(arm, state.goal), FAR_OUT, atol=1e-9)
+    else:
+        assert pitch_and_roll(session.require_arm().chain, state.goal)[0] == pytest.approx(
+            1.2, abs=1e-9
+        )
+        (gap,) = (f.amount for f in state.findings if f.reason is Reason.POSITION_CHANGED)
+        assert gap == pytest.approx(math.dist(point(arm, state.goal), FAR_OUT), abs=1e-12)
+
+
+@pytest.mark.parametrize("priority", Priority)
+def test_dragging_outwards_each_reading_gives_way_in_its_own_manner(
+    arm: ArmModel, session: Session, state: State, priority: Priority
+) -> None:
+    state = take(session, state, cmd.SetPriority(priority))
+    pitch, _ = pitch_and_roll(session.require_arm().chain, state.goal)
+    target = point(arm, state.goal)
+    for _ in range(20):
+        target = target + 0.006 * OUT
+        state = take(session, state, cmd.MoveTool(target))
+    # 0.6 m out and level with the shoulder, the arm is nearly stretched.
+    tilted = abs(pitch_and_roll(session.require_arm().chain, state.goal)[0] - pitch)
+    short = math.dist(point(arm, state.goal), target)
+    if priority is Priority.PITCH:
+        assert tilted < 1e-9
+        assert short > 1e-3
+        assert Reason.POSITION_CHANGED in reasons(state)
+    else:
+        assert tilted > 0.1
+        assert short < 1e-9
+        assert Reason.PITCH_CHANGED in reasons(state)
+
+
+def test_new_priority_reapplies_the_target_or_changes_nothing(
+    session: Session, state: State
+) -> None:
+    reread = take(session, state, cmd.SetPriority(Priority.PITCH))
+    assert (reread.goal == state.goal).all()
+    assert not reread.moving
+    T = se3.from_rotation_translation(SIDEWAYS, FAR_OUT)
+    posed = take(session, state, cmd.SetPose(T))
+    reread = take(session, posed, cmd.SetPriority(Priority.PITCH))
+    assert reread.target is posed.target
+    assert pitch_and_roll(session.require_arm().chain, reread.goal)[0] == pytest.approx(
+        1.2, abs=1e-9
+    )
+    back = take(session, reread, cmd.SetPriority(Priority.POSE))
+    assert np.allclose(back.goal, posed.goal, atol=1e-9)
+
+
+def test_roll_beyond_its_limit_is_reported_as_roll(
+    arm: ArmModel, session: Session, state: State
+) -> None:
+    _, roll = pitch_and_roll(session.require_arm().chain, state.goal)
+    turn = cmd.TurnTool(pitch_and_roll(session.require_arm().chain, state.goal)[0], roll + 3.05)
+    state = take(session, state, turn)
+    while state.since is not None:
+        state = take(session, state)
+    assert reasons(state) == [Reason.ROLL_CHANGED, Reason.AXIS_LIMIT]
+    assert state.findings[0].amount == pytest.approx(3.05 - arm.chain.upper[4], abs=1e-6)
+    assert state.findings[1].axis == 4

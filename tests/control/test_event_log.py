@@ -1,0 +1,70 @@
+"""No silent stop: whatever holds the arm back is an entry, once, and has a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.event_log import LogEntry, entries_between
+from katana450.arm.control.messages import REASONS, STATUS, sentence
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Finding, Reason, State, Status
+
+TICK = 0.01
+
+
+def run(
+    session: Session, state: State, commands: Sequence[cmd.Command], ticks: int
+) -> tuple[State, list[LogEntry]]:
+    entries: list[LogEntry] = []
+    for number in range(ticks):
+        before = state
+        state = session.step(state, commands if number == 0 else [], state.t + TICK)
+        entries += entries_between(before, state)
+    return state, entries
+
+
+FAULTS: dict[Reason, list[cmd.Command]] = {
+    Reason.AXIS_LIMIT: [cmd.SetJoint(0, 4.0)],
+    Reason.GRIPPER_LIMIT: [cmd.SetGripper(2.0)],
+    Reason.OUT_OF_REACH: [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))],
+    Reason.STOPPED: [cmd.Stop()],
+    Reason.PAUSED: [cmd.Pause()],
+}
+
+
+@pytest.mark.parametrize("reason", FAULTS)
+def test_finding_is_logged_once(session: Session, state: State, reason: Reason) -> None:
+    state, entries = run(session, state, FAULTS[reason], 40)
+    came = [entry for entry in entries if entry.began and entry.finding.reason is reason]
+    assert len(came) == 1
+    assert 0.0 < came[0].t <= state.t
+    assert sentence(state)
+
+
+def test_end_of_a_finding_is_logged(session: Session, state: State) -> None:
+    stopped, _ = run(session, state, [cmd.Stop()], 3)
+    released, entries = run(session, stopped, [cmd.ClearStop()], 3)
+    assert [(e.finding.reason, e.began) for e in entries] == [(Reason.STOPPED, False)]
+    assert released.findings == ()
+
+
+def test_a_number_that_changes_is_no_news(session: Session, state: State) -> None:
+    far, _ = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))], 40)
+    farther, more = run(session, far, [cmd.MoveTool(np.array([0.95, 0.0, 0.1]))], 40)
+    assert farther.findings[0].reason is Reason.OUT_OF_REACH
+    assert [entry for entry in more if entry.finding.reason is Reason.OUT_OF_REACH] == []
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_every_reason_has_its_sentence(reason: Reason) -> None:
+    said = REASONS[reason](Finding(reason, 0.0123, axis=2, parts=("base_link", "table"), time=0.4))
+    assert len(said) > 10
+
+
+@pytest.mark.parametrize("status", Status)
+def test_every_status_has_its_words(status: Status) -> None:
+    assert STATUS[status]

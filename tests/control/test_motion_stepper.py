@@ -1,0 +1,294 @@
+"""Stop, pause, speed and jog: what a hand on the arm must be able to trust."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import TOOL_SPEED, Session
+from katana450.arm.control.state import JointTarget, Reason, State, Status
+from katana450.errors import InputError
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, jacobian_body
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.limiter import JointMotion, Limiter
+
+TICK = 0.01
+FAR = np.array([2.0, -0.4, 0.6, 0.8, -1.5])
+
+
+def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
+    commands = list(commands)
+    for _ in range(ticks):
+        before, state = state, session.step(state, commands, state.t + TICK)
+        check(session, before.motion, state.motion)
+        commands = []
+    return state
+
+
+def check(session: Session, before: JointMotion, after: JointMotion) -> None:
+    limits, slack = session.require_arm().limits, 1.0 + 1e-6
+    assert (np.abs(after.qd) <= limits.speed * slack).all()
+    assert (np.abs(after.qd - before.qd) <= limits.acceleration * TICK * slack + 1e-8).all()
+    assert (np.abs(after.qdd - before.qdd) <= limits.jerk * TICK * slack + 1e-7).all()
+
+
+def speed(chain: Chain, motion: JointMotion) -> float:
+    return float(np.linalg.norm(jacobian_body(chain, motion.q)[3:] @ motion.qd))
+
+
+def point(chain: Chain, q: FloatArray) -> FloatArray:
+    return forward(chain, q)[:3, 3]
+
+
+def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
+    session: Session, state: State
+) -> None:
+    chain = session.require_arm().chain
+    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    assert speed(chain, moving.motion) > 0.1
+    stopped = run(session, moving, [cmd.Stop()])
+    assert stopped.status is Status.STOPPED
+    (finding,) = stopped.findings
+    assert finding.reason is Reason.STOPPED
+    ticks = 1
+    while stopped.moving:
+        # Braking from the first tick on.
+        before, stopped = stopped, run(session, stopped, [])
+        assert speed(chain, stopped.motion) <= speed(chain, before.motion) + 0.05
+        ticks += 1
+    assert stopped.motion.at_rest
+    assert ticks * TICK == pytest.approx(finding.time, abs=2 * TICK)
+    way = math.dist(point(chain, moving.setpoint), point(chain, stopped.setpoint))
+    assert finding.amount == pytest.approx(way, abs=1e-4)
+    assert stopped.findings == (finding,)
+
+
+ORDERS: list[cmd.Command] = [
+    cmd.SetJoint(0, 1.0),
+    cmd.SetJoints(FAR),
+    cmd.MoveTool(np.array([0.3, 0.2, 0.1])),
+    cmd.TurnTool(0.3, 0.3),
+    cmd.SetPose(np.eye(4)),
+    cmd.SetGripper(0.2),
+    cmd.Home(),
+    cmd.GoToZero(),
+    cmd.Hold(),
+    cmd.EndDrag(),
+    cmd.Pause(),
+    cmd.Resume(),
+    cmd.Jog(np.array([0.1, 0.0, 0.0, 0.0, 0.0])),
+]
+
+
+def test_stopped_arm_moves_only_after_clear_stop_and_a_new_command(
+    session: Session, state: State
+) -> None:
+    moving = run(session, state, [cmd.SetJoints(FAR), cmd.SetGripper(0.3)], 30)
+    stopped = run(session, moving, [cmd.Stop()], 200)
+    grip = moving.gripper_setpoint
+    for order in ORDERS:
+        after = run(session, stopped, [order], 50)
+        assert (after.setpoint == stopped.setpoint).all(), order
+        assert after.gripper_setpoint == stopped.gripper_setpoint == grip
+        assert after.status is Status.STOPPED
+    released = run(session, stopped, [cmd.ClearStop()], 100)
+    assert released.status is Status.OK
+    assert (released.setpoint == stopped.setpoint).all()
+    assert isinstance(released.target, JointTarget)
+    assert released.gripper_setpoint == grip
+    assert run(session, released, [cmd.SetJoint(0, 1.0)], 5).moving
+
+
+def test_a_stop_in_the_same_tick_beats_what_came_with_it(session: Session, state: State) -> None:
+    batches: list[list[cmd.Command]] = [
+        [cmd.Stop(), cmd.SetJoints(FAR)],
+        [cmd.SetJoints(FAR), cmd.Stop()],
+    ]
+    for batch in batches:
+        after = run(session, state, batch, 100)
+        assert (after.setpoint == state.setpoint).all()
+        assert after.status is Status.STOPPED
+
+
+def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    once = run(session, moving, [cmd.Stop()], 20)
+    twice = run(session, once, [cmd.Stop()])
+    assert twice.findings == once.findings
+    assert twice.stopped == once.stopped
+
+
+def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: State) -> None:
+    start = state.setpoint
+    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    paused = run(session, moving, [cmd.Pause()], 150)
+    assert paused.status is Status.PAUSED
+    assert not paused.moving
+    assert (paused.setpoint != paused.goal).any()
+    way = FAR - start
+    for at in (moving.setpoint, paused.setpoint):
+        fraction = (at - start) @ way / (way @ way)
+        assert np.allclose(at, start + fraction * way, atol=1e-9)
+    again = run(session, paused, [cmd.Resume()], 400)
+    assert (again.setpoint == FAR).all()
+    assert again.findings == ()
+    # What is asked meanwhile is gone for when it goes on.
+    told = run(session, paused, [cmd.Home()], 50)
+    assert (told.setpoint == paused.setpoint).all()
+    assert {f.reason for f in told.findings} == {Reason.PAUSED}
+    assert (run(session, told, [cmd.Resume()], 400).setpoint == session.ready).all()
+
+
+def test_the_speed_scale_counts_at_once_and_for_every_joint(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoints(FAR)], 70)
+    slow = run(session, moving, [cmd.SpeedScale(0.1)], 120)
+    limits = session.require_arm().limits
+    assert (np.abs(slow.motion.qd) <= 0.1 * limits.speed * (1 + 1e-9)).all()
+    assert (np.abs(slow.motion.qd) / limits.speed).max() > 0.09
+    fast = run(session, slow, [cmd.SpeedScale(1.0)], 600)
+    assert (fast.setpoint == FAR).all()
+
+
+@pytest.mark.parametrize("fraction", [0.0, -0.1, 1.1, math.nan, math.inf, True, "1"])
+def test_a_speed_that_is_none_is_refused(fraction: float) -> None:
+    with pytest.raises(InputError, match="speed"):
+        cmd.SpeedScale(fraction)
+
+
+def test_the_tool_is_never_faster_than_it_may_be(session: Session, state: State) -> None:
+    rng = np.random.default_rng(7)
+    chain, fastest = session.require_arm().chain, 0.0
+    for number in range(40):
+        goal = rng.uniform(chain.lower, chain.upper)
+        ticks = int(rng.integers(20, 200))
+        command: cmd.Command = cmd.SetJoints(goal)
+        if number % 4 == 3:
+            command = cmd.MoveTool(rng.uniform(-0.5, 0.5, 3))
+        for _ in range(ticks):
+            state = run(session, state, [command])
+            fastest = max(fastest, speed(chain, state.motion))
+            command = cmd.SpeedScale(1.0)
+    assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
+
+
+JOGS: dict[str, tuple[list[float], JogFrame]] = {
+    "x": ([0.1, 0.0, 0.0, 0.0, 0.0], JogFrame.BASE),
+    "z": ([0.0, 0.0, 0.1, 0.0, 0.0], JogFrame.BASE),
+    "ahead": ([-0.1, 0.0, 0.0, 0.0, 0.0], JogFrame.TOOL),
+    "pitch": ([0.0, 0.0, 0.0, 0.3, 0.0], JogFrame.BASE),
+    "roll": ([0.0, 0.0, 0.0, 0.0, 0.3], JogFrame.BASE),
+}
+
+
+@pytest.mark.parametrize("name", JOGS)
+def test_a_jog_goes_where_it_is_held_to(session: Session, name: str) -> None:
+    rates, frame = JOGS[name]
+    chain = session.require_arm().chain
+    state = session.begin(np.array([0.4, -1.2, 1.6, 0.3, 0.2]), 0.0, 0.0)
+    start, R = point(chain, state.setpoint), forward(chain, state.setpoint)[:3, :3]
+    before = pitch_and_roll(chain, state.setpoint)
+    for _ in range(60):
+        state = run(session, state, [cmd.Jog(np.array(rates), frame)])
+    after = pitch_and_roll(chain, state.setpoint)
+    moved = point(chain, state.setpoint) - start
+    v = np.array(rates[:3])
+    wanted = v if frame is JogFrame.BASE else R @ v
+    if wanted.any():
+        assert moved @ wanted / np.linalg.norm(wanted) > 0.02
+        assert np.linalg.norm(np.cross(moved, wanted)) < 0.1 * np.linalg.norm(moved) * 0.1
+        assert np.allclose(before, after, atol=0.02)
+    else:
+        turned = np.subtract(after, before)
+        assert turned[0] * rates[3] + turned[1] * rates[4] > 0.02
+        assert np.linalg.norm(moved) < 5e-3
+
+
+def test_jog_without_renewal_ends(session: Session, state: State) -> None:
+    jog = cmd.Jog(np.array([-0.15, 0.0, 0.0, 0.0, 0.0]))
+    held = state
+    for _ in range(30):
+        held = run(session, held, [jog])
+    until = held.t + cmd.JOG_TIME
+    while held.t < until:
+        held = run(session, held, [])
+    assert speed(session.require_arm().chain, held.motion) > 0.05
+    # From then on it brakes, about as fast as it can.
+    fastest = Limiter(session.require_arm().limits).stopping_time(held.motion)
+    while held.moving:
+        held = run(session, held, [])
+    assert held.t <= until + 1.2 * fastest + 3 * TICK
+    assert (held.setpoint == held.goal).all()
+    assert held.jogging is None
+    assert held.findings == ()
+
+
+def test_after_any_jog_the_arm_comes_to_rest_where_it_says(session: Session, state: State) -> None:
+    """Jogs of all directions, one after the other, until joints come up to their limits."""
+    random = np.random.default_rng(5)
+    near = 0
+    for _ in range(60):
+        rates = np.zeros(5)
+        rates[random.integers(3)] = random.choice((-0.25, 0.25))
+        for _ in range(random.integers(2, 18)):
+            state = run(session, state, [cmd.Jog(rates)], 5)
+        near += not session.require_arm().chain.within_limits(state.setpoint, slack=-0.05)
+        state = run(session, state, [cmd.Jog(np.zeros(5))], 200)
+        assert not state.moving
+        assert (state.setpoint == state.goal).all()
+    assert near > 5
+
+
+def test_a_jog_stops_before_a_limit(session: Session, state: State) -> None:
+    chain = session.require_arm().chain
+    for _ in range(500):
+        state = run(session, state, [cmd.Jog(np.array([0.0, 0.3, 0.0, 0.0, 0.0]))])
+        assert chain.within_limits(state.setpoint, slack=0.0)
+
+
+def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None:
+    """From the stretched arm axis 2 soon is at its limit, and the wrist has to make up for it."""
+    chain = session.require_arm().chain
+    state = session.begin(np.zeros(5), 0.0, 0.0)
+    height = point(chain, state.setpoint)[2]
+    for _ in range(160):
+        state = run(session, state, [cmd.Jog(np.array([0.0, 0.0, -0.25, 0.0, 0.0]))])
+        before, height = height, point(chain, state.setpoint)[2]
+        assert height < before + 1e-5
+    assert state.setpoint[1] == pytest.approx(chain.upper[1], abs=2e-3)
+    assert height < -0.1
+
+
+@pytest.mark.parametrize(
+    ("q", "rates", "told"),
+    [
+        ([0.0] * 5, [-0.2, 0.0, 0.0, 0.0, 0.0], (Reason.SINGULAR, None)),
+        ([0.0] * 5, [0.0, 0.2, 0.0, 0.0, 0.0], None),
+        ([0.0, -1.2, 1.6, 0.3, 3.0], [0.0, 0.0, 0.0, 0.0, 0.5], (Reason.AXIS_LIMIT, 4)),
+        ([0.0, -1.2, 1.6, 0.3, 3.0], [0.0, 0.0, 0.0, 0.0, -0.5], None),
+    ],
+)
+def test_blocked_jog_reports_its_cause(
+    session: Session, q: list[float], rates: list[float], told: tuple[Reason, int | None] | None
+) -> None:
+    state = session.begin(session.require_arm().chain.clamp(np.array(q)), 0.0, 0.0)
+    for _ in range(30):
+        state = run(session, state, [cmd.Jog(np.array(rates))])
+    assert [(f.reason, f.axis) for f in state.findings] == ([] if told is None else [told])
+    assert state.moving
+    # Who lets go misses nothing any more.
+    assert run(session, state, [], 200).findings == ()
+
+
+@pytest.mark.parametrize("rates", [[0.1] * 4, [math.nan] * 5, "fast", [[0.1] * 5]])
+def test_a_jog_that_is_none_is_refused(rates: object) -> None:
+    with pytest.raises(InputError, match="jog"):
+        cmd.Jog(rates)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="JogFrame"):
+        cmd.Jog(np.zeros(5), "world")  # type: ignore[arg-type]

@@ -1,0 +1,269 @@
+"""Objects of any shape: met by the arm, fixed to its hand, exchanged all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.placement import free_place, girth
+from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, same
+from katana450.arm.control.session import Session
+from katana450.arm.control.solid import ObjectAppearance, Solid
+from katana450.arm.control.state import Reason, State
+from katana450.assembly.robot_session import describe_robot
+from katana450.errors import InputError
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.convex_body import convex_body
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import MILLILITRE
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+
+TICK = 0.01
+SLIGHTLY = 2e-5  # m
+
+
+def solid_of(mesh: trimesh.Trimesh, key: str = "a1") -> Solid:
+    """As the reader of files makes it: on z = 0, about its middle."""
+    (low, high), found = mesh.bounds, convex_body(mesh.vertices)
+    at = np.array((*(0.5 * (low + high)[:2]), low[2]))
+    return Solid(key, tuple(high - low), found.corners - at)
+
+
+KNOT = trimesh.creation.torus(0.06, 0.02, 24, 16)
+SOLID = solid_of(KNOT)
+
+
+def standing(x: float, y: float, z: float = 0.0, yaw: float = 0.0) -> FloatArray:
+    return se3.from_rotation_translation(so3.rotation_z(yaw), (x, y, z))
+
+
+def knot(T: FloatArray, name: str = "knot", **other: object) -> SceneObject:
+    return replace(SceneObject(name, Shape.MESH, (), T, solid=SOLID), **other)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    return describe_robot(Settings(), URDF_PATH, None).session
+
+
+def begun(session: Session, *objects: SceneObject) -> State:
+    state = session.begin(session.ready, 0.0, 0.0)
+    return session.step(state, [cmd.ReplaceScene(objects)], TICK)
+
+
+def run(
+    session: Session, state: State, commands: Sequence[cmd.Command], ticks: int = 600
+) -> list[State]:
+    states = []
+    for tick in range(ticks):
+        state = session.step(state, () if tick else commands, state.t + TICK)
+        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        states.append(state)
+        if not state.moving:
+            return states
+    raise AssertionError("the arm never came to rest")
+
+
+def x_of(state: State) -> FloatArray:
+    return np.append(state.setpoint, state.gripper_setpoint)
+
+
+def outlines(session: Session, state: State) -> list[tuple[int, FloatArray, FloatArray]]:
+    """The hulls of the links: the piece each moves with, and its planes there, (m, 3) and (m,)."""
+    world = session.world_at(replace(state, objects=()))
+    assert world is not None
+    found = []
+    for part in world.parts:
+        for T, shape in zip(part.T_mover_shape, part.shapes, strict=True):
+            if part.mover:
+                corners = np.frombuffer(shape.mark).reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
+                mesh = trimesh.Trimesh(corners).convex_hull
+                heights = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles[:, 0])
+                found.append((part.mover, mesh.face_normals, heights))
+    return found
+
+
+def test_driven_at_full_speed_into_a_mesh_the_arm_stops_before(session: Session) -> None:
+    """Judged by places all over the triangles, not by what counts for them."""
+    upright = KNOT.copy()
+    upright.apply_transform(se3.from_rotation_translation(so3.rotation_x(np.pi / 2), np.zeros(3)))
+    scene_object = SceneObject(
+        "knot", Shape.MESH, (), standing(0.40, -0.06), solid=solid_of(upright), scale=1.2
+    )
+    low = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
+    state = session.step(session.begin(low, 0.0, 0.0), [cmd.ReplaceScene((scene_object,))], TICK)
+    states = run(session, state, [cmd.SetJoint(0, -0.6)])
+    (finding,) = states[-1].findings
+    assert finding.reason is Reason.CONTACT
+    assert "knot" in (finding.parts or ())
+    assert STOP - SLIGHTLY <= finding.amount < 2.0 * STOP
+    dense = upright.subdivide().vertices
+    points = 1.2 * (dense - (0.0, 0.0, dense[:, 2].min())) + scene_object.T[:3, 3]
+    world = session.world_at(states[-1])
+    assert world is not None
+    links = outlines(session, states[-1])
+    for each in states[::30] + states[-1:]:
+        poses = world.linkage.poses(x_of(each))
+        for mover, normals, heights in links:
+            local = (points - poses[mover][:3, 3]) @ poses[mover][:3, :3]
+            assert (local @ normals.T - heights).max(axis=1).min() > 0.0
+    bare = session.begin(low, 0.0, 0.0)
+    bare = session.step(bare, [cmd.ReplaceScene(()), cmd.SetJoint(0, -0.6)], TICK)
+    assert run(session, bare, [])[-1].findings == ()
+
+
+def test_attached_object_moves_with_the_hand(session: Session) -> None:
+    ready = session.begin(session.ready, 0.0, 0.0)
+    palm = session.environment.pose(replace(knot(np.eye(4)), fixed=True), x_of(ready))
+    state = begun(session, knot(palm @ standing(0.1, 0.0, 0.02)))
+    before = session.environment.pose(state.objects[0], x_of(state))
+    state = session.step(state, [cmd.Attach("knot", Attachment.HAND)], state.t + TICK)
+    (fixed,) = state.objects
+    assert fixed.fixed
+    assert not fixed.held
+    np.testing.assert_allclose(session.environment.pose(fixed, x_of(state)), before, atol=1e-12)
+    moved = run(session, state, [cmd.SetJoint(0, 0.4), cmd.SetGripper(0.3)])[-1]
+    assert moved.gripper_setpoint == 0.3
+    (carried,) = moved.objects
+    assert carried is fixed
+    turned = session.environment.pose(fixed, x_of(moved))
+    azimuth = [np.arctan2(T[1, 3], T[0, 3]) for T in (before, turned)]
+    assert azimuth[1] - azimuth[0] == pytest.approx(0.4, abs=1e-9)
+    # It is a part of the arm: met by the table, not by the hand.
+    world = session.world_at(moved)
+    assert world is not None
+    assert np.isfinite(world.gap(x_of(moved), "knot", "table"))
+    hand = session.environment.hand
+    assert hand is not None
+    assert all(world.gap(x_of(moved), "knot", finger) == np.inf for finger in hand.fingers)
+    low = run(session, moved, [cmd.SetJoint(1, 0.3)])[-1]
+    (finding,) = (each for each in low.findings if each.reason is Reason.CONTACT)
+    assert set(finding.parts or ()) == {"knot", "table"}
+
+
+@pytest.mark.parametrize("to", [Attachment.WORLD, Attachment.TABLE])
+def test_detached_object_stays_in_place_or_is_put_on_the_table(
+    session: Session, to: Attachment
+) -> None:
+    palm_at = np.eye(4)
+    palm_at[:3, 3] = (0.08, 0.0, 0.0)
+    state = begun(session, knot(palm_at, fixed=True))
+    there = session.environment.pose(state.objects[0], x_of(state))
+    state = session.step(state, [cmd.Attach("knot", to)], state.t + TICK)
+    (left,) = state.objects
+    assert not left.carried
+    np.testing.assert_allclose(left.T[:2, 3], there[:2, 3], atol=1e-12)
+    if to is Attachment.WORLD:
+        np.testing.assert_allclose(left.T, there, atol=1e-12)
+    else:
+        assert left.T[2, 3] == 0.0
+        np.testing.assert_allclose(left.T[:3, 2], (0.0, 0.0, 1.0), atol=1e-12)
+
+
+def test_a_scene_takes_the_place_of_another_at_one_go(session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    cup = next(scene_object for scene_object in state.objects if scene_object.name == "cup")
+    state = session.step(state, [cmd.ReplaceScene((cup, knot(standing(0.4, 0.3))), 1e-4)], TICK)
+    assert [scene_object.name for scene_object in state.objects] == ["cup", "knot"]
+    assert state.poured is not None
+    assert state.poured.water.cup == 100 * MILLILITRE
+    held = replace(cup, held=True, T=np.eye(4))
+    kept = session.step(
+        replace(state, objects=(held,), grip=0.0), [cmd.ReplaceScene((cup,))], state.t + TICK
+    )
+    assert [scene_object.held for scene_object in kept.objects] == [True]
+    assert kept.poured is None
+
+
+def test_how_a_object_looks_is_a_part_of_it(session: Session) -> None:
+    plain = knot(standing(0.4, 0.3))
+    for other in (
+        replace(plain, appearance=ObjectAppearance((1, 2, 3))),
+        replace(plain, appearance=ObjectAppearance(hidden=True)),
+        replace(plain, scale=2.0),
+        replace(plain, solid=solid_of(KNOT, "b2")),
+        replace(plain, fixed=True),
+    ):
+        assert not same((plain,), (other,))
+        assert same((other,), (replace(other, T=other.T.copy()),))
+    hidden = begun(session, replace(plain, appearance=ObjectAppearance(hidden=True)))
+    world = session.world_at(hidden)
+    assert world is not None
+    assert "knot" in {part.name for part in world.parts}
+
+
+def test_another_mesh_of_the_same_size_is_another_world(session: Session) -> None:
+    """Else a plan made beside the one would be taken to be clear of the other."""
+    ball = trimesh.creation.icosphere(2, radius=0.05)
+    box = trimesh.creation.box(ball.extents)
+    fingerprints = []
+    for mesh in (ball, box, box):
+        scene_object = SceneObject("it", Shape.MESH, (), standing(0.4, 0.3), solid=solid_of(mesh))
+        world = session.world_at(begun(session, scene_object))
+        assert world is not None
+        fingerprints.append(world.fingerprint)
+    assert fingerprints[0].differs_by(fingerprints[1]) == np.inf
+    assert fingerprints[1].differs_by(fingerprints[2]) == 0.0
+
+
+def test_what_cannot_be_is_refused(session: Session) -> None:
+    T, solid = standing(0.4, 0.3), SOLID
+    for wrong in (
+        lambda: SceneObject("it", Shape.MESH, (), T),
+        lambda: SceneObject("it", Shape.BOX, (0.1, 0.1, 0.1), T, solid=solid),
+        lambda: knot(T, scale=0.0),
+        lambda: knot(T, scale=np.nan),
+        lambda: knot(T, scale=900.0),
+        lambda: knot(T, scale=1e-3),
+        lambda: knot(T, fixed=True, held=True),
+        lambda: ObjectAppearance((0, 0, 256)),
+        lambda: ObjectAppearance(opacity=0.0),
+        lambda: Solid("no key", (1.0, 1.0, 1.0), solid.corners),
+        lambda: Solid("k", (1.0, 1.0, np.inf), solid.corners),
+        lambda: Solid("k", (1.0, 1.0, 1.0), np.zeros((3, 3))),
+        lambda: Solid("k", (1.0, 1.0, 1.0), np.full((5, 3), np.nan)),
+        lambda: cmd.Attach("it", "hand"),  # type: ignore[arg-type]
+        lambda: cmd.ReplaceScene((knot(T), knot(T))),
+        lambda: cmd.ReplaceScene(tuple(knot(T, f"{i}") for i in range(MAX_OBJECTS + 1))),
+        lambda: cmd.ReplaceScene((knot(T, held=True),)),
+    ):
+        with pytest.raises(InputError):
+            wrong()
+    for command in (
+        cmd.ReplaceScene((), 1e-4),
+        cmd.ReplaceScene(session.begin(session.ready, 0, 0).objects, 1),
+    ):
+        with pytest.raises(InputError):
+            session.check(command)
+    blind = Session(session.require_arm(), session.ready)
+    for asked in (
+        cmd.Attach("it", Attachment.HAND),
+        cmd.PlaceObject(knot(T, fixed=True)),
+        cmd.ReplaceScene((knot(T, fixed=True),)),
+    ):
+        with pytest.raises(InputError, match="not looked at"):
+            blind.check(asked)
+
+
+def test_new_objects_stand_in_reach_and_beside_each_other() -> None:
+    objects: list[SceneObject] = []
+    for number in range(12):
+        new = knot(np.eye(4), f"{number}", scale=0.6)
+        objects.append(replace(new, T=free_place(new, objects)))
+    places = np.array([scene_object.T[:2, 3] for scene_object in objects])
+    np.testing.assert_array_equal(places[0], (0.36, 0.0))
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + np.eye(12)
+    assert apart.min() >= 2.0 * girth(objects[0])
+    assert np.linalg.norm(places, axis=1).max() <= 0.6
+    # What the hand carries takes no place, and neither does the object itself.
+    carried = [replace(objects[0], fixed=True), *objects[1:]]
+    np.testing.assert_array_equal(
+        free_place(knot(np.eye(4), "new", scale=0.6), carried)[:2, 3], places[0]
+    )

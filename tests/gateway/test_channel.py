@@ -1,0 +1,77 @@
+"""Who asks a lot, beside others who have a turn too."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from itertools import pairwise
+
+from katana450.arm.control.lease import Role
+from katana450.server.service.budget import Budgets
+from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
+from katana450.server.web.channel import CLOSE_FRAME_TIMEOUT, GoneError
+from katana450.server.web.program_socket import ProgramChannel
+
+ASKED = 200
+
+
+class Torrent:
+    """A line on which everything has arrived already."""
+
+    def __init__(self) -> None:
+        self.left = ASKED
+        self.arrival = Arrival(None)
+
+    async def receive(self) -> str:
+        if not self.left:
+            await asyncio.Event().wait()
+        self.left -= 1
+        return '{"do": "heartbeat"}'
+
+    async def send(self, _text: str) -> None:
+        return
+
+    async def close(self, _code: int, _why: str, /) -> None:
+        raise GoneError
+
+
+class Deaf(Torrent):
+    """One that takes in nothing, not even a farewell."""
+
+    async def send(self, _text: str) -> None:
+        await asyncio.Event().wait()
+
+    async def close(self, _code: int, _why: str, /) -> None:
+        await asyncio.Event().wait()
+
+
+def test_many_requests_of_one_client_delay_nobody_else() -> None:
+    async def ask() -> list[int]:
+        hub, torrent = Hub(time.monotonic), Torrent()
+        program = ProgramChannel(hub, torrent, Budgets(hub.clock).of("a"))
+        window = hub.join(Identity("session", "Torrent", Role.OPERATOR), "a-page", program.tell)
+        asking = asyncio.create_task(program.run(window))
+        taken = [torrent.left]
+        while torrent.left:
+            await asyncio.sleep(0)
+            taken.append(torrent.left)
+        asking.cancel()
+        return taken
+
+    taken = asyncio.run(ask())
+    assert taken[-1] == 0
+    assert max(before - after for before, after in pairwise(taken)) == 1
+
+
+def test_unresponsive_flooder_is_disconnected() -> None:
+    async def ask() -> None:
+        hub, deaf = Hub(time.monotonic), Deaf()
+        deaf.left = 10**9
+        program = ProgramChannel(hub, deaf, Budgets(hub.clock).of("a"))
+        window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.tell)
+        async with asyncio.timeout(10.0 * CLOSE_FRAME_TIMEOUT):
+            await program.run(window)
+
+    asyncio.run(ask())

@@ -1,0 +1,189 @@
+"""Who may tell a program what to do, told by a clock of the test's own."""
+
+from __future__ import annotations
+
+import time
+from argparse import Namespace
+from dataclasses import replace
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Person, Role
+from katana450.arm.control.session import Session
+from katana450.errors import LeaseError
+from katana450.extensions.programs.actions import ACTION_TIMEOUT
+from katana450.extensions.programs.extension import OWNER_SILENCE
+from katana450.extensions.programs.requests import ProgramOrder
+from katana450.extensions.programs.server.panel_access import PanelAccess
+from katana450.extensions.programs.server.program_runner import ProgramRunner
+from katana450.server.service.hub import Hub, Window
+from tests.gateway.test_hub import PAGES, Table
+
+NOBODY = Person("nobody", "Nobody", Role.ADMIN)
+
+SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
+
+
+def made(hub: Hub) -> ProgramRunner:
+    """Make the runner as ``katana450 serve`` does."""
+    return ProgramRunner(hub, Namespace(owner_silence=OWNER_SILENCE))
+
+
+class Staged(Table):
+    """A table whose arm can be planned for."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session.begin(session.ready, 0.0, 0.0), made)
+        self.arm.session, self.arm.arm = session, Mock(T_base_shoulder=np.eye(4))
+        assert isinstance(self.hub.runner, ProgramRunner)
+        self.programs = self.hub.runner
+        self.panel = PanelAccess(self.programs, self.hub, lambda act: act())
+
+    @property
+    def status(self) -> str:
+        told = self.programs.progress()
+        return "" if told is None else told.status
+
+    def plan(self, window: Window, script: str = SCRIPT) -> None:
+        """And wait for the thread that does it."""
+        self.programs.script(window, script, more=False, speed=1.0)
+        due = time.monotonic() + 10.0
+        while self.status == "planning" and time.monotonic() < due:
+            time.sleep(0.005)
+
+
+@pytest.fixture
+def table(session: Session) -> Staged:
+    return Staged(session)
+
+
+def test_a_program_holds_the_arm_under_its_own_name(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.touch(window.person.key)
+    table.plan(window)
+    assert table.status == "ready"
+    table.programs.steer(window, ProgramOrder.RUN)
+    holder = table.hub.lease.holder
+    assert holder is not None
+    assert (holder.name, holder.role) == ("Wave", Role.OPERATOR)
+    table.wait(1.0, window)
+    assert table.hub.lease.holder == holder
+    assert any(isinstance(command, cmd.SpeedScale) for command in table.arm.commands)
+    with pytest.raises(LeaseError, match="Wave holds the arm"):
+        table.touch(window.person.key)
+
+
+def test_program_time_passes_while_the_state_is_unchanged(table: Staged) -> None:
+    """An arm at rest shows the state in which it came to rest, its time included."""
+    window = table.join(PAGES[0])
+    table.plan(window)
+    table.programs.steer(window, ProgramOrder.RUN)
+    table.wait(29.0, window)
+    assert not any(isinstance(command, cmd.Follow) for command in table.arm.commands)
+    table.wait(2.0, window)
+    assert any(isinstance(command, cmd.Follow) for command in table.arm.commands)
+
+
+def test_pause_does_not_count_towards_the_timeout(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window, "steps:\n  - gripper: open\n")
+    table.programs.steer(window, ProgramOrder.RUN)
+    rest = table.arm.rest
+    table.arm.rest = replace(rest, gripper_goal=rest.gripper_goal + 0.5)
+    table.wait(0.1, window)
+    # The fingers rest on their way, and nothing new is shown before they are told to go on.
+    table.arm.rest = replace(table.arm.rest, paused=True)
+    table.wait(2.0 * ACTION_TIMEOUT, window)
+    assert table.status == "paused"
+    table.arm.rest = replace(table.arm.rest, t=rest.t + 2.0 * ACTION_TIMEOUT + 0.1, paused=False)
+    table.wait(0.1, window)
+    assert table.status == "running"
+    table.wait(ACTION_TIMEOUT, window)
+    assert table.status == "failed"
+
+
+def test_others_may_not_steer_it_unless_they_may_take_the_arm(table: Staged) -> None:
+    owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
+    viewer, admin = table.join("third", Role.VIEWER), table.join("fourth", Role.ADMIN)
+    program_runner = table.programs
+    with pytest.raises(LeaseError, match="watch"):
+        program_runner.script(viewer, SCRIPT, more=False, speed=1.0)
+    table.plan(owner)
+    program_runner.steer(owner, ProgramOrder.RUN)
+    for window, said in ((viewer, "watch"), (other, "is Window 1's")):
+        with pytest.raises(LeaseError, match=said):
+            program_runner.check_may_touch(window.actor)
+        with pytest.raises(LeaseError, match=said):
+            program_runner.steer(window, ProgramOrder.END)
+    with pytest.raises(LeaseError, match="end it first"):
+        table.plan(other)
+    program_runner.check_may_touch(admin.actor)
+    program_runner.steer(admin, ProgramOrder.END)
+    assert table.status == "stopped"
+    assert table.hub.lease.holder is None
+
+
+def test_program_does_not_take_the_lease_from_a_driver(table: Staged) -> None:
+    owner, other = (table.join(page) for page in PAGES)
+    table.plan(owner)
+    table.touch(other.person.key)
+    with pytest.raises(LeaseError, match="Window 2 holds the arm"):
+        table.programs.steer(owner, ProgramOrder.RUN)
+    assert len(table.hub.windows) == 2
+    assert table.hub.lease.holder == other.person
+
+
+def test_stop_and_a_page_that_is_gone_end_it(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    table.plan(window)
+    table.programs.steer(window, ProgramOrder.RUN)
+    table.stop("Somebody")
+    table.wait(0.1, window)
+    assert table.status == "stopped"
+    table.hub.move(window, cmd.ClearStop())
+    table.hub.release_lease(window)
+    table.programs.steer(window, ProgramOrder.RUN)
+    table.wait(0.5, window)
+    table.hub.leave(window)
+    table.wait(0.5)
+    assert table.status == "running"
+    table.wait(1.0)
+    assert table.status == "stopped"
+    assert table.arm.holds > 0
+
+
+def test_panel_request_is_executed_after_planning(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    with pytest.raises(LeaseError, match="front page"):
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, replace(window.actor, person=NOBODY))
+    table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
+    with pytest.raises(LeaseError, match="being planned"):
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
+    due = time.monotonic() + 10.0
+    while table.status in ("planning", "ready") and time.monotonic() < due:
+        table.wait(0.02, window)
+        time.sleep(0.005)
+    assert table.status == "running"
+
+
+def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> None:
+    window = table.join(PAGES[0])
+    program_runner = table.programs
+    table.panel.plan(SCRIPT, ProgramOrder.RUN, window.actor)
+    clicked = table.hub.at_scene(window.person.key, table.hub.gate.revocations)
+    table.stop("Anybody")
+    table.hub.move(window, cmd.ClearStop())
+    # A click that was on its way meanwhile.
+    with pytest.raises(LeaseError, match="Do it again"):
+        table.panel.plan(SCRIPT, ProgramOrder.RUN, clicked)
+    with pytest.raises(LeaseError, match="Do it again"):
+        table.panel.steer(ProgramOrder.RUN, clicked)
+    due = time.monotonic() + 10.0
+    while table.status == "planning" and time.monotonic() < due:
+        time.sleep(0.005)
+    table.wait(1.0, window)
+    assert table.status == "ready"
+    assert not program_runner.running

@@ -1,0 +1,138 @@
+"""How often something may happen, and how far a browser may be behind."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from katana450.server.viser_bridge.flow import (
+    MAX_IN_FLIGHT_BYTES,
+    MAX_REMEMBERED_FRAMES,
+    OVERDUE,
+    FlowControl,
+)
+from katana450.server.web.token_bucket import TokenBucket
+
+
+def test_a_bucket_gives_what_it_holds_and_fills_with_time() -> None:
+    bucket = TokenBucket(10.0, 3.0, 0.0)
+    assert [bucket.take(0.0) for _ in range(4)] == [True, True, True, False]
+    assert not bucket.take(0.09)
+    assert bucket.take(0.11)
+    assert [bucket.take(100.0) for _ in range(4)] == [True, True, True, False]
+
+
+def test_a_bucket_takes_many_or_none() -> None:
+    bucket = TokenBucket(1.0, 5.0, 0.0)
+    assert not bucket.take(0.0, 6.0)
+    assert bucket.take(0.0, 5.0)
+
+
+def test_time_that_goes_back_fills_nothing() -> None:
+    bucket = TokenBucket(1.0, 1.0, 10.0)
+    assert bucket.take(10.0)
+    assert not bucket.take(0.0)
+    assert not bucket.take(10.5)
+
+
+def test_browser_without_acknowledgements_gets_all_frames() -> None:
+    flow = FlowControl()
+    for t in range(2 * MAX_REMEMBERED_FRAMES):
+        flow.sent(MAX_IN_FLIGHT_BYTES, float(t))
+    assert flow.has_room(1e9)
+    assert flow.age(1e9) == 0.0
+
+
+def test_the_age_is_that_of_the_oldest_frame_that_is_not_seen() -> None:
+    flow = FlowControl()
+    for t in (1.0, 2.0, 3.0):
+        flow.sent(100, t)
+    assert flow.seen(1, 3.0)
+    assert flow.age(3.5) == pytest.approx(1.5)
+    assert flow.seen(3, 3.5)
+    assert flow.age(99.0) == 0.0
+
+
+def test_nothing_more_is_sent_while_something_is_overdue() -> None:
+    flow = FlowControl()
+    flow.sent(100, 0.0)
+    assert flow.seen(1, 0.1)
+    flow.sent(100, 1.0)
+    assert flow.has_room(1.0 + 0.99 * OVERDUE)
+    assert not flow.has_room(1.0 + OVERDUE)
+    assert flow.seen(2, 1.0 + OVERDUE)
+    # By now it is known that this line takes so long.
+    flow.sent(100, 2.0)
+    assert flow.has_room(2.0 + 1.99 * OVERDUE)
+    assert not flow.has_room(2.0 + 2.0 * OVERDUE)
+
+
+def test_a_frame_larger_than_the_line_goes_alone() -> None:
+    flow = FlowControl()
+    flow.sent(100, 0.0)
+    assert flow.seen(1, 0.1)
+    assert flow.has_room(0.1)
+    flow.sent(10 * MAX_IN_FLIGHT_BYTES, 0.1)
+    assert not flow.has_room(0.1)
+
+
+@settings(deadline=None)
+@given(st.floats(1.5e4, 5e6), st.floats(0.0, 0.3), st.integers(200, 3000))
+def test_flow_control_keeps_frames_fresh_and_uses_the_bandwidth(
+    rate: float, trip: float, size: int
+) -> None:
+    ages = ages_after(20.0, lambda _: rate, trip, size)
+    assert max(ages) < 1.2 + trip
+    assert len(ages) > 0.5 * 40.0 * min(rate / size, 1.0 / FRAME)
+
+
+@pytest.mark.parametrize("trip", [0.0, 0.05])
+@pytest.mark.parametrize("size", [300, 2000])
+def test_when_a_line_grows_thin_little_is_on_the_way(size: int, trip: float) -> None:
+    ages = ages_after(20.0, lambda t: 5e6 if t < 30.0 else 1.5e4, trip, size)
+    assert max(ages) < 1.5
+    assert np.median(ages[len(ages) // 2 :]) < 0.6
+
+
+FRAME = 0.016
+"""[s]"""
+
+
+def ages_after(warm: float, rate: Callable[[float], float], trip: float, size: int) -> list[float]:
+    """Of the frames of ``size`` that are seen from ``warm`` [s] on to the end of a minute.
+
+    On a line of ``rate`` [bytes/s] and round trip ``trip`` [s], and viser with a frame every FRAME.
+    """
+    flow, t, free_at, count = FlowControl(), 0.0, 0.0, 1
+    flow.sent(100, 0.0)
+    assert flow.seen(1, 0.0)
+    on_the_line: deque[tuple[float, float]] = deque()
+    ages = []
+    while t < 60.0:
+        t += FRAME
+        while on_the_line and on_the_line[0][0] + trip <= t:
+            arrived, sent_at = on_the_line.popleft()
+            count += 1
+            assert flow.seen(count, t)
+            if t > warm:
+                ages.append(arrived - sent_at)
+        if flow.has_room(t):
+            flow.sent(size, t)
+            free_at = max(free_at, t) + size / rate(t)
+            on_the_line.append((free_at, t))
+    return ages
+
+
+@pytest.mark.parametrize("count", [-1, 1, 4, 10**30])
+def test_what_cannot_have_been_seen_is_no_word(count: int) -> None:
+    flow = FlowControl()
+    for t in range(3):
+        flow.sent(100, float(t))
+    assert flow.seen(2, 2.0)
+    assert not flow.seen(count, 2.5)
+    assert flow.age(3.0) == pytest.approx(1.0)

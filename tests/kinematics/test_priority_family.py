@@ -1,0 +1,166 @@
+"""The readings on random members of the family, against searches on the joints."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import forward_batch, inverse_batch
+from katana450.maths.kinematics.branch import BRANCHES, branch_of
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tracker import leap
+from tests.kinematics.family import random_pose
+from tests.kinematics.test_projection_family import limited_member, nearest_point, random_targets
+
+
+def wished_pitch(chain: Chain, T: FloatArray, alpha1: FloatArray) -> FloatArray:
+    """Pitch (k,) [rad] of the roll axis asked for, from planes at `alpha1` (k,) [rad]."""
+    dx, dy, dz = arm_of(chain).pose(T)[:3, 0]
+    inwards = np.cos(alpha1) * dx + np.sin(alpha1) * dy < 0.0
+    return np.asarray(np.arctan2(-dz, np.where(inwards, -1.0, 1.0) * math.hypot(dx, dy)))
+
+
+def least_pitch(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
+    """Least error of the pitch [rad] with the tool point of `T` kept, over a grid of pitches."""
+    targets = [ToolTarget(T[:3, 3], float(p), 0.0) for p in np.linspace(-math.pi, math.pi, 2001)]
+    poses = [
+        target.pose(chain, target.facing(chain, branch, float(q0[0])))
+        for branch in BRANCHES[::2]
+        for target in targets
+    ]
+    found = inverse_batch(chain, np.array(poses), residuals=True)
+    assert found.position_error is not None
+    assert found.rotation_error is not None
+    fits = ((found.q >= chain.lower) & (found.q <= chain.upper))[:, :, :4].all(axis=2)
+    fits &= (found.position_error < 1e-9) & (found.rotation_error < 1e-9)
+    alpha = arm_of(chain).canonical(found.q[fits])
+    pitch = alpha[:, 1:4].sum(axis=1) - arm_of(chain).tilt
+    error = np.abs(pitch - wished_pitch(chain, T, alpha[:, 0]) + math.pi) % math.tau - math.pi
+    return float(np.abs(error).min()) if error.size else math.inf
+
+
+def nearest_at_pitch(
+    chain: Chain, T: FloatArray, held: Projection, pitch: float, rng: np.random.Generator
+) -> float:
+    """Least distance [m] to the point of `T` that a random search on the branch of `held` finds.
+
+    With the `pitch` held, in planes that see the asked roll axis as the plane of `held` does. A
+    limit of axis 1 that holds the arm is taken for the best place of it.
+    """
+    arm, branch = arm_of(chain), held.branch
+    lower, upper = np.sort((arm.canonical(chain.lower), arm.canonical(chain.upper)), axis=0)
+    middle = 0.5 * (lower + upper)[3]
+    seen = float(wished_pitch(chain, T, arm.canonical(held.q)[:1])[0])
+
+    if 0 in held.limits:
+        lower[0] = upper[0] = arm.canonical(held.q)[0]
+
+    def distances(alpha: FloatArray) -> FloatArray:
+        four = pitch + arm.tilt - alpha[:, 1] - alpha[:, 2] - middle
+        alpha[:, 3] = middle + (four + math.pi) % math.tau - math.pi
+        points = forward_batch(chain, arm.joints(alpha))[:, :3, 3]
+        x, y, _ = arm.T_C_S[:3, :3] @ points.T + arm.T_C_S[:3, 3:]
+        r = x * np.cos(alpha[:, 0]) + y * np.sin(alpha[:, 0])
+        fits = (alpha[:, 3] >= lower[3]) & (alpha[:, 3] <= upper[3])
+        fits &= np.abs(wished_pitch(chain, T, alpha[:, 0]) - seen) < 1e-9
+        fits &= (r >= 0.0) if branch.shoulder == "front" else (r <= 0.0)
+        fits &= (np.sin(alpha[:, 2]) >= 0.0) == (branch.elbow == "up")
+        return np.where(fits, np.linalg.norm(points - T[:3, 3], axis=1), np.inf)
+
+    starts, samples = 12, 40
+    alpha = rng.uniform(lower, upper, size=(8_000, 5))
+    d = distances(alpha)
+    best = np.argpartition(d, starts)[:starts]
+    alpha, least, width = alpha[best], d[best], np.full(starts, 0.2)
+    rows = np.arange(starts)
+    for _ in range(90):
+        step = rng.normal(size=(starts, samples, 5)) * width[:, None, None]
+        # Moving few joints at a time keeps the others on their limits.
+        step *= rng.random(step.shape) < 0.6
+        # With axis 4 at a limit the two before it have to move against each other.
+        step[:, ::3, 2] = -step[:, ::3, 1]
+        tried = np.clip(alpha[:, None] + step, lower, upper).reshape(-1, 5)
+        d = distances(tried).reshape(starts, samples)
+        k = d.argmin(axis=1)
+        better = d[rows, k] < least
+        alpha[better] = tried.reshape(starts, samples, 5)[rows, k][better]
+        least = np.where(better, d[rows, k], least)
+        width *= np.where(better, 1.3, 0.75)
+    return float(least.min())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_search_keeps_the_promise_of_a_reading_better(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    chain = limited_member(rng, lateral=seed % 2 == 1)
+    kept = 0
+    for T in random_targets(chain, rng, 3):
+        position = project(chain, T, priority=Priority.POSITION)
+        assert position.position_error <= nearest_point(chain, T[:3, 3], rng) + 1e-6
+        if position.position_error < 1e-9:
+            assert position.pitch_error <= least_pitch(chain, T, position.q) + 1e-9
+        for branch in BRANCHES:
+            held = project(chain, T, priority=Priority.PITCH, branch=branch)
+            alpha1 = arm_of(chain).canonical(held.q)[:1]
+            pitch = float(wished_pitch(chain, T, alpha1)[0])
+            # The tool may face away from axis 1 or towards it.
+            ways = (pitch, math.pi - pitch)
+            least = [nearest_at_pitch(chain, T, held, way, rng) for way in ways]
+            if held.pitch_error > 1e-9:
+                assert min(least) == math.inf
+                continue
+            kept += 1
+            taken, _ = pitch_and_roll(chain, held.q)
+            misses = [abs(math.remainder(taken - way, math.tau)) for way in ways]
+            assert min(misses) <= 1e-9
+            assert held.position_error <= least[int(np.argmin(misses))] + 1e-6
+    assert kept > 0
+
+
+@pytest.mark.parametrize("priority", Priority)
+def test_reachable_pose_is_unchanged_by_every_priority(
+    priority: Priority, rng: np.random.Generator
+) -> None:
+    for _ in range(60):
+        chain = limited_member(rng)
+        q = rng.uniform(chain.lower, chain.upper)
+        T = forward(chain, q)
+        p = project(chain, T, priority=priority, branch=branch_of(chain, q), q_hint=q)
+        np.testing.assert_allclose(p.q, q, atol=1e-7)
+        assert p.position_error < 1e-12
+        assert p.rotation_error < 1e-10
+        assert p.pitch_error < 1e-9
+        assert p.limits == ()
+
+
+@pytest.mark.parametrize("priority", Priority)
+def test_five_numbers_of_a_posture_lead_back_to_it(
+    priority: Priority, rng: np.random.Generator
+) -> None:
+    """Also with the tool point beside the roll axis."""
+    for number in range(120):
+        chain = limited_member(rng)
+        if number % 2:
+            chain = chain.with_tool(chain.M @ random_pose(rng, 0.02))
+        q = rng.uniform(chain.lower, chain.upper)
+        target, branch = ToolTarget.at(chain, q), branch_of(chain, q)
+        T = forward(chain, q)
+        near = q + 0.01 * rng.normal(size=5)
+        if number % 2 == 0:
+            facing = target.facing(chain, branch, float(near[0]))
+            assert math.remainder(facing - q[0], math.tau) == pytest.approx(0.0, abs=1e-9)
+        np.testing.assert_allclose(target.pose(chain, float(q[0])), T, atol=1e-12)
+        best = leap(chain, near, target, branch, priority)
+        assert best.position_error < 1e-9
+        assert best.yaw_error == 0.0
+        if number % 2 == 0:
+            np.testing.assert_allclose(best.q, q, atol=1e-7)

@@ -1,0 +1,178 @@
+"""What is planned together: what is put in a row, and the pitch of a grasp with its use."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from katana450.errors import CancelledError, InputError
+from katana450.extensions.programs.actions import PutObject
+from katana450.extensions.programs.compiler import FINDING, TIMING, Compiler, PlanningStage
+from katana450.extensions.programs.plan_builder import PlanBuilder, UntimedPath
+from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.planning.checkpoint import checked_by
+from tests.programs.conftest import Stage
+
+NEAR = (165.0, 286.0)
+"""[mm] So near the arm that the basin is reached at a steep pitch alone."""
+
+
+def puts(*spots: tuple[str, tuple[float, float]]) -> str:
+    steps = (f"  - put: {{object: {name}, x: {x:g}, y: {y:g}}}" for name, (x, y) in spots)
+    return "steps:\n" + "\n".join(steps)
+
+
+def stood(stage: Stage, name: str) -> tuple[float, float]:
+    """[mm] Where it stands at first."""
+    (scene_object,) = (each for each in stage.begin().objects if each.name == name)
+    x, y, _ = (1e3 * scene_object.T[:3, 3]).tolist()
+    return x, y
+
+
+def test_cup_and_basin_change_places(stage: Stage) -> None:
+    cup, basin = stood(stage, "cup"), stood(stage, "basin")
+    text = puts(("cup", basin), ("basin", cup))
+    program = compiled(parse(text), stage.plan_context, stage.begin())
+    ends = [task.order.scene_object for task in program.tasks if isinstance(task.order, PutObject)]
+    assert [(each.name, *np.round(1e3 * each.T[:2, 3], 6)) for each in ends] == [
+        ("cup", *basin),
+        ("basin", *cup),
+    ]
+    _, states = stage.play(program, stage.begin())
+    at = {each.name: 1e3 * each.T[:2, 3] for each in states[-1].objects}
+    assert at["cup"] == pytest.approx(basin)
+    assert at["basin"] == pytest.approx(cup)
+
+
+@pytest.mark.parametrize(
+    ("between", "last", "said"),
+    [
+        # What stands still meanwhile is in the way.
+        ("  - wait: 0.1\n", (-200.0, 300.0), "cup would stand in basin"),
+        # And so is what is put there last.
+        ("", None, "basin would stand in cup"),
+    ],
+)
+def test_an_arrangement_in_which_objects_stand_in_each_other_is_refused(
+    stage: Stage, between: str, last: tuple[float, float] | None, said: str
+) -> None:
+    basin = stood(stage, "basin")
+    last = last or (basin[0] + 20.0, basin[1])
+    text = puts(("cup", basin)) + "\n" + between + puts(("basin", last))[7:]
+    with pytest.raises(ScriptError, match=said):
+        compiled(parse(text), stage.plan_context, stage.begin())
+
+
+@pytest.mark.parametrize("name", ["cup", "basin"])
+@pytest.mark.parametrize("spot", [(1500.0, 0.0), (300.0, -720.0), (-260.0, 300.0)])
+def test_an_object_beyond_the_table_is_refused_before_anything_moves(
+    stage: Stage, name: str, spot: tuple[float, float]
+) -> None:
+    text = puts((name, spot)).replace("steps:\n", "steps:\n  - home\n")
+    x, y = spot
+    said = rf"line 3.*{name} would be in the air at x {x:.1f}, y {y:.1f} mm: nothing carries it"
+    with pytest.raises(ScriptError, match=said) as refused:
+        compiled(parse(text), stage.plan_context, stage.begin())
+    assert "from x -250 to 750 and from y -700 to 700 mm" in str(refused.value)
+
+
+def test_an_object_at_the_edge_of_the_table_is_carried(stage: Stage) -> None:
+    program = compiled(parse(puts(("cup", (740.0, 690.0)))), stage.plan_context, stage.begin())
+    _, states = stage.play(program, stage.begin())
+    at = {each.name: 1e3 * each.T[:2, 3] for each in states[-1].objects}
+    assert at["cup"] == pytest.approx((740.0, 690.0))
+
+
+def test_the_same_step_is_planned_anew_when_objects_stand_elsewhere(stage: Stage) -> None:
+    """The second time the basin stands where the arm went the first time."""
+    once = (
+        "frame: base\ntool: tcp\nsteps:\n  - repeat:\n      times: 1\n      steps:\n"
+        "        - move: {x: 360, y: 0, z: 60, pitch: 60}\n        - home\n"
+        "        - put: {object: cup, x: 0, y: -400}\n"
+        "        - put: {object: basin, x: 420, y: 0}\n"
+    )
+    assert compiled(parse(once), stage.plan_context, stage.begin()).steps == 5
+    with pytest.raises(ScriptError, match=r"line 7.* and basin are .* too near"):
+        compiled(parse(once.replace("times: 1", "times: 2")), stage.plan_context, stage.begin())
+
+
+LINES = "tool: tcp\nsteps:\n  - line: {by: {z: 20}}\n  - line: {by: {y: 20}}\n  - home\n"
+
+
+def test_planning_reports_each_step_of_both_phases(stage: Stage) -> None:
+    stages: list[PlanningStage] = []
+    compiled(parse(LINES), stage.plan_context, stage.begin(), report=stages.append)
+    phases = [(phase, step) for phase in (FINDING, TIMING) for step in range(1, 5)]
+    assert [(each.phase, each.step) for each in stages] == phases
+    fractions = [each.fraction for each in stages]
+    assert fractions[0] == pytest.approx(0.0)
+    assert fractions == sorted(fractions)
+    assert fractions[-1] < 1.0
+
+
+def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
+    """Each phase is cancelled in its middle, and the longest gap between checkpoints is short."""
+    for phase in (FINDING, TIMING):
+        reached: list[PlanningStage] = []
+
+        def check() -> None:
+            if any(each == (phase, 3, 4) for each in reached):  # noqa: B023
+                raise CancelledError("enough")
+
+        with pytest.raises(CancelledError, match="enough"), checked_by(check):
+            compiled(parse(LINES), stage.plan_context, stage.begin(), report=reached.append)
+        assert reached[-1] == (phase, 3, 4)
+    gaps: list[float] = []
+    begun = time.thread_time()
+
+    def measure() -> None:
+        nonlocal begun
+        now = time.thread_time()
+        gaps.append(now - begun)
+        begun = now
+
+    with checked_by(measure):
+        compiled(parse(PourDemo().text), stage.plan_context, stage.begin())
+    assert len(gaps) > 1000
+    assert max(gaps) < 0.25
+
+
+@pytest.fixture
+def untimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How long ways take is not what is looked at here."""
+    monkeypatch.setattr(UntimedPath, "timed", lambda self: self)
+
+
+def layout(stage: Stage, text: str) -> tuple[PlanBuilder, Compiler]:
+    builder = PlanBuilder(stage.plan_context, stage.begin())
+    return builder, Compiler(parse(text), builder)
+
+
+@pytest.mark.usefixtures("untimed")
+def test_another_pitch_is_taken_when_the_first_does_not_reach_the_basin(stage: Stage) -> None:
+    builder, found = layout(stage, PourDemo(basin=NEAR).text)
+    names = [name for orders in found.all() for name, _ in orders]
+    # What led nowhere has left nothing behind.
+    assert names.count("grasp cup: close") == 1
+    assert names.count("pour") == 1
+    assert builder.taken is None
+
+
+@pytest.mark.usefixtures("untimed")
+def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
+    text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
+    with pytest.raises(InputError, match="cannot be emptied into basin") as told:
+        layout(stage, text)[1].all()
+    assert "another pitch" not in str(told.value)
+
+
+@pytest.mark.usefixtures("untimed")
+def test_those_that_were_tried_are_told(stage: Stage) -> None:
+    with pytest.raises(InputError, match=r"another pitch .* tried 30, .* and \d+ deg") as told:
+        layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].all()
+    assert "with a pitch of 30.0 deg" in str(told.value)

@@ -1,0 +1,194 @@
+"""What stands around is drawn as it is said to look, and is coated where the arm is near."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+import viser
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import Environment, SceneObject, Shape
+from katana450.arm.control.session import Session
+from katana450.arm.control.solid import ObjectAppearance
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.robot.creases import drawn, glb
+from katana450.arm.robot.object_meshes import Mesh, Meshes
+from katana450.arm.robot.props import load_props
+from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.maths.water.environment import TableTop
+from katana450.server.view.objects_panel import NOTHING, ObjectsPanel
+from katana450.server.view.scene_objects import ThingNodes
+from katana450.server.view.tint import Tint
+from tests.view.gestures import RecordedGestures
+from tests.viser_bridge import internals
+
+PATH = "/objects/1"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def mesh() -> Mesh:
+    painted = trimesh.creation.box((60.0, 40.0, 20.0))
+    painted.visual.face_colors = [[220, 30, 30, 255]] * 6 + [[30, 30, 220, 255]] * 6
+    return read_mesh(painted.export(file_type="ply"), "it.ply")
+
+
+def seen(state: State, *objects: SceneObject, near: str = "") -> State:
+    found = (Finding(Reason.CONTACT, 0.005, parts=(near, "finger")),) if near else ()
+    return replace(state, objects=objects, findings=found)
+
+
+def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
+    server: viser.ViserServer, session: Session, mesh: Mesh
+) -> None:
+    meshes = Meshes()
+    meshes.put([mesh], ())
+    nodes = ThingNodes(server, load_props(), Environment(None, None), RecordedGestures(), meshes)
+    state = session.begin(session.ready, 0.0, 0.0)
+    scene_object = SceneObject("it", Shape.MESH, (), np.eye(4), solid=mesh.solid)
+
+    def node(name: str = "shape") -> viser.SceneNodeHandle:
+        return internals.nodes(server)[f"{PATH}/{name}"]
+
+    nodes.follow(seen(state, scene_object))
+    own = node()
+    assert isinstance(own, viser.GlbHandle)
+    nodes.follow(seen(state, replace(scene_object, scale=2.0)))
+    assert node() is own
+    assert own.scale == 2.0
+    nodes.follow(seen(state, replace(scene_object, appearance=ObjectAppearance((1, 2, 3), 0.5))))
+    one = node()
+    assert isinstance(one, viser.MeshHandle)
+    assert (tuple(one.color), one.opacity, one.scale) == ((1, 2, 3), 0.5, 1.0)
+    nodes.follow(seen(state, replace(scene_object, appearance=ObjectAppearance((4, 5, 6)))))
+    assert node() is one
+    assert (tuple(one.color), one.opacity) == ((4, 5, 6), None)
+
+    def shown(path: str = PATH) -> bool:
+        return bool(internals.nodes(server)[path].visible)
+
+    nodes.follow(
+        seen(state, replace(scene_object, appearance=ObjectAppearance((4, 5, 6), hidden=True)))
+    )
+    assert not shown()
+    nodes.follow(
+        seen(
+            state,
+            replace(scene_object, appearance=ObjectAppearance((4, 5, 6)), scale=1.5),
+            near="it",
+        )
+    )
+    assert shown()
+    coat = node("contact")
+    assert isinstance(coat, viser.MeshHandle)
+    assert (tuple(coat.color), coat.scale) == (Tint.COLOUR, 1.5)
+    assert shown(f"{PATH}/contact")
+    nodes.follow(
+        seen(state, replace(scene_object, appearance=ObjectAppearance((4, 5, 6)), scale=1.5))
+    )
+    assert not shown(f"{PATH}/contact")
+    nodes.follow(seen(state))
+    assert not [each for each in internals.nodes(server) if each.startswith(PATH)]
+
+
+def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
+    server: viser.ViserServer, session: Session, mesh: Mesh
+) -> None:
+    nodes = ThingNodes(server, load_props(), Environment(None, None), RecordedGestures(), Meshes())
+    state = session.begin(session.ready, 0.0, 0.0)
+    scene_object = SceneObject("it", Shape.MESH, (), np.eye(4), solid=mesh.solid)
+    nodes.follow(seen(state, scene_object))
+    shape = internals.nodes(server)[f"{PATH}/shape"]
+    assert isinstance(shape, viser.MeshHandle)
+    np.testing.assert_allclose(np.ptp(shape.vertices, axis=0), mesh.solid.size, atol=1e-6)
+    nodes.follow(seen(state))
+
+
+def test_faces_are_apart_at_creases_and_colours_and_one_where_they_bend(mesh: Mesh) -> None:
+    ball = trimesh.creation.icosphere(3)
+    assert len(drawn(ball.vertices, ball.faces).vertices) == len(ball.vertices)
+    half = np.where(ball.triangles_center[:, 2] > 0.0, 0, 1)
+    colours = np.array([[255, 0, 0, 255], [0, 0, 255, 255]], dtype=np.uint8)[half]
+    split = drawn(ball.vertices, ball.faces, colours)
+    assert split.colours is not None
+    np.testing.assert_array_equal(split.colours[split.faces][:, 0], colours)
+    np.testing.assert_allclose(split.vertices[split.faces], ball.triangles, atol=1e-12)
+    assert len(ball.vertices) < len(split.vertices) < len(ball.vertices) + 100
+    tube = trimesh.creation.cylinder(1.0, 2.0, sections=32)
+    # The round side is one, each lid another, its middle shared by nobody.
+    assert len(drawn(tube.vertices, tube.faces).vertices) == 4 * 32 + 2
+    # Read by another program: where it was, in its colours.
+    back = trimesh.load_scene(trimesh.util.wrap_as_stream(glb(mesh.drawn, 0.5)), file_type="glb")
+    np.testing.assert_allclose(np.ptp(back.bounds, axis=0), mesh.solid.size, atol=1e-6)
+
+
+def test_cup_dragged_beyond_the_table_waits_at_its_edge(
+    server: viser.ViserServer, session: Session
+) -> None:
+    """The person hears why when they let go, and the handle comes back to the cup."""
+    gestures = RecordedGestures()
+    put = gestures.commands
+    around = Environment(None, None, TableTop((-0.25, 0.75), (-0.7, 0.7), -0.025))
+    nodes = ThingNodes(server, load_props(), around, gestures, Meshes())
+    cup = SceneObject("cup", Shape.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
+    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))
+    told: list[str] = []
+    client = SimpleNamespace(add_notification=lambda _title, text, **_: told.append(text))
+
+    def drag(phase: str, x: float) -> None:
+        target = SimpleNamespace(position=(x, 0.1, 0.0))
+        event: Any = SimpleNamespace(phase=phase, target=target, client=client, client_id=1)
+        nodes._moved("cup", event)
+
+    drag("start", 0.7)
+    drag("update", 0.74)
+    drag("update", 1.5)
+    assert [each.scene_object.T[0, 3] for each in put if isinstance(each, cmd.PlaceObject)] == [
+        0.7,
+        0.74,
+    ]
+    assert not told
+    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), put[-1].scene_object))  # type: ignore[union-attr]
+    drag("end", 1.5)
+    assert len(put) == 2
+    assert "nothing carries it there" in told[0]
+    assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
+
+
+def test_the_panel_shows_the_object_there_is(
+    server: viser.ViserServer, session: Session, mesh: Mesh
+) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    panel = ObjectsPanel(server, RecordedGestures(), lambda: state, session.environment)
+    assert panel._choice.value == NOTHING
+    scene_object = SceneObject(
+        "it",
+        Shape.MESH,
+        (),
+        np.eye(4),
+        solid=mesh.solid,
+        scale=2.0,
+        appearance=ObjectAppearance((9, 8, 7)),
+    )
+    other = replace(scene_object, name="other", scale=1.0)
+    panel.follow(seen(state, scene_object), caught_up=True)
+    assert (panel._choice.value, panel._scale.value) == ("it", 2.0)
+    assert tuple(panel._colour.value) == (9, 8, 7)
+    panel.follow(seen(state, scene_object, other), caught_up=False)
+    assert panel._choice.value == "it"
+    panel.follow(seen(state, scene_object, other), caught_up=True)
+    assert (panel._choice.value, panel._scale.value) == ("other", 1.0)
+    panel.follow(seen(state, scene_object), caught_up=True)
+    assert (panel._choice.value, panel._scale.value) == ("it", 2.0)

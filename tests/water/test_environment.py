@@ -1,0 +1,59 @@
+"""The basin's level, and the props as vessels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from katana450.arm.robot.props import BASIN_AT, load_props
+from katana450.arm.robot.water import water_environment
+from katana450.errors import InputError
+from katana450.maths.water.environment import Basin, WaterEnvironment
+from tests.geometry.strategies import repeatable
+
+radii = st.floats(0.01, 0.3)
+basins = st.builds(
+    lambda a, b, depth: Basin((0.0, 0.0, 0.0), 0.004, a, b, depth, max(a, b) + 0.01),
+    radii,
+    radii,
+    st.floats(0.01, 0.2),
+)
+
+
+def test_the_props_are_the_vessels(environment: WaterEnvironment) -> None:
+    props = load_props()
+    assert environment.cup.inside.radius == props.cup.inner_radius
+    assert environment.cup.floor + environment.cup.inside.depth == pytest.approx(props.cup.height)
+    assert environment.basin.rim == pytest.approx(props.basin.height)
+    assert environment.basin.radius(0.0) == props.basin.floor_radius < props.basin.inner_radius
+    assert environment.basin.at == BASIN_AT
+    assert water_environment(props, (0.3, 0.1, 0.0)).basin.at == (0.3, 0.1, 0.0)
+
+
+@repeatable
+@given(basins, st.floats(0.0, 1.0))
+def test_a_level_is_the_inverse_of_a_volume(basin: Basin, fraction: float) -> None:
+    level = fraction * basin.depth
+    z = (np.arange(2000) + 0.5) / 2000.0 * level
+    slices = np.array([basin.radius(height) for height in z])
+    summed = float((math.pi * slices**2).mean()) * level
+    assert basin.volume(level) == pytest.approx(summed, rel=1e-6, abs=1e-18)
+    assert basin.level(basin.volume(level)) == pytest.approx(level, rel=1e-11, abs=1e-15)
+
+
+def test_a_straight_basin_is_the_limit_of_leaning_ones(environment: WaterEnvironment) -> None:
+    straight = replace(environment.basin, rim_radius=environment.basin.floor_radius)
+    nearly = replace(straight, rim_radius=straight.floor_radius * (1.0 + 1e-12))
+    assert nearly.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)
+
+
+def test_a_basin_without_size_or_place_is_refused(environment: WaterEnvironment) -> None:
+    with pytest.raises(InputError, match="depth"):
+        replace(environment.basin, depth=math.nan)
+    with pytest.raises(InputError, match="stands at"):
+        replace(environment.basin, at=(0.2, math.inf, 0.0))
