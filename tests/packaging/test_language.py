@@ -1,0 +1,110 @@
+"""Check the language of code, documentation and messages against a list of words to avoid."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CODE = ("app", "robot_description", "benchmarks", "examples", "tests")
+PROSE = ("docs", "examples")
+PAGE = (".js", ".html", ".css")
+
+OPENINGS = ("Of", "That", "Those", "Likewise", "What", "Who", "Whoever", "Whose", "How", "Whether")
+"""Words that begin no docstring: the first word is a verb, or a noun that names the thing."""
+
+WORDS = {
+    r"whoever|whomever|wherever": "name the subject: 'a client that ...', 'the person who ...'",
+    r"likewise": "'also', or repeat the verb",
+    r"signs? of life": "'heartbeat'",
+    r"patience": "'timeout'",
+    r"wish(es|ed)?": "'target' or 'request'",
+    r"(is|are|was|were|be|been|gets|being) told": "'is reported', 'is notified'",
+    r"(is|are) said": "'is reported', 'is stated'",
+    r"(go|goes|going|went) on": "'continue'",
+    r"no good": "'invalid'",
+    r"all the same": "'nevertheless', or a sentence of its own",
+    r"nought|naught": "'zero' or 'nothing'",
+    r"none the (less|worse)": "say what happens instead",
+    r"once more": "'again'",
+}
+"""Pattern of words to avoid, and what to write instead."""
+
+PATTERN = re.compile("|".join(rf"(?P<w{i}>\b(?:{word})\b)" for i, word in enumerate(WORDS)), re.I)
+
+
+def python_files() -> Iterator[Path]:
+    for folder in CODE:
+        yield from sorted((ROOT / folder).rglob("*.py"))
+
+
+def texts_of(source: str) -> Iterator[tuple[int, str]]:
+    """Return docstrings and texts with at least two words, each with its line."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+            yield node.lineno, node.value
+
+
+def docstrings_of(source: str) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node)
+            if text:
+                yield getattr(node, "lineno", 1), text
+
+
+def advice_on(text: str) -> list[str]:
+    """Return one line of advice for each word of ``text`` that is on the list."""
+    advice = tuple(WORDS.values())
+    return [
+        f"{found.group()!r}: {advice[int((found.lastgroup or 'w0')[1:])]}"
+        for found in PATTERN.finditer(" ".join(text.split()))
+    ]
+
+
+def test_docstrings_begin_with_a_verb_or_a_noun() -> None:
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line}: {text.splitlines()[0]}"
+        for file in python_files()
+        for line, text in docstrings_of(file.read_text(encoding="utf-8"))
+        if text.split()[0].strip(",.:") in OPENINGS
+    ]
+    assert not wrong, f"{len(wrong)} docstrings\n" + "\n".join(wrong)
+
+
+def test_texts_in_code_avoid_the_words_on_the_list() -> None:
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line}: {advice}"
+        for file in python_files()
+        if file != Path(__file__)
+        for line, text in texts_of(file.read_text(encoding="utf-8"))
+        for advice in advice_on(text)
+    ]
+    assert not wrong, f"{len(wrong)} texts\n" + "\n".join(wrong)
+
+
+def test_documentation_and_page_avoid_the_words_on_the_list() -> None:
+    files = [*ROOT.glob("*.md"), *(file for name in PROSE for file in (ROOT / name).rglob("*.md"))]
+    files += [file for file in (ROOT / "static").rglob("*") if file.suffix in PAGE]
+    wrong = [
+        f"{file.relative_to(ROOT)}: {advice}"
+        for file in sorted(files)
+        for advice in advice_on(file.read_text(encoding="utf-8"))
+    ]
+    assert not wrong, f"{len(wrong)} places\n" + "\n".join(wrong)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("The person is told at once.", 1),
+        ("It goes\non, likewise.", 2),
+        ("A client that floods is disconnected.", 0),
+    ],
+)
+def test_words_are_found_across_line_ends(text: str, found: int) -> None:
+    assert len(advice_on(text)) == found
