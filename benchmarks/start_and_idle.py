@@ -44,7 +44,8 @@ APPS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
 
 class Times(NamedTuple):
     """Seconds from the command to the open port, and to a page that can be used; and that a page
-    takes to load once the server runs."""
+    takes to load once the server runs.
+    """
 
     port: float
     usable: float

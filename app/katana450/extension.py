@@ -132,7 +132,8 @@ def _is_installed(name: str) -> bool:
 
 def missing_extension(error: ImportError) -> str | None:
     """Return the name of the extension that ``error`` could not import, or None if it is another
-    module."""
+    module.
+    """
     prefix, _, rest = (error.name or "").partition(f"{PACKAGE}.")
     return rest.split(".")[0] if rest and not prefix else None
 

@@ -92,7 +92,7 @@ def _slanted(sections: Sequence[CrossSection]) -> CrossSection:
 def lettering(text: str, height: float, thick: float) -> Manifold:
     """Return ``text`` centred on the origin, reading along x, standing from z 0 to ``thick``.
 
-    Raises
+    Raises:
     ------
     ValueError
         A letter has no strokes.

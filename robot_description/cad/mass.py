@@ -200,7 +200,7 @@ def _block(found: Inertial) -> str:
 def with_inertials(urdf: str, found: Mapping[str, Inertial]) -> str:
     """Return the text ``urdf`` with the <inertial> of each link replaced, all else untouched.
 
-    Raises
+    Raises:
     ------
     ValueError
         A link has no <inertial> to replace.

@@ -57,7 +57,7 @@ def fillet_points(
 ) -> list[tuple[float, float]]:
     """Return the points that replace ``corner`` between two others by an arc of ``radius`` mm.
 
-    Raises
+    Raises:
     ------
     ValueError
         The arc does not fit: a side is shorter than the arc's tangent.
@@ -91,7 +91,7 @@ def fillet_points(
 def filleted(chain: Sequence[tuple[float, float, float]]) -> list[list[tuple[float, float]]]:
     """Return what replaces each inner corner (u, v, fillet radius) of an open ``chain``, mm.
 
-    Raises
+    Raises:
     ------
     ValueError
         Two neighbouring fillets overlap, or one is longer than its side.
@@ -136,7 +136,8 @@ def toothed(
     at: tuple[float, float] = (0.0, 0.0),
 ) -> Outline:
     """Return a circle with ``count`` teeth: each (fraction of the pitch, depth below
-    ``radius``)."""
+    ``radius``).
+    """
     step = 2.0 * math.pi / count
     points = [
         (
@@ -158,7 +159,7 @@ def hull(*outlines: Outline) -> Outline:
 def inset(outline: Outline, distance: float) -> Outline:
     """Return ``outline`` with every side moved inwards by ``distance`` mm, point for point.
 
-    Raises
+    Raises:
     ------
     ValueError
         A side would vanish or turn round: the distance exceeds a corner's radius.

@@ -32,7 +32,7 @@ class Part:
     def bodies(self) -> list[tuple[Material, Manifold]]:
         """Return one solid for each material used, in the fixed order of the materials.
 
-        Raises
+        Raises:
         ------
         ValueError
             A cut has left nothing of a material.

@@ -43,7 +43,7 @@ _TURNS: dict[Direction, list[list[int]]] = {
 def loft(rings: Sequence[NDArray[np.float64]]) -> Manifold:
     """Return the solid through ``rings``, each (n, 3), counter-clockwise about the way up.
 
-    Raises
+    Raises:
     ------
     ValueError
         The rings do not close to a solid.

@@ -1,5 +1,6 @@
 """The process that people and programs speak to: gateway and view. It can end and begin again; the
-arm is in another, and stops meanwhile."""
+arm is in another, and stops meanwhile.
+"""
 
 from __future__ import annotations
 

@@ -13,7 +13,8 @@ CONTINUED = "    | "
 
 def printable(text: str) -> str:
     """``text`` with every character escaped that is not printable: line breaks of any kind,
-    control and format characters, lone surrogates."""
+    control and format characters, lone surrogates.
+    """
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

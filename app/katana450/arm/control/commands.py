@@ -172,7 +172,8 @@ class SetTool(BaseCommand):
 @dataclass(frozen=True)
 class SetPriority(BaseCommand):
     """From now on ``priority`` says which numbers of a target count; the one there is, is
-    reread."""
+    reread.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits()
 
@@ -272,7 +273,8 @@ class Follow(BaseCommand):
 @dataclass(frozen=True)
 class GoAlong(BaseCommand):
     """Go on or back along the plan that is followed, to ``fraction`` of it: 0 its start, 1 its
-    end."""
+    end.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits()
 

@@ -42,12 +42,12 @@ class Following:
 
     @property
     def local(self) -> float:
-        """tau in that segment [s]."""
+        """Tau in that segment [s]."""
         return float(self.pace.q[0])
 
     @property
     def aim(self) -> float:
-        """tau in that segment to come to rest at next: its end where the way leads beyond it."""
+        """Tau in that segment to come to rest at next: its end where the way leads beyond it."""
         begin, end = self.plan.begins[self.number : self.number + 2]
         span = self.segment.scaling.span
         if self.towards >= end:

@@ -178,7 +178,8 @@ FLAT = 1e6
 
 def condition(values: FloatArray) -> str:
     """Largest over smallest of singular values ``values`` (n,), falling; without end in a
-    singularity."""
+    singularity.
+    """
     return "∞" if values[0] >= FLAT * values[-1] else _short(float(values[0] / values[-1]))
 
 

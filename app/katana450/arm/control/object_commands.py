@@ -116,7 +116,8 @@ class Attach(BaseCommand):
 @dataclass(frozen=True, eq=False)
 class ReplaceScene(BaseCommand):
     """Have these objects about and no others, at one go; what is held stays, as the only one of its
-    name. ``volume``: of water in the cup [m^3]; None for no water anywhere."""
+    name. ``volume``: of water in the cup [m^3]; None for no water anywhere.
+    """
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 

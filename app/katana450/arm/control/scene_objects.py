@@ -289,7 +289,8 @@ class Environment:
 
     def pose(self, scene_object: SceneObject, x: FloatArray) -> FloatArray:
         """(4, 4) of ``scene_object`` in the base frame, at ``x`` (k,): joints and finger joint
-        [rad]."""
+        [rad].
+        """
         return scene_object.T if not scene_object.carried else self._palm(x) @ scene_object.T
 
     def taken(self, scene_object: SceneObject, x: FloatArray) -> SceneObject:
@@ -302,7 +303,8 @@ class Environment:
 
     def mounted(self, scene_object: SceneObject, to: Attachment, x: FloatArray) -> SceneObject:
         """``scene_object`` fixed to the hand, or to it no more. What the fingers hold stays with
-        them."""
+        them.
+        """
         if scene_object.held or (
             to is Attachment.HAND and (scene_object.fixed or self.hand is None)
         ):

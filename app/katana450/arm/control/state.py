@@ -159,7 +159,8 @@ ACCEPTED = Outcome()
 @dataclass(frozen=True)
 class StoppingDistance:
     """Distance that the tool, or else any link, travels until it is at rest [m], and the time that
-    takes [s]."""
+    takes [s].
+    """
 
     way: float
     time: float

@@ -87,7 +87,8 @@ class ConduitStretch:
 
     def between(self, angle: float) -> tuple[int, float]:
         """The number of the last of ``angles`` before ``angle`` [rad], and the fraction beyond
-        it."""
+        it.
+        """
         lower, upper = self.hinge.lower, self.hinge.upper
         row = (min(max(angle, lower), upper) - lower) / (upper - lower) * (ANGLES - 1)
         low = min(int(row), ANGLES - 2)

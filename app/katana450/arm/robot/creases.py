@@ -40,7 +40,8 @@ class Drawn:
 
 def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None) -> Drawn:
     """``vertices`` (n, 3), ``faces`` (m, 3) and their ``colours`` (m, 4), apart where they are to
-    be: corners of one vertex stay one where smooth edges of one colour lead from face to face."""
+    be: corners of one vertex stay one where smooth edges of one colour lead from face to face.
+    """
     normals = np.cross(
         vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
     )

@@ -87,5 +87,5 @@ class Link:
 
     @cached_property
     def colour(self) -> tuple[float, float, float]:
-        """sRGB 0..1 of most of its surface; PLAIN without shapes."""
+        """SRGB 0..1 of most of its surface; PLAIN without shapes."""
         return main_colour(self.shapes)

@@ -66,7 +66,7 @@ PLAIN = (0.8, 0.8, 0.8)
 
 
 def main_colour(shapes: Sequence[VisualMesh]) -> tuple[float, float, float]:
-    """sRGB 0..1 of most of their surface; PLAIN where there are none."""
+    """SRGB 0..1 of most of their surface; PLAIN where there are none."""
     areas: dict[Material, float] = {}
     for shape in shapes:
         areas[shape.material] = areas.get(shape.material, 0.0) + shape.area

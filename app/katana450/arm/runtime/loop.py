@@ -49,7 +49,8 @@ class ControlLoop:
         held_up: float = math.inf,
     ) -> None:
         """``rate``: ticks a second [Hz]. ``held_up``: lateness of a tick [s] that stops an arm
-        which moves: nobody watched over it meanwhile."""
+        which moves: nobody watched over it meanwhile.
+        """
         self._session = session
         self._driver = driver
         self._mailbox = mailbox

@@ -25,7 +25,8 @@ REST_SECONDS = 5.0
 
 class PlanningWorker:
     """Between whoever commands and the arm: a branch is taken on a planned way, clear from end to
-    end; all else goes on at once, and ends the work on a way."""
+    end; all else goes on at once, and ends the work on a way.
+    """
 
     def __init__(self, session: Session, state_publisher: StatePublisher, arm: CommandSink) -> None:
         self._session = session

@@ -228,7 +228,8 @@ def _extrusion(node: Node, name: str) -> MeshSurface:
 
 def _frames(spine: FloatArray) -> list[FloatArray]:
     """(3, 3) of the section's plane at each point of a spine, as 6.18 has it: y along the spine,
-    z out of its bend; where there is none, as at the point before."""
+    z out of its bend; where there is none, as at the point before.
+    """
     closed = bool((spine[0] == spine[-1]).all())
     ahead, behind = np.roll(spine, -1, axis=0), np.roll(spine, 1, axis=0)
     if closed:

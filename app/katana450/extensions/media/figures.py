@@ -93,7 +93,7 @@ def path_figure(paths: Sequence[PathTrace]) -> bytes:
 
 
 def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
-    """sigma (m,) in the middle of PARTS parts of every path, and the largest error there [m].
+    """Sigma (m,) in the middle of PARTS parts of every path, and the largest error there [m].
 
     Rounding errors jump from place to place: all of them on each other would be a block of colour.
     """

@@ -43,7 +43,8 @@ class Translucent(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Picture:
     """pixels: (height, width, 3) sRGB of 255. item: (height, width) the item that the middle of
-    each pixel shows, FLOOR or NOWHERE. names: of the items, those that are seen through last."""
+    each pixel shows, FLOOR or NOWHERE. names: of the items, those that are seen through last.
+    """
 
     pixels: npt.NDArray[np.uint8]
     item: Ints

@@ -1,5 +1,6 @@
 """Pictures of a run at the moments a paper would show: its Figs. 9 to 12 for an object that is
-carried and poured, and for a path the arm on it with what it has traced."""
+carried and poured, and for a path the arm on it with what it has traced.
+"""
 
 from __future__ import annotations
 

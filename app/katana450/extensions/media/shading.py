@@ -126,7 +126,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def developed(light: Floats) -> Floats:
-    """sRGB 0..1 of light: as it is up to the shoulder, then softly up to white."""
+    """SRGB 0..1 of light: as it is up to the shoulder, then softly up to white."""
     over = np.maximum(light - SHOULDER, 0.0) / (1.0 - SHOULDER)
     soft = SHOULDER + (1.0 - SHOULDER) * (1.0 - np.exp(-over))
     x = np.clip(np.where(light > SHOULDER, soft, light), 0.0, 1.0)

@@ -29,7 +29,8 @@ def check_traceable() -> None:
 
 class Meeting(NamedTuple):
     """The first triangle each of n rays meets: its number or NOTHING, how far off (n,) [m], and
-    the shares (n,) of its second and third corner where it is met."""
+    the shares (n,) of its second and third corner where it is met.
+    """
 
     face: Ints
     distance: Floats

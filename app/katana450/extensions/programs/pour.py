@@ -10,7 +10,8 @@ Spot = tuple[float, float]
 @dataclass(frozen=True)
 class PourDemo:
     """water: [ml]. cup, basin: where they stand on the table [mm], None where they are. shake: how
-    often the cup is shaken out."""
+    often the cup is shaken out.
+    """
 
     water: float = 200.0
     cup: Spot | None = None

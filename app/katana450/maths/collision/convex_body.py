@@ -248,7 +248,8 @@ def _grown(
 
 def _corners(planes: FloatArray, inside: FloatArray) -> FloatArray:
     """Of what is under all ``planes``, by the hull of the dual points n / h (Preparata and Shamos,
-    Computational Geometry, 1985, ch. 7)."""
+    Computational Geometry, 1985, ch. 7).
+    """
     normals, heights = planes[:, :3], planes[:, 3] - planes[:, :3] @ inside
     dual, far, _ = _faces(normals / heights[:, None])
     corners = dual / far[:, None] + inside

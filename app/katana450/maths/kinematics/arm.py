@@ -89,11 +89,11 @@ class FiveAxisArm:
         return T if self.is_canonical else self.T_C_S @ T @ self.T_tool_K
 
     def canonical(self, q: npt.ArrayLike) -> FloatArray:
-        """alpha (..., 5) [rad] of the joint angles `q` (..., 5) [rad]."""
+        """Alpha (..., 5) [rad] of the joint angles `q` (..., 5) [rad]."""
         return np.asarray(q) * self.signs + self.shifts
 
     def joints(self, alpha: npt.ArrayLike) -> FloatArray:
-        """q (..., 5) [rad] of the canonical angles `alpha` (..., 5) [rad]."""
+        """Q (..., 5) [rad] of the canonical angles `alpha` (..., 5) [rad]."""
         # + 0.0 leaves no negative zero behind.
         return (np.asarray(alpha) - self.shifts) * self.signs + 0.0
 

@@ -1,5 +1,6 @@
 """Cancellation of a long calculation: the loops of planning call ``checkpoint``, and the code that
-started them decides in ``checked_by`` whether they continue."""
+started them decides in ``checked_by`` whether they continue.
+"""
 
 from __future__ import annotations
 

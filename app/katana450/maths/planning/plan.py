@@ -94,13 +94,13 @@ class Plan:
 
     @cached_property
     def begins(self) -> tuple[float, ...]:
-        """tau at which each segment begins, and the last ends [s]."""
+        """Tau at which each segment begins, and the last ends [s]."""
         spans = [segment.scaling.span for segment in self.segments]
         return tuple(np.cumsum([0.0, *spans]).tolist())
 
     @property
     def span(self) -> float:
-        """tau at the end [s]."""
+        """Tau at the end [s]."""
         return self.begins[-1]
 
     @property

@@ -89,7 +89,7 @@ class Scaling:
 
     @property
     def span(self) -> float:
-        """tau at the end of the path [s]."""
+        """Tau at the end of the path [s]."""
         return self._starts[-1]
 
     @property
@@ -98,11 +98,11 @@ class Scaling:
         return rest_to_rest(self.span, self.acceleration, self.jerk)
 
     def tau_after(self, t: float) -> float:
-        """tau [s] ``t`` [s] after the start at full speed, from 0 to `duration`."""
+        """Tau [s] ``t`` [s] after the start at full speed, from 0 to `duration`."""
         return self.motion_after(t)[0]
 
     def motion_after(self, t: float) -> tuple[float, float, float]:
-        """tau [s] ``t`` [s] after the start at full speed, tau' [1] and tau'' [1/s]."""
+        """Tau [s] ``t`` [s] after the start at full speed, tau' [1] and tau'' [1/s]."""
         return motion_after(t, self.span, self.acceleration, self.jerk)
 
     @cached_property
@@ -115,13 +115,13 @@ class Scaling:
 
     @cached_property
     def _starts(self) -> list[float]:
-        """tau where each piece begins, and that at the end."""
+        """Tau where each piece begins, and that at the end."""
         fractions = np.array([1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0]) / len(self._pieces)
         passed = np.cumsum(np.array(self._pieces) @ fractions)
         return [0.0, *passed.tolist()]
 
     def pace(self, tau: float) -> PathRates:
-        """sigma at `tau`, from 0 to `span`."""
+        """Sigma at `tau`, from 0 to `span`."""
         starts, count = self._starts, len(self._pieces)
         piece = min(max(bisect_right(starts, tau) - 1, 0), count - 1)
         a, b, c, d = self._pieces[piece]

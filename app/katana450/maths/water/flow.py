@@ -212,7 +212,8 @@ class WaterFlow:
 
 def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
     """Tilt [rad] between the cup's axis and the surface's normal, and downhill as in
-    `WaterSurface`."""
+    `WaterSurface`.
+    """
     R = T[:3, :3]
     weight = norm(slosh.up)
     if weight < MIN_GRAVITY:

@@ -1,5 +1,6 @@
 """What the server says: JSON objects whose ``is`` names what they are. Lengths in m, angles in rad,
-times in s."""
+times in s.
+"""
 
 from __future__ import annotations
 
@@ -109,7 +110,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
     ``by``: its owner. ``status``: planning, cancelled, refused, ready, running, paused, blocked,
     done, stopped or failed. ``step`` of ``steps`` is under way, on ``line`` of the script, and
     ``fraction`` of its ``task`` is done, or of all planning. ``seconds``: all motions at full
-    speed. ``why``: what is wrong with it, or why it was planned anew or not run."""
+    speed. ``why``: what is wrong with it, or why it was planned anew or not run.
+    """
 
     name: str
     by: str

@@ -59,7 +59,8 @@ class Done(Answer, frozen=True, kw_only=True):
 
 class Refused(Answer, frozen=True, kw_only=True):
     """The request is refused and has changed nothing. ``why``: the reason, and what to do.
-    ``retry``: time [s] after which to ask again."""
+    ``retry``: time [s] after which to ask again.
+    """
 
     why: str
     retry: float | None = None

@@ -240,7 +240,8 @@ class Watch(Request, frozen=True, kw_only=True):
 
 class Query(Request, frozen=True, kw_only=True):
     """Tell something once: the state, what arm it is, what held it back, its branches, the loop,
-    the objects around it, the VRML world, where its links are."""
+    the objects around it, the VRML world, where its links are.
+    """
 
     traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
 

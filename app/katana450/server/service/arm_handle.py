@@ -40,7 +40,8 @@ class ArmHandle:
         nodes: Nodes,
     ) -> None:
         """``navigator``: of an arm; None of a mechanism that has only joints. ``nodes``: all that
-        has a name in its VRML world."""
+        has a name in its VRML world.
+        """
         self.robot = robot
         self.nodes = nodes
         self.session = session

@@ -68,7 +68,8 @@ class Hub:
     ) -> None:
         """``hold_after``: silence of whoever drives [s] that stops an arm that moves. ``meshes``:
         those there are at first. ``runner``: makes its ``Runner``, None for one that never
-        drives."""
+        drives.
+        """
         self.clock = clock
         self._hold_after = hold_after
         self.gate = CommandGate(clock)

@@ -99,7 +99,7 @@ def poses(stretch: ConduitStretch, count: int) -> Floats:
 
 
 def _shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
-    """wxyz (n, 4) of the turns of the unit vectors ``a`` onto ``b``, both (n, 3)."""
+    """Wxyz (n, 4) of the turns of the unit vectors ``a`` onto ``b``, both (n, 3)."""
     wxyz = np.column_stack((1.0 + (a * b).sum(axis=1), np.cross(a, b)))
     # Straight back, as from x only: of the half turns that will do, the one about z.
     wxyz[wxyz[:, 0] < BACKWARD] = (0.0, 0.0, 0.0, 1.0)

@@ -32,7 +32,8 @@ class Scenery:
         meshes: Meshes,
     ) -> None:
         """``session``: knows where objects are. ``gestures``: takes those with their handles.
-        ``meshes``: those that objects are of."""
+        ``meshes``: those that objects are of.
+        """
         self._server = server
         self._robot = robot
         self._session = session

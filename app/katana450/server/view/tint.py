@@ -17,7 +17,8 @@ from katana450.server.view.scene import surface
 
 class Tint:
     """Coats links in the shapes that stand for them where contacts are looked for, objects in their
-    own."""
+    own.
+    """
 
     COLOUR = (224, 49, 49)
     OPACITY = 0.55

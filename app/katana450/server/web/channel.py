@@ -90,7 +90,8 @@ class Channel(ABC):
         self, hub: Hub, line: JsonChannel, budget: Budget, *, often: TokenBucket, bad: TokenBucket
     ) -> None:
         """``budget``: of whoever asks, and of all their other windows. ``often``: how much may be
-        asked here. ``bad``: how much of it may be nonsense."""
+        asked here. ``bad``: how much of it may be nonsense.
+        """
         self.hub = hub
         self.budget = budget
         self._dispatcher = Dispatcher(hub)

@@ -149,7 +149,8 @@ async def serve_socket(
 
 class LineServer:
     """The TCP port. Only programs of this machine reach it; a first line that is no ``hello`` ends
-    the connection, so that a page's request, which begins otherwise, gets nowhere."""
+    the connection, so that a page's request, which begins otherwise, gets nowhere.
+    """
 
     def __init__(self, hub: Hub, authenticator: Authenticator, budgets: Budgets) -> None:
         self._hub = hub

@@ -49,7 +49,8 @@ class ProgramRunner(Runner):
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
         """``options.owner_silence``: time without a heartbeat of its owner after which a program
-        ends [s]; a page that reloads is back sooner."""
+        ends [s]; a page that reloads is back sooner.
+        """
         super().__init__(hub, options)
         self._owner_silence: float = options.owner_silence
         self._parts: dict[str, str] = {}
@@ -285,7 +286,8 @@ class ProgramRunner(Runner):
 
     def _begin(self, window: Window, order: ProgramOrder) -> int | None:
         """Run the program that is planned; where the arm or the scene is not as it was planned for,
-        plan it anew first."""
+        plan it anew first.
+        """
         planning, hub = self._planning, self.hub
         if planning is None or planning.program is None:
             raise LeaseError("There is no program that is planned; send one first.")
