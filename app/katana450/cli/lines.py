@@ -34,18 +34,18 @@ class Kinematics:
     """Forward and inverse kinematics of the arm in the URDF, on plain JSON values."""
 
     def __init__(
-        self, urdf: Path, tool: str | None, *, in_base_frame: bool, all_metrics: bool = False
+        self, urdf: Path, tool: str | None, *, in_base_frame: bool, metrics: bool = False
     ) -> None:
         """``in_base_frame``: poses are in the base frame on the table, else in {S}.
 
         ``urdf``, ``tool``: the arm, and the link that is its default tool; see ``load``.
-        ``badges``: solutions carry what they cost to take from the request's ``q``.
+        ``metrics``: solutions carry what they cost to take from the request's ``q``.
         """
-        self._badges = all_metrics
+        self._with_metrics = metrics
         robot = load(urdf, tool)
         self._arm = robot.require_arm()
         self._world = None
-        if all_metrics:
+        if metrics:
             world, _ = world_of(robot)
             self._world = world and world.with_obstacles(initial_objects(load_props()))
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
@@ -63,12 +63,12 @@ class Kinematics:
         ``rotation_misfit`` is how far its columns were off orthonormal.
 
         The residuals say how far that pose is from ``T``, limits of the joints left aside:
-        ``within_limits`` tells of each solution whether the arm can go there. With badges there are
+        ``within_limits`` tells of each solution whether the arm can go there. With metrics there are
         also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
         value, and the two parts in contact there, if any are, with the finger joint at 0 or the
         limit next to it.
         """
-        chain = self._chain(request, {"T", "tool", "q"} if self._badges else {"T", "tool"})
+        chain = self._chain(request, {"T", "tool", "q"} if self._with_metrics else {"T", "tool"})
         start = chain.check_q(_numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
         given = _numbers(request, "T", 2)
         T = se3.printed(given, "T")
@@ -84,7 +84,7 @@ class Kinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
-                | (self._metrics(BranchMetrics.of(chain, solution, start)) if self._badges else {})
+                | (self._metrics(BranchMetrics.of(chain, solution, start)) if self._with_metrics else {})
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),

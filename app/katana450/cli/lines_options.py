@@ -19,7 +19,7 @@ def add_ik_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``ik`` to ``parser``."""
     _add_frame(parser)
     parser.add_argument(
-        "--badges",
+        "--metrics",
         action="store_true",
         help='each solution with its way from "q" in the line (default: the zero posture) '
         "as distance_rad and time_s, its smallest_singular_value, and in contact the two "
