@@ -37,7 +37,7 @@ from katana450.arm.runtime.loop import ControlLoop
 tick = ControlLoop.tick
 def fatal(loop):
     tick(loop)
-    if loop.board.snapshot.state.moving:
+    if loop.state_publisher.snapshot.state.moving:
         raise SystemExit
 if __name__ == "__main__":
     ControlLoop.tick = fatal

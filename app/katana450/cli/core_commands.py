@@ -31,9 +31,7 @@ def _ik(options: Namespace) -> int:
 
     in_base_frame, metrics = options.frame == "base", options.metrics
     return answer_lines(
-        Kinematics(
-            options.urdf, options.tool, in_base_frame=in_base_frame, metrics=metrics
-        ).ik
+        Kinematics(options.urdf, options.tool, in_base_frame=in_base_frame, metrics=metrics).ik
     )
 
 

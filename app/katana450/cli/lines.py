@@ -63,8 +63,8 @@ class Kinematics:
         ``rotation_misfit`` is how far its columns were off orthonormal.
 
         The residuals say how far that pose is from ``T``, limits of the joints left aside:
-        ``within_limits`` tells of each solution whether the arm can go there. With metrics there are
-        also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
+        ``within_limits`` tells of each solution whether the arm can go there. With metrics there
+        are also its way from ``q`` ([n rad]; the zero posture if not given), its smallest singular
         value, and the two parts in contact there, if any are, with the finger joint at 0 or the
         limit next to it.
         """
@@ -84,7 +84,11 @@ class Kinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
-                | (self._metrics(BranchMetrics.of(chain, solution, start)) if self._with_metrics else {})
+                | (
+                    self._metrics(BranchMetrics.of(chain, solution, start))
+                    if self._with_metrics
+                    else {}
+                )
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
