@@ -140,7 +140,7 @@ class Answer(
     kw_only=True,
     omit_defaults=True,
     tag_field="is",
-    tag=str.lower,
+    tag=tag_of,
 ):
     """Base of all answers; ``is`` is the class name in lower case, ``id`` the request's."""
 
