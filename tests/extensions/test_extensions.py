@@ -45,7 +45,7 @@ def add_options(parser):
 
 def routes(context):
     async def weather(request):
-        context.visitor(request)
+        context.identity(request)
         return PlainTextResponse(f"arm: {context.hub.arm is not None}")
     return [Route("/api/v1/weather", weather)]
 

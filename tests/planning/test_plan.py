@@ -119,7 +119,7 @@ def test_unsuccessful_search_ends(
     """Past a wall without end the arm would have to reach over itself."""
     wall_at = se3.from_rotation_translation(np.eye(3), (1.15, 0.0, 0.0))
     endless = bare.with_obstacles([obstacle("wall", wall_at, box((2.0, 0.01, 6.0)))])
-    monkeypatch.setattr("katana450.maths.planning.sampling.EFFORT", 5)
+    monkeypatch.setattr("katana450.maths.planning.sampling.MAX_POSTURES", 5)
     path = across(arm, 0.0)
     with pytest.raises(BlockedError, match=r"found in 5 tries from seed 0\. The straight .*wall"):
         collision_free_path(arm.chain, path.start, path.end, endless, 0.0, 0)

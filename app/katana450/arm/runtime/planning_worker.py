@@ -73,7 +73,7 @@ class PlanningWorker:
         with self._lock:
             self._work = cancelled
         threading.Thread(
-            target=self._find, args=(command, actor, cancelled), name="navigator", daemon=True
+            target=self._find, args=(command, actor, cancelled), name="planning worker", daemon=True
         ).start()
 
     def _find(

@@ -130,7 +130,7 @@ def _wished_jerk(
 def braked(
     q: FloatArray, qd: FloatArray, qdd: FloatArray, A: FloatArray, J: FloatArray
 ) -> FloatArray:
-    """(n,) where joints come to rest that brake as hard as they may [rad]; as ``Limiter.halt``."""
+    """(n,) where joints come to rest that brake as hard as they may [rad]."""
     sign = np.where(qd + qdd * np.abs(qdd) / (2.0 * J) < 0.0, -1.0, 1.0)
     v, a = sign * qd, sign * qdd
     # The jerk leads to the deceleration p, which lasts a while where it is all there is.

@@ -268,7 +268,7 @@ class Branches(Answer, frozen=True, kw_only=True):
 class Loop(Answer, frozen=True, kw_only=True):
     """How well the control loop has kept its period of late.
 
-    ``ticks``: how many are looked at; ``late_p50``, ``late_p99``, ``late_most``: how much later
+    ``ticks``: how many are looked at; ``late_p50``, ``late_p99``, ``late_max``: how much later
     than due they came; ``lost``: that came more than a period late, since the start.
     """
 
