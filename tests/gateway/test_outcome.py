@@ -168,7 +168,7 @@ def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     answer = done(serialize.concluded(answers.Done(ticket=1), *state.outcomes))
     assert (answer.outcome, reasons(answer)) == ("limited", ["axis limit"])
     (part,) = answer.refused
-    assert (part.part, part.command, part.why) == (2, "shift", "There is no 'ball'.")
+    assert (part.part, part.command, part.why) == (2, "move_object", "There is no 'ball'.")
     other = cmd.MoveObject("cube", position=np.zeros(3))
     state = session.step(state, [cmd.Batch((gone, other))], 0.02)
     refused = serialize.concluded(answers.Done(ticket=2), *state.outcomes)
@@ -195,7 +195,7 @@ def test_a_server_names_the_refused_parts_of_a_request(server: AppServer) -> Non
                 break
         lines.answer(do="release_lease")
     assert answer["outcome"] == "limited"
-    assert answer["refused"] == [{"part": 2, "command": "shift", "why": "There is no 'ball'."}]
+    assert answer["refused"] == [{"part": 2, "command": "move_object", "why": "There is no 'ball'."}]
 
 
 def test_what_is_no_command_has_no_outcome(program: Client) -> None:
