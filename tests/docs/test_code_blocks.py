@@ -38,6 +38,9 @@ NOT_CHECKED = {
 # Commands of shell blocks that are neither ours nor targets of make, and where they are run.
 ELSEWHERE = {
     "apt-get": "changes the system",
+    "sudo apt": "changes the system",
+    "uv tool install": "tests/packaging/test_tool_install.py",
+    "pipx install": "installs as uv does, from the same package; pipx is not among the dependencies",
     "docker": "needs a container service; .ci/image builds and runs the image without one",
     "export": "sets a variable for docker",
     "git": "reads the history, which an archive of the sources does not have",
