@@ -17,7 +17,7 @@ NAN = math.nan
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: cmd.SetJoint(0, NAN), "axis 1 has to be a finite number"),
+        (lambda: cmd.SetJoint(0, NAN), "axis 1 must be a finite number"),
         (lambda: cmd.SetJoint(2, math.inf), "axis 3"),
         (lambda: cmd.SetJoint(-1, 0.0), "whole number from 0"),
         (lambda: cmd.SetJoint(True, 0.0), "whole number from 0"),

@@ -166,10 +166,10 @@ def test_tool_command_without_an_arm_is_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (cmd.SetJoint(3, 0.0), "axis 4, only 3"),
+        (cmd.SetJoint(3, 0.0), "axis 4: the robot has 3"),
         (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
-        (cmd.SetJoints(np.zeros(5)), "3 driven joints, the command 5"),
-        (cmd.Servo(np.zeros(2)), "3 driven joints, the command 2"),
+        (cmd.SetJoints(np.zeros(5)), "3 driven joints, but the command has 5"),
+        (cmd.Servo(np.zeros(2)), "3 driven joints, but the command has 2"),
     ],
 )
 def test_what_does_not_fit_is_refused(session: Session, command: cmd.Command, said: str) -> None:

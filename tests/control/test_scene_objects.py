@@ -248,7 +248,7 @@ def test_what_cannot_be_is_refused(session: Session) -> None:
         cmd.PlaceObject(knot(T, fixed=True)),
         cmd.ReplaceScene((knot(T, fixed=True),)),
     ):
-        with pytest.raises(InputError, match="not looked at"):
+        with pytest.raises(InputError, match="no collision checking"):
             blind.check(asked)
 
 

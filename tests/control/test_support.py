@@ -45,7 +45,7 @@ def test_nothing_carries_an_object_beyond_the_table(x: float, y: float) -> None:
 
 
 def test_object_above_the_table_is_in_the_air() -> None:
-    with pytest.raises(InputError, match=r"120\.0 mm above what is below it"):
+    with pytest.raises(InputError, match=r"120\.0 mm above its support"):
         check_carried(TABLE, (), can(at(0.3, 0.0, 0.12)))
 
 

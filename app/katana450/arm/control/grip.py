@@ -1,4 +1,4 @@
-"""What the fingers feel: an object between both is held, and let go when they open."""
+"""Contact of the fingers: an object between both is held, and is let go when they open."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
 TOUCHING = 3e-4
-"""[m] A finger that is no farther touches: as far as the sensors in the pads are soft."""
+"""[m] Distance up to which a finger touches: the sensors in the pads yield by as much."""
 
 CENTRED = 3e-3
-"""[m] When one finger touches and the other is no farther, the object slides between them."""
+"""[m] Distance of the second finger up to which the object slides to the middle when the first
+finger touches it."""
 
 OPENED_TURN, OPENED_SLIDE = 0.02, 1e-3
-"""[rad, m] By as much the fingers open before what they held is free: 1 mm at the pads."""
+"""[rad, m] Opening of the fingers from which on an object is free: 1 mm at the pads."""
 
 
 def gripped(environment: Environment, world: CollisionWorld | None, state: State) -> State:
-    """``state`` after what the fingers did in this tick."""
+    """Return ``state`` after the motion of the fingers in this tick."""
     hand = environment.hand
     if world is None or hand is None or not (hand.fingers and state.objects):
         return state
@@ -45,7 +46,7 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
 
 
 def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
-    """The fingers that feel an object, by what became of it when they closed."""
+    """Return the fingers that touch an object, judged by the result of their closing."""
     if hand is None:
         return ()
     if any(scene_object.held for scene_object in state.objects):
@@ -57,7 +58,7 @@ def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
 def _felt(
     fingers: tuple[str, ...], world: CollisionWorld, scene_object: SceneObject, x: FloatArray
 ) -> dict[str, float]:
-    """How far each finger is from ``scene_object`` [m]."""
+    """Return the distance of each finger from ``scene_object`` [m]."""
     return {finger: world.gap(x, finger, scene_object.name) for finger in fingers}
 
 
@@ -68,7 +69,10 @@ def _closed(
     felt: dict[str, float],
     x: FloatArray,
 ) -> State:
-    """The fingers have closed on ``scene_object``: they stop there, and hold it if both have."""
+    """Return ``state`` with the fingers closed on ``scene_object``.
+
+    The fingers stop, and they hold the object if both touch it.
+    """
     state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
     far = max(felt, key=lambda finger: felt[finger])
