@@ -1,4 +1,4 @@
-"""The lease: every event, from everybody, in every state, does what is written or nothing."""
+"""The lease: every event by every person in every state has its defined effect, or none."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ EVENTS: dict[str, Event] = {
 
 
 def legal(event: str, lease: Lease, who: Person, to: Person) -> bool:
-    """What is written in the lease's own words, once more."""
+    """Return whether the rules of the lease allow the event, written independently of the code."""
     free, mine = lease.holder is None, lease.holder == who
     drives = who.role is not Role.VIEWER
     match event:
@@ -55,7 +55,7 @@ def legal(event: str, lease: Lease, who: Person, to: Person) -> bool:
 
 
 def leases() -> list[Lease]:
-    """Every holder with every queue of the others."""
+    """Return leases with every holder and every queue of the others."""
     found = []
     for holder in (None, ANNA, BERT, CARA):
         others = [each for each in (ANNA, BERT, CARA) if each != holder]
@@ -67,7 +67,7 @@ def leases() -> list[Lease]:
 
 @pytest.mark.parametrize("event", EVENTS)
 def test_checks_raise_exactly_for_forbidden_actions(event: str) -> None:
-    tried = 0
+    count = 0
     for lease, who, to in itertools.product(leases(), PEOPLE, PEOPLE):
         before = replace(lease)
         if legal(event, lease, who, to):
@@ -76,8 +76,8 @@ def test_checks_raise_exactly_for_forbidden_actions(event: str) -> None:
             with pytest.raises(LeaseError):
                 EVENTS[event](lease, who, to, 11.0)
         assert lease == before
-        tried += 1
-    assert tried == len(leases()) * 16
+        count += 1
+    assert count == len(leases()) * 16
 
 
 @given(
@@ -108,13 +108,13 @@ def test_lease_has_at_most_one_holder_who_never_waits_for_it(
         assert len(set(lease.waiting)) == len(lease.waiting)
         assert DORA not in lease.waiting
         if lease.holder != before.holder and before.holder is not None:
-            # Nobody loses the arm but by these.
+            # Only these events take the arm from its holder.
             assert event in {"take", "hand over", "release", "expire"}
         if event == "hear":
             assert lease == replace(before, heard=t)
 
 
-def test_free_lease_is_granted_and_a_held_one_is_not() -> None:
+def test_only_a_free_lease_is_granted() -> None:
     lease = Lease().acquire(ANNA, 1.0)
     assert lease.holder == ANNA
     with pytest.raises(LeaseError, match="Anna holds the arm"):
@@ -143,7 +143,7 @@ def test_lease_goes_to_the_first_in_the_queue() -> None:
     assert lease.acquire(CARA, 3.0).waiting == ()
 
 
-def test_silence_ends_it_and_a_sign_of_life_keeps_it() -> None:
+def test_silence_ends_the_lease_and_a_heartbeat_keeps_it() -> None:
     lease = Lease().acquire(ANNA, 1.0)
     assert lease.silence(1.25) == 0.25
     assert lease.expire(1.0 + LEASE_TIMEOUT - 1e-9) is lease
@@ -151,11 +151,11 @@ def test_silence_ends_it_and_a_sign_of_life_keeps_it() -> None:
     heard = lease.hear(ANNA, 2.0)
     assert heard.expire(1.0 + LEASE_TIMEOUT).holder == ANNA
     assert heard.expire(2.0 + LEASE_TIMEOUT).holder is None
-    # Nobody is silent where nobody holds it.
+    # A free lease has no silence.
     assert Lease().silence(1e9) == 0.0
 
 
-def test_a_clock_that_stands_or_goes_back_takes_no_life_away() -> None:
+def test_clock_that_stands_or_runs_back_does_not_shorten_the_lease() -> None:
     lease = Lease().acquire(ANNA, 5.0)
     assert lease.hear(ANNA, 4.0).heard == 5.0
     assert lease.silence(4.0) == 0.0
