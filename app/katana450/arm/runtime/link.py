@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 PIPE_ERRORS = (EOFError, OSError)
 """Errors that a pipe raises when its other end is closed."""
 
-PULSE_EVERY = 0.1
+PULSE_INTERVAL = 0.1
 """[s] Maximum time between two messages of the arm's process, as long as its control loop ticks."""
 
 PULSE = b"."
@@ -46,10 +46,10 @@ PULSE = b"."
 COMMAND_TIMEOUT = 0.5
 """[s] Silence of the arm's process after which only a stop is sent to it."""
 
-REPORT_EVERY = 1.0
+REPORT_INTERVAL = 1.0
 """[s] Time between two reports of the timing of the control loop."""
 
-ENDING_SECONDS = 2.0
+JOIN_TIMEOUT = 2.0
 """[s] Timeout for the end of a thread; a thread that waits to report wakes sooner."""
 
 
@@ -138,7 +138,7 @@ class ArmEnd:
     def join(self) -> None:
         """Return once the threads have ended, which they do when both ends are closed."""
         for thread in self._threads:
-            thread.join(ENDING_SECONDS)
+            thread.join(JOIN_TIMEOUT)
 
     def _listen(self) -> None:
         try:
@@ -175,16 +175,16 @@ class ArmEnd:
             self._send(StateMessage(self._named(seen), event_log, state_publisher.loop_timing))
             last = event_log[-1] if event_log else None
             while not self.cut.is_set():
-                snapshot = state_publisher.wait_for_change(seen, PULSE_EVERY)
+                snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
                 now = time.monotonic()
                 if snapshot is seen and self._loop.ticks == ticks:
                     # A loop that does not tick must give no pulse.
                     continue
                 ticks = self._loop.ticks
-                if snapshot is seen and now - reported < REPORT_EVERY:
+                if snapshot is seen and now - reported < REPORT_INTERVAL:
                     self._pipe.send_bytes(PULSE)
                     continue
-                if now - reported >= REPORT_EVERY:
+                if now - reported >= REPORT_INTERVAL:
                     reported, state_publisher.loop_timing = now, self._loop.loop_timing
                 fresh = _newer(state_publisher.event_log, last)
                 last = fresh[-1] if fresh else last

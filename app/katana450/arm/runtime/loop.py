@@ -121,7 +121,7 @@ class ControlLoop:
 
     @property
     def running(self) -> bool:
-        """Whether the thread runs; False once it has ended for any reason."""
+        """True if the thread runs; False once it has ended for any reason."""
         return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:

@@ -19,7 +19,7 @@ from katana450.errors import KatanaError
 
 log = logging.getLogger(__name__)
 
-REST_SECONDS = 5.0
+REST_TIMEOUT = 5.0
 """[s] Timeout for the arm to come to rest before a plan starts."""
 
 
@@ -48,7 +48,7 @@ class PlanningWorker:
 
     @property
     def busy(self) -> bool:
-        """Whether a path is being planned, or is found and not started yet."""
+        """True if a path is being planned, or is found and not started yet."""
         return self._work is not None or self._state_publisher.snapshot.ticket < self.last_ticket
 
     def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
@@ -75,7 +75,7 @@ class PlanningWorker:
         with self._lock:
             self._work = cancelled
         threading.Thread(
-            target=self._find, args=(command, actor, cancelled), name="navigator", daemon=True
+            target=self._find, args=(command, actor, cancelled), name="planning", daemon=True
         ).start()
 
     def _find(
@@ -103,7 +103,7 @@ class PlanningWorker:
         """Return the state of the arm at rest; a moving arm is sent a hold first."""
         if self._state_publisher.snapshot.state.moving:
             self._unless(cancelled, cmd.Hold(), actor)
-        end = time.monotonic() + REST_SECONDS
+        end = time.monotonic() + REST_TIMEOUT
         snapshot = self._state_publisher.snapshot
         while snapshot.state.moving or snapshot.ticket < self._arm.last_ticket:
             if time.monotonic() > end or cancelled.is_set():

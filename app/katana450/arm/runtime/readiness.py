@@ -33,16 +33,16 @@ def writable(fd: int) -> bool:
     return _polled(fd, getattr(select, "POLLOUT", 0), unknown=True)
 
 
-def data_age(line: SocketChannel) -> float:
+def data_age(channel: SocketChannel) -> float:
     """Return the time since the kernel received the newest data of a TCP connection [s].
 
     Returns 0 if the system does not report it: data that is being read then counts as new.
     """
     option = getattr(socket, "TCP_INFO", None)
-    if option is None or line.fileno() < 0:
+    if option is None or channel.fileno() < 0:
         return 0.0
     try:
-        info = line.getsockopt(socket.IPPROTO_TCP, option, LAST_DATA_RECEIVED + 4)
+        info = channel.getsockopt(socket.IPPROTO_TCP, option, LAST_DATA_RECEIVED + 4)
     except OSError:
         return 0.0
     if len(info) < LAST_DATA_RECEIVED + 4:

@@ -14,7 +14,7 @@ from typing import Any
 from katana450.arm.control.solid import Solid
 from katana450.maths.planning.plan import Plan
 
-KEPT_HERE, KEPT_THERE = 8, 32
+MAX_NAMED_PLANS, MAX_STORED_PLANS = 8, 32
 """Number of plans that the arm's end (8) and the front end (32) remember. The end that names the
 plans keeps fewer than the end that looks the names up."""
 
@@ -32,7 +32,7 @@ class PlanNames:
     def note(self, number: int, plan: Plan) -> None:
         """Record that ``plan`` came in as ``number``."""
         self._known[id(plan)] = number, plan
-        while len(self._known) > KEPT_HERE:
+        while len(self._known) > MAX_NAMED_PLANS:
             self._known.pop(next(iter(self._known)))
 
     def dumped(self, value: Any) -> bytes:
@@ -57,7 +57,7 @@ class PlanStore:
     def note(self, number: int, plan: Plan) -> None:
         """Record that ``plan`` is sent as ``number``."""
         self._sent[number] = plan
-        while len(self._sent) > KEPT_THERE:
+        while len(self._sent) > MAX_STORED_PLANS:
             self._sent.pop(next(iter(self._sent)))
 
     def loaded(self, data: bytes) -> Any:
