@@ -87,7 +87,7 @@ class Appearance:
 
     def of(self, name: str) -> LinkAppearance:
         """Return the appearance of the link or object ``name``."""
-        return next((look for each, look in self.changed if each == name), AS_MADE)
+        return next((appearance for each, appearance in self.changed if each == name), AS_MADE)
 
     def having(
         self, name: str, trait: AppearanceTrait, value: float | tuple[float, ...] | None
@@ -97,11 +97,11 @@ class Appearance:
         Returns the same if MAX_CHANGED_PARTS other parts are changed already.
         """
         others = self.without(name)
-        look = self.of(name).having(trait, value)
-        if look == AS_MADE:
+        appearance = self.of(name).having(trait, value)
+        if appearance == AS_MADE:
             return others
-        room = len(others.changed) < MAX_CHANGED_PARTS
-        return Appearance((*others.changed, (name, look))) if room else self
+        has_room = len(others.changed) < MAX_CHANGED_PARTS
+        return Appearance((*others.changed, (name, appearance))) if has_room else self
 
     def without(self, name: str) -> Appearance:
         """Return the appearance with ``name`` as it is made."""

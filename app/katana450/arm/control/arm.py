@@ -26,7 +26,7 @@ class GripperModel:
 
     @property
     def moves(self) -> bool:
-        """Whether the finger joint has a range."""
+        """True if the finger joint has a range."""
         return self.lower < self.upper
 
     def clamp(self, value: float) -> float:
@@ -65,7 +65,7 @@ class ArmModel:
 
     @property
     def slides(self) -> tuple[bool, ...]:
-        """Whether each joint is prismatic (n,): none is."""
+        """Flags (n,) of the prismatic joints: all False."""
         return (False,) * self.chain.n
 
     @cached_property

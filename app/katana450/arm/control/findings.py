@@ -27,7 +27,7 @@ MIN_JOG_FRACTION = 0.05
 FULL_JOG_FRACTION = 0.9
 """Fraction of a jog above which no loss is reported."""
 
-AT_LIMIT = math.radians(0.5)
+LIMIT_DISTANCE = math.radians(0.5)
 """[rad] Distance to a limit within which a joint holds up a jog."""
 
 
@@ -90,9 +90,9 @@ def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
     """Return what stops a jog with the twist ``V`` (6,) in {S} at ``q`` (n,) [rad]."""
     if limited_jog(chain, q, V) < MIN_JOG_FRACTION:
         return (Finding(Reason.SINGULAR),)
-    near = limit_distances(chain, q) <= AT_LIMIT
+    near = limit_distances(chain, q) <= LIMIT_DISTANCE
     # Computed only near a limit, to keep the tick short.
-    if not near.any() or limited_jog(chain, q, V, AT_LIMIT) > FULL_JOG_FRACTION:
+    if not near.any() or limited_jog(chain, q, V, LIMIT_DISTANCE) > FULL_JOG_FRACTION:
         return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(

@@ -76,7 +76,7 @@ class Following:
 
     @property
     def there(self) -> bool:
-        """Whether the arm is at rest at the place that it was to go to."""
+        """True if the arm is at rest at the place that it was to go to."""
         return self.pace.at_rest and self.local == self.aim and self._beyond == 0
 
     @property

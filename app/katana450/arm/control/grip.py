@@ -10,14 +10,14 @@ from katana450.arm.control.state import Finding, Reason, State
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
-TOUCHING = 3e-4
+TOUCH_DISTANCE = 3e-4
 """[m] Distance up to which a finger touches: the sensors in the pads yield by as much."""
 
-CENTRED = 3e-3
+CENTRING_DISTANCE = 3e-3
 """[m] Distance of the second finger up to which the object slides to the middle when the first
 finger touches it."""
 
-OPENED_TURN, OPENED_SLIDE = 0.02, 1e-3
+RELEASE_TURN, RELEASE_SLIDE = 0.02, 1e-3
 """[rad, m] Opening of the fingers from which on an object is free: 1 mm at the pads."""
 
 
@@ -28,7 +28,7 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
         return state
     x = state.x_setpoint
     if state.grip is not None:
-        opened = OPENED_SLIDE if hand.slides else OPENED_TURN
+        opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
         if state.gripper_setpoint <= state.grip + opened:
             return state
         objects = tuple(environment.left(t, x) if t.held else t for t in state.objects)
@@ -40,7 +40,7 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
     for scene_object in state.objects:
         if scene_object.can_be_held and not scene_object.fixed:
             felt = _felt(hand.fingers, world, scene_object, x)
-            if min(felt.values()) <= TOUCHING:
+            if min(felt.values()) <= TOUCH_DISTANCE:
                 return _closed(environment, state, scene_object, felt, x)
     return state
 
@@ -76,7 +76,7 @@ def _closed(
     state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
     far = max(felt, key=lambda finger: felt[finger])
-    if felt[far] > CENTRED:
+    if felt[far] > CENTRING_DISTANCE:
         lopsided = Finding(Reason.LOPSIDED, felt[far], parts=(far, scene_object.name))
         return replace(stopped, findings=(*stopped.findings, lopsided))
     taken = environment.taken(scene_object, x)

@@ -33,12 +33,12 @@ class Role(Enum):
 
     @property
     def may_drive(self) -> bool:
-        """Whether the role may drive the arm."""
+        """True if the role may drive the arm."""
         return self is not Role.VIEWER
 
     @property
     def may_take(self) -> bool:
-        """Whether the role may take the arm from its holder."""
+        """True if the role may take the arm from its holder."""
         return self is Role.ADMIN
 
 

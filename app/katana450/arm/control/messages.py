@@ -174,7 +174,7 @@ def limit_text(number: int, angle: float) -> str:
 ROOM = "to each limit"
 """Label of the distances of all axes to their nearer limits."""
 
-FLAT = 1e6
+MAX_CONDITION = 1e6
 """Condition number above which only rounding separates the arm from a singularity."""
 
 
@@ -183,7 +183,7 @@ def condition(values: FloatArray) -> str:
 
     values: the singular values of the Jacobian.
     """
-    return "∞" if values[0] >= FLAT * values[-1] else _short(float(values[0] / values[-1]))
+    return "∞" if values[0] >= MAX_CONDITION * values[-1] else _short(float(values[0] / values[-1]))
 
 
 def branch_cells(choice: BranchOption) -> tuple[str, str, str]:

@@ -30,7 +30,7 @@ from katana450.maths.kinematics.velocity import JogFrame, jog, tool_speed, tool_
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 from katana450.maths.motion.pursuit import stream_step
 
-PROBE = 0.02
+PROBE_LENGTH = 0.02
 """[rad] Length of path that must be clear before a waiting arm continues. After a shorter probe the
 arm would only come back to where it was."""
 
@@ -41,16 +41,16 @@ move the tool faster at the next posture."""
 SLOWDOWN_TIME = 0.3
 """[s] Approximate time to slow down by as much as the tool speeds up on a bend."""
 
-SLOWINGS = 4
+MAX_SLOWDOWNS = 4
 """Maximum number of slower attempts at a step in which the tool would be too fast."""
 
 BRAKE_SPEED_FRACTION = 0.97
 """[1] Fraction of the maximum tool speed that is allowed in the samples of a brake. Between the
 samples the tool may be faster."""
 
-COARSE, FINE = 0.02, 0.005
-"""[s] Minimum time between samples of a brake: COARSE for the steps, of which there are many, FINE
-for the one decision to leave a plan."""
+COARSE_SAMPLING, FINE_SAMPLING = 0.02, 0.005
+"""[s] Minimum time between samples of a brake. The coarse value is for steps, of which there are
+many; the fine one is for the one decision to leave a plan."""
 
 
 class MotionStepper:
@@ -162,7 +162,7 @@ class MotionStepper:
         if state.motion.at_rest:
             return True
         chain = self._arm.chain_to(state.tool)
-        if not self._below(self._maximum, chain, state.motion, FINE):
+        if not self._below(self._maximum, chain, state.motion, FINE_SAMPLING):
             return False
         return (
             self._world is None
@@ -202,7 +202,7 @@ class MotionStepper:
             V = wished_twist(chain, motion.q, state.jogging)
             bounds = self._any.stoppable(motion.q)
             rates = jog(chain, motion.q, V, JogFrame.BASE, dt, bounds=bounds)
-        for _ in range(SLOWINGS):
+        for _ in range(MAX_SLOWDOWNS):
             if rates is not None:
                 ahead = self._any.at_rate(motion, fraction * rates, dt)
             elif state.servo is not None:
@@ -223,7 +223,7 @@ class MotionStepper:
 
     def _slow_to_rest(self, chain: Chain, motion: JointMotion) -> bool:
         """Return whether the tool stays below its maximum speed if every joint brakes now."""
-        return self._below(BRAKE_SPEED_FRACTION * self._maximum, chain, motion, COARSE)
+        return self._below(BRAKE_SPEED_FRACTION * self._maximum, chain, motion, COARSE_SAMPLING)
 
     def _below(self, maximum: float, chain: Chain, motion: JointMotion, spacing: float) -> bool:
         """Return whether the tool stays below ``maximum`` [m/s] in samples of a brake begun now.
@@ -258,7 +258,7 @@ class MotionStepper:
         return along.motion(), along
 
     def _fraction(self, chain: Chain, state: State) -> float:
-        """Return the fraction of the joint speeds at which the tool keeps its speed limit."""
+        """Return the fraction of the joint speeds at which the tool keeps its limit to the goal."""
         change = state.goal - state.setpoint
         if state.jogging is not None or state.servo is not None or not change.any():
             return 1.0
@@ -321,7 +321,7 @@ class MotionStepper:
         change = state.goal - state.setpoint
         if not change.any():
             return True
-        fraction = min(1.0, PROBE / float(np.abs(change).sum()))
+        fraction = min(1.0, PROBE_LENGTH / float(np.abs(change).sum()))
         x = state.x_setpoint
         towards = np.append(state.setpoint + fraction * change, state.gripper_setpoint)
         step = advance(self._world, x, towards, MIN_STOP_TIME)
@@ -353,7 +353,7 @@ def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
 
 
 def _with_contact(state: State, contact: Contact | None) -> State:
-    """``state`` with ``contact`` as its first finding, in place of any earlier contact."""
+    """Return ``state`` with ``contact`` as its first finding, in place of any earlier contact."""
     others = tuple(finding for finding in state.findings if finding.reason is not Reason.CONTACT)
     if contact is None:
         return state if others == state.findings else replace(state, findings=others)

@@ -18,6 +18,7 @@ OBJECT_GAP = 0.02
 """[m] Minimum gap between two objects."""
 
 AZIMUTHS = tuple(math.radians(sign * angle) for angle in range(0, 110, 12) for sign in (1, -1))
+"""[rad] Directions to try, from straight ahead outwards to both sides."""
 
 
 def free_place(scene_object: SceneObject, objects: Sequence[SceneObject]) -> FloatArray:

@@ -18,14 +18,14 @@ from katana450.maths.planning.scaling import Scaling
 MAX_UNCHECKED_PATH = 1e-3
 """[m] Length of path below which no intermediate posture is checked: every part is thicker."""
 
-SAME_PLACE = 1e-4
+MAX_DISPLACEMENT = 1e-4
 """[m or 1] Displacement of a body up to which it counts as unmoved since the planning. Plans keep
 MARGIN, which is 1 mm more than necessary."""
 
-SAME_FINGERS_TURN, SAME_FINGERS_SLIDE = 5e-3, 5e-4
+MAX_FINGER_TURN, MAX_FINGER_SLIDE = 5e-3, 5e-4
 """[rad, m] Change of the fingers up to which a plan stays valid: half a millimetre at the pads."""
 
-PROBE = 0.02
+PROBE_FRACTION = 0.02
 """[1] Fraction of a segment that must be clear before a waiting arm continues."""
 
 
@@ -40,7 +40,7 @@ class PlanFollower:
             slides: whether the fingers slide instead of turning.
         """
         self._world = world
-        self._same_fingers = SAME_FINGERS_SLIDE if slides else SAME_FINGERS_TURN
+        self._max_finger_change = MAX_FINGER_SLIDE if slides else MAX_FINGER_TURN
         self._limiters: dict[Scaling, Limiter] = {}
         # Cache: the part of a segment that is clear with the present finger angle.
         self._known: tuple[Segment, float, float, float] | None = None
@@ -81,7 +81,7 @@ class PlanFollower:
         fingers: the finger joint [rad or m].
         """
         here = now.turned_over()
-        reach = PROBE * here.segment.scaling.span
+        reach = PROBE_FRACTION * here.segment.scaling.span
         probe = min(max(here.aim, here.local - reach), here.local + reach)
         return self._met(here, here.at(probe), fingers) is None
 
@@ -90,8 +90,8 @@ class PlanFollower:
         world = self._world
         if world is None or (
             plan.clear_of is not None
-            and abs(plan.fingers - fingers) <= self._same_fingers
-            and plan.clear_of.differs_by(world.fingerprint) <= SAME_PLACE
+            and abs(plan.fingers - fingers) <= self._max_finger_change
+            and plan.clear_of.differs_by(world.fingerprint) <= MAX_DISPLACEMENT
         ):
             return None
         start, end = (segment.scaling.pace(each.local).sigma for each in (here, stopping_point))
@@ -101,15 +101,15 @@ class PlanFollower:
             known = (segment, fingers, start, start)
         if known[2] <= low and high <= known[3]:
             return None
-        room = SweptClearance.about(world, STOP, segment.sweep.at(start, fingers))
+        swept = SweptClearance.about(world, STOP, segment.sweep.at(start, fingers))
         for a, b in ((low, known[2]), (known[3], high)):
             found = (
-                segment.sweep.blocked(room, fingers, a, b, MAX_UNCHECKED_PATH) if a < b else None
+                segment.sweep.blocked(swept, fingers, a, b, MAX_UNCHECKED_PATH) if a < b else None
             )
             if found is not None:
                 return found.contact
         # A path that leads out of a contact is clear only from here.
-        if float(room.minimum.min()) >= STOP:
+        if float(swept.minimum.min()) >= STOP:
             self._known = (segment, fingers, min(low, known[2]), max(high, known[3]))
         return None
 

@@ -33,7 +33,7 @@ class MotionWithWater:
 
     @property
     def still(self) -> bool:
-        """Whether the water is at rest as long as the cup does not move."""
+        """True if the water is at rest as long as the cup does not move."""
         slosh = self.water.slosh
         return not self.water.parcels and slosh.lean == slosh.rate == (0.0, 0.0)
 
@@ -49,7 +49,7 @@ class Pouring:
         self._water_environment = water_environment
         self._environment = environment
         # Cache for the present place of the basin.
-        self._made: tuple[SceneObject | None, WaterFlow] | None = None
+        self._cache: tuple[SceneObject | None, WaterFlow] | None = None
 
     def check(self, volume: float) -> None:
         """Raise InputError if ``volume`` [m^3] is negative or more than the cup holds."""
@@ -104,13 +104,13 @@ class Pouring:
 
     def _flow(self, objects: Sequence[SceneObject]) -> WaterFlow:
         basin = named(objects, BASIN)
-        if self._made is None or self._made[0] is not basin:
+        if self._cache is None or self._cache[0] is not basin:
             at = ABSENT_BASIN_AT if basin is None else vector(basin.T[:3, 3])
             water_environment = replace(
                 self._water_environment, basin=replace(self._water_environment.basin, at=at)
             )
-            self._made = (basin, WaterFlow(water_environment))
-        return self._made[1]
+            self._cache = (basin, WaterFlow(water_environment))
+        return self._cache[1]
 
     def _pose(self, objects: Sequence[SceneObject], x: FloatArray) -> FloatArray | None:
         cup = named(objects, CUP)

@@ -107,28 +107,28 @@ PAINT = (204, 204, 204)
 """Default colour of a painted object, red, green, blue of 255."""
 
 
-def _as_link(look: solid.ObjectAppearance) -> LinkAppearance:
+def _as_link(appearance: solid.ObjectAppearance) -> LinkAppearance:
     """Return the appearance of an object in the form of a link's."""
-    painted = look.colour is not None or look.opacity < 1.0
-    choice = (
-        DisplayMode.HIDDEN if look.hidden else DisplayMode.PAINTED if painted else DisplayMode.MADE
-    )
-    if look.colour is None:
-        return LinkAppearance(choice, None, 1.0 - look.opacity)
-    red, green, blue = (part / 255.0 for part in look.colour)
-    return LinkAppearance(choice, (red, green, blue), 1.0 - look.opacity)
+    painted = appearance.colour is not None or appearance.opacity < 1.0
+    choice = DisplayMode.PAINTED if painted else DisplayMode.MADE
+    if appearance.hidden:
+        choice = DisplayMode.HIDDEN
+    if appearance.colour is None:
+        return LinkAppearance(choice, None, 1.0 - appearance.opacity)
+    red, green, blue = (part / 255.0 for part in appearance.colour)
+    return LinkAppearance(choice, (red, green, blue), 1.0 - appearance.opacity)
 
 
-def _as_object(look: LinkAppearance) -> solid.ObjectAppearance:
+def _as_object(appearance: LinkAppearance) -> solid.ObjectAppearance:
     """Return the appearance of a link in the form of an object's.
 
     An object that is shown as it is made keeps no paint.
     """
-    if look.choice is DisplayMode.MADE:
+    if appearance.choice is DisplayMode.MADE:
         return solid.PLAIN
-    colour = None if look.choice is DisplayMode.HIDDEN else PAINT
-    if look.colour is not None:
-        red, green, blue = (round(255.0 * part) for part in look.colour)
+    colour = None if appearance.choice is DisplayMode.HIDDEN else PAINT
+    if appearance.colour is not None:
+        red, green, blue = (round(255.0 * part) for part in appearance.colour)
         colour = red, green, blue
-    opacity = max(1.0 - look.transparency, solid.MIN_OPACITY)
-    return solid.ObjectAppearance(colour, opacity, look.choice is DisplayMode.HIDDEN)
+    opacity = max(1.0 - appearance.transparency, solid.MIN_OPACITY)
+    return solid.ObjectAppearance(colour, opacity, appearance.choice is DisplayMode.HIDDEN)

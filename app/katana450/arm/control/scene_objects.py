@@ -130,7 +130,7 @@ class SceneObject:
 
     @property
     def carried(self) -> bool:
-        """Whether the object moves with the hand."""
+        """True if the object moves with the hand."""
         return self.held or self.fixed
 
     @property
@@ -182,7 +182,7 @@ def same(some: tuple[SceneObject, ...], others: tuple[SceneObject, ...]) -> bool
 
 
 def _properties(scene_object: SceneObject) -> tuple[object, ...]:
-    """All properties of the object except its pose."""
+    """Return all properties of the object except its pose."""
     key = None if scene_object.solid is None else scene_object.solid.key
     kind = (scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, key)
     return (

@@ -131,7 +131,7 @@ class Session:
         self._tool_speed = tool_speed
         self._joint_stepper = JointStepper(robot, travel) if isinstance(robot, JointSet) else None
         # Cache for the objects of the newest state.
-        self._made: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
+        self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
         self.check(cmd.SetJoints(ready))
         self.ready = frozen(ready)
         if of_joints(self._limits, robot.slides, self.ready):
@@ -159,14 +159,14 @@ class Session:
         return self._for(state)[1]
 
     def _for(self, state: State) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper]:
-        if self._made is None or self._made[0] is not state.objects:
+        if self._cache is None or self._cache[0] is not state.objects:
             world = self.environment.world(state.objects)
             stepper: Stepper | None = self._joint_stepper
             if stepper is None:
                 touch = None if world is None else self.environment.touch(world, state.objects)
                 stepper = MotionStepper(self.require_arm(), world, self._tool_speed, touch)
-            self._made = (state.objects, world, stepper)
-        return self._made
+            self._cache = (state.objects, world, stepper)
+        return self._cache
 
     def _stepper(self, state: State) -> Stepper:
         return self._for(state)[2]

@@ -292,7 +292,7 @@ class State:
 
     @property
     def moving(self) -> bool:
-        """Whether the arm or the gripper is still under way."""
+        """True if the arm or the gripper is still under way."""
         resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
 
@@ -324,7 +324,7 @@ class State:
 
     @property
     def under_way(self) -> bool:
-        """Whether the setpoints differ from the goals, even if the arm waits."""
+        """True if the setpoints differ from the goals, even if the arm waits."""
         return bool(
             (self.setpoint != self.goal).any()
             or not self.motion.at_rest

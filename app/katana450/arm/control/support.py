@@ -13,10 +13,10 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import TableTop
 
-GAP = 1e-3
+SUPPORT_GAP = 1e-3
 """[m] Height over a surface up to which an object counts as standing on it."""
 
-UPRIGHT = 0.999
+MIN_UPRIGHT = 0.999
 """Cosine of the tilt up to which the top of an object is level enough to carry another."""
 
 
@@ -46,7 +46,7 @@ def check_carried(
     tops = [each.T[2, 3] + each.height for each in objects if _is_over(scene_object, each)]
     if table.x[0] <= x <= table.x[1] and table.y[0] <= y <= table.y[1]:
         tops.append(0.0)
-    if any(lowest - top <= GAP for top in tops):
+    if any(lowest - top <= SUPPORT_GAP for top in tops):
         return
     at = f"{scene_object.name} would be in the air at x {1e3 * x:.1f}, y {1e3 * y:.1f}"
     if tops:
@@ -93,7 +93,7 @@ def _is_over(scene_object: SceneObject, other: SceneObject) -> bool:
     """Return whether the middle of ``scene_object`` is over the level top of ``other``."""
     if other.name == scene_object.name or other.carried or other.shape is Shape.SPHERE:
         return False
-    if other.T[2, 2] < UPRIGHT:
+    if other.T[2, 2] < MIN_UPRIGHT:
         return False
     x, y, _ = se3.inverse(other.T)[:3] @ np.append(scene_object.T_collision_shape[:3, 3], 1.0)
     if other.shape is Shape.CYLINDER:
