@@ -288,7 +288,10 @@ class GoAlong(BaseCommand):
 
 @dataclass(frozen=True)
 class SpeedScale(BaseCommand):
-    """Limit every joint and the tool to a fraction ``value`` of its maximum speed, up to 1."""
+    """Limit the speed of every joint and of the tool to the fraction ``value`` of its maximum.
+
+    value: from MIN_SPEED to 1.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits(
         pacing=True, while_stopped=True, supersedes=False, passive=True, joints_only=True

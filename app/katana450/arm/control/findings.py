@@ -87,7 +87,10 @@ def of_projection(
 
 
 def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
-    """Return what stops a jog with the twist ``V`` (6,) in {S} at ``q`` (n,) [rad]."""
+    """Return the findings on what stops a jog at ``q`` (n,) [rad].
+
+    V: twist (6,) of the jog in {S} [rad/s, m/s].
+    """
     if limited_jog(chain, q, V) < MIN_JOG_FRACTION:
         return (Finding(Reason.SINGULAR),)
     near = limit_distances(chain, q) <= LIMIT_DISTANCE

@@ -76,12 +76,12 @@ class Following:
 
     @property
     def there(self) -> bool:
-        """True if the arm is at rest at the place that it was to go to."""
+        """True if the arm is at rest at its place of rest."""
         return self.pace.at_rest and self.local == self.aim and self._beyond == 0
 
     @property
     def _beyond(self) -> int:
-        """The aim is in a later segment (1), an earlier one (-1) or the present one (0)."""
+        """Return 1 if the aim is in a later segment, -1 if in an earlier one, else 0."""
         begin, end = self.plan.begins[self.number : self.number + 2]
         return int(self.towards > end) - int(self.towards < begin)
 

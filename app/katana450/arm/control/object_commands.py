@@ -140,6 +140,6 @@ class ReplaceScene(BaseCommand):
                 f"A scene must have at most {MAX_OBJECTS} objects, each with a different name."
             )
         if any(scene_object.held for scene_object in self.objects):
-            raise InputError("No object of a new scene can be held.")
+            raise InputError("The objects of a new scene must not be held.")
         if self.volume is not None:
             check_finite("The volume", self.volume)

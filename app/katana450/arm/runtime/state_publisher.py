@@ -69,7 +69,7 @@ class StatePublisher:
             return outcomes
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
-        """Return the newest snapshot, once it is not ``seen`` or after ``timeout`` [s]."""
+        """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s]."""
         with self._pinned:
             self._pinned.wait_for(lambda: self._snapshot is not seen, timeout)
             return self._snapshot
