@@ -22,33 +22,33 @@ PEOPLE = (ANNA, BERT, CARA, DORA)
 Event = Callable[[Lease, Person, Person, float], Lease]
 
 EVENTS: dict[str, Event] = {
-    "acquire": lambda lease, who, _, t: lease.acquire(who, t),
-    "take": lambda lease, who, _, t: lease.take(who, t),
-    "request": lambda lease, who, _, __: lease.request(who),
-    "withdraw": lambda lease, who, _, __: lease.withdraw(who),
-    "hand over": lambda lease, who, to, t: lease.hand_over(who, to, t),
-    "release": lambda lease, who, _, __: lease.release(who),
-    "hear": lambda lease, who, _, t: lease.hear(who, t),
-    "leave": lambda lease, who, _, __: lease.leave(who),
+    "acquire": lambda lease, person, _, t: lease.acquire(person, t),
+    "take": lambda lease, person, _, t: lease.take(person, t),
+    "request": lambda lease, person, _, __: lease.request(person),
+    "withdraw": lambda lease, person, _, __: lease.withdraw(person),
+    "hand over": lambda lease, person, to, t: lease.hand_over(person, to, t),
+    "release": lambda lease, person, _, __: lease.release(person),
+    "hear": lambda lease, person, _, t: lease.hear(person, t),
+    "leave": lambda lease, person, _, __: lease.leave(person),
     "expire": lambda lease, _, __, t: lease.expire(t),
 }
 
 
-def legal(event: str, lease: Lease, who: Person, to: Person) -> bool:
+def legal(event: str, lease: Lease, person: Person, to: Person) -> bool:
     """Return whether the rules of the lease allow the event, written independently of the code."""
-    free, mine = lease.holder is None, lease.holder == who
-    drives = who.role is not Role.VIEWER
+    free, mine = lease.holder is None, lease.holder == person
+    drives = person.role is not Role.VIEWER
     match event:
         case "acquire":
             return free and drives
         case "take":
-            return drives and not mine and (free or who.role is Role.ADMIN)
+            return drives and not mine and (free or person.role is Role.ADMIN)
         case "request":
-            return drives and not free and not mine and who not in lease.waiting
+            return drives and not free and not mine and person not in lease.waiting
         case "withdraw":
-            return who in lease.waiting
+            return person in lease.waiting
         case "hand over":
-            return mine and to != who and to.role is not Role.VIEWER
+            return mine and to != person and to.role is not Role.VIEWER
         case "release" | "hear":
             return mine
     return True
@@ -68,13 +68,13 @@ def leases() -> list[Lease]:
 @pytest.mark.parametrize("event", EVENTS)
 def test_checks_raise_exactly_for_forbidden_actions(event: str) -> None:
     count = 0
-    for lease, who, to in itertools.product(leases(), PEOPLE, PEOPLE):
+    for lease, person, to in itertools.product(leases(), PEOPLE, PEOPLE):
         before = replace(lease)
-        if legal(event, lease, who, to):
-            EVENTS[event](lease, who, to, 11.0)
+        if legal(event, lease, person, to):
+            EVENTS[event](lease, person, to, 11.0)
         else:
             with pytest.raises(LeaseError):
-                EVENTS[event](lease, who, to, 11.0)
+                EVENTS[event](lease, person, to, 11.0)
         assert lease == before
         count += 1
     assert count == len(leases()) * 16
@@ -95,13 +95,13 @@ def test_lease_has_at_most_one_holder_who_never_waits_for_it(
     story: list[tuple[str, Person, Person, float]],
 ) -> None:
     lease, t = Lease(), 0.0
-    for event, who, to, dt in story:
+    for event, person, to, dt in story:
         t += dt
         before = lease
         try:
-            lease = EVENTS[event](lease, who, to, t)
+            lease = EVENTS[event](lease, person, to, t)
         except LeaseError:
-            assert not legal(event, before, who, to)
+            assert not legal(event, before, person, to)
             continue
         assert lease.holder is None or lease.holder.role is not Role.VIEWER
         assert lease.holder not in lease.waiting

@@ -62,8 +62,8 @@ def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
     dragged = run(session, state, FAR_DRAG)
     assert dragged.jogging is None
     dragged = run(session, dragged, None, 300)
-    wanted = FAR_DRAG.position
-    np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
+    desired = FAR_DRAG.position
+    np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
     # The next drag moves the goal along its own line.
     settled = run(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
@@ -75,9 +75,9 @@ def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
 
 def test_drag_replaces_a_stream(session: Session, state: State) -> None:
     state = streamed(session, state, 40)
-    wanted = np.add(point(session, state.goal), (0.0, 0.0, 0.05))
-    dragged = run(session, run(session, state, cmd.MoveTool(wanted)), None, 200)
-    np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
+    desired = np.add(point(session, state.goal), (0.0, 0.0, 0.05))
+    dragged = run(session, run(session, state, cmd.MoveTool(desired)), None, 200)
+    np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
 
 
 BEGINNINGS: dict[type, Callable[[Session, State], State]] = {

@@ -199,10 +199,10 @@ def test_jog_moves_in_its_direction(session: Session, name: str) -> None:
     after = pitch_and_roll(chain, state.setpoint)
     moved = point(chain, state.setpoint) - start
     v = np.array(rates[:3])
-    wanted = v if frame is JogFrame.BASE else R @ v
-    if wanted.any():
-        assert moved @ wanted / np.linalg.norm(wanted) > 0.02
-        assert np.linalg.norm(np.cross(moved, wanted)) < 0.1 * np.linalg.norm(moved) * 0.1
+    desired = v if frame is JogFrame.BASE else R @ v
+    if desired.any():
+        assert moved @ desired / np.linalg.norm(desired) > 0.02
+        assert np.linalg.norm(np.cross(moved, desired)) < 0.1 * np.linalg.norm(moved) * 0.1
         assert np.allclose(before, after, atol=0.02)
     else:
         turned = np.subtract(after, before)

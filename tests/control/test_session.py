@@ -85,9 +85,9 @@ def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     state = run(session, state, [cmd.TurnTool(0.6, 0.4)], ticks=5)
-    wanted = np.array([0.25, 0.25, -0.05])
-    state = run(session, state, [cmd.MoveTool(wanted)], ticks=5)
-    assert np.allclose(tool_point(arm, state), wanted, atol=1e-12)
+    desired = np.array([0.25, 0.25, -0.05])
+    state = run(session, state, [cmd.MoveTool(desired)], ticks=5)
+    assert np.allclose(tool_point(arm, state), desired, atol=1e-12)
     assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
         (0.6, 0.4), abs=1e-12
     )
@@ -162,19 +162,19 @@ def test_drag_that_ends_at_once_still_reaches_its_target(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     """One tick cannot track all of the path; the target remains after the end of the drag."""
-    wanted = np.array([-0.2, 0.35, 0.1])
-    released = run(session, state, [cmd.MoveTool(wanted), cmd.EndDrag()])
+    desired = np.array([-0.2, 0.35, 0.1])
+    released = run(session, state, [cmd.MoveTool(desired), cmd.EndDrag()])
     assert released.since is not None
     assert released.findings == ()
-    assert math.dist(tool_point(arm, released), wanted) > 0.1
+    assert math.dist(tool_point(arm, released), desired) > 0.1
     there = run(session, released, [], ticks=15)
     assert there.since is None
-    assert np.allclose(tool_point(arm, there), wanted, atol=1e-12)
+    assert np.allclose(tool_point(arm, there), desired, atol=1e-12)
     assert isinstance(there.target, JointTarget)
     assert there.target.q is there.goal
     # A new drag on the way replaces the target.
-    again = run(session, released, [cmd.MoveTool(wanted)], ticks=15)
-    assert np.allclose(tool_point(arm, again), wanted, atol=1e-12)
+    again = run(session, released, [cmd.MoveTool(desired)], ticks=15)
+    assert np.allclose(tool_point(arm, again), desired, atol=1e-12)
     assert not isinstance(again.target, JointTarget)
     # Any other command ends the drag.
     for command in (cmd.Hold(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
