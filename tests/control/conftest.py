@@ -1,4 +1,4 @@
-"""What tests of the session begin with: an arm at rest, and a cup in its way."""
+"""Fixtures of the session tests: the arm at rest, and a collision world with a cup."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def state(session: Session) -> State:
 
 @pytest.fixture(scope="session")
 def world(robot: Robot) -> CollisionWorld:
-    """The arm on its table, a cup before it."""
+    """The arm on its table, with a cup in front of it."""
     found, _ = world_of(robot)
     assert found is not None
     cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
@@ -35,5 +35,5 @@ def world(robot: Robot) -> CollisionWorld:
 
 @pytest.fixture(scope="session")
 def shipped() -> Session:
-    """The session that the app begins with: the arm on its table, its objects and the water."""
+    """The session of the app: the arm on its table, its objects and the water."""
     return describe_robot(Settings(), URDF_PATH, None).session

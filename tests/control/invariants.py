@@ -1,4 +1,4 @@
-"""The commands that every robot can be given, at random, and what has to hold after every tick."""
+"""Random commands for every robot, and the invariants that hold after every tick."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ from katana450.settings import Settings
 DT = 0.01
 
 ROUNDING = 1e-6
-"""[1] Of a limit."""
+"""[1] Tolerance, as a fraction of a limit."""
 
 REST_SECONDS = 4.0
-"""[s] In which the slowest brake ends: a pause along a plan at the lowest speed."""
+"""[s] Maximum time of the slowest brake: a pause along a plan at the lowest speed."""
 
-LONGEST_SECONDS = 60.0
-"""[s] In which whatever was asked is done at full speed."""
+MAX_MOTION_SECONDS = 60.0
+"""[s] Maximum time of any motion at full speed."""
 
 MOTIONS = tuple(kind for kind, row in TABLE.items() if row.begins is not None)
-"""The commands after which the arm may move; a stop and its end are among them only by name."""
+"""Commands after which the arm may move. A stop and its end also begin a mode, but no motion."""
 
 RESTS = (cmd.Stop, cmd.ClearStop, cmd.Hold, cmd.EndDrag, cmd.SetTool)
-"""Of these, the ones that never begin a motion."""
+"""Commands among MOTIONS that never begin a motion."""
 
 SESSIONS: dict[str, Session] = {}
-"""Made once."""
+"""Cache of the sessions by name."""
 
 JOINTS = JointSet(
     names=("rail", "turn", "tilt"),
@@ -64,7 +64,7 @@ JOINTS = JointSet(
 
 
 def session_of(name: str) -> Session:
-    """The session of the app, the same for an arm without its gripper, or one of joints alone."""
+    """Return the session of the app, of an arm without gripper, or of joints alone."""
     if name not in SESSIONS:
         if name == "joints":
             SESSIONS[name] = Session(JOINTS, JOINTS.ready)
@@ -75,7 +75,7 @@ def session_of(name: str) -> Session:
 
 
 def fractions(n: int) -> st.SearchStrategy[FloatArray]:
-    """(n,) numbers from -1 to 1."""
+    """Return a strategy for n numbers (n,) from -1 to 1."""
     return st.lists(st.integers(-8, 8), min_size=n, max_size=n).map(lambda k: np.array(k) / 8.0)
 
 
@@ -83,11 +83,11 @@ ticks = st.integers(1, 30)
 
 
 class JointRules(RuleBasedStateMachine):
-    """The commands that every robot can be given, and the invariants."""
+    """The commands for every robot, and the invariants."""
 
     names: tuple[str, ...] = ("joints",)
-    whole = False
-    """Whether the newest tick kept all invariants."""
+    tick_completed = False
+    """True if the newest tick completed with all invariants."""
 
     @initialize(data=st.data())
     def begin(self, data: st.DataObject) -> None:
@@ -97,12 +97,12 @@ class JointRules(RuleBasedStateMachine):
         self.state = self.first = self.session.begin(self.session.ready, 0.0, 0.0)
         self.limits = (self.session.arm or JOINTS).limits
         self.log: list[tuple[tuple[cmd.Command, ...], float]] = []
-        self.ordered = False
-        """Whether a command newer than the last stop may move the arm."""
-        self.gripped = False
-        """Likewise the fingers."""
+        self.may_move = False
+        """True if a command newer than the last stop may move the arm."""
+        self.fingers_may_move = False
+        """True if a command newer than the last stop may move the fingers."""
         self.braking = 0
-        """Ticks since the arm was stopped or paused."""
+        """Number of ticks since the stop or pause of the arm."""
         self.stop_ends: FloatArray | None = None
 
     # The commands.
@@ -167,17 +167,17 @@ class JointRules(RuleBasedStateMachine):
     def batch(self, speed: float, last: cmd.Command) -> None:
         self.run([cmd.Batch((cmd.SpeedScale(speed), last))], 1)
 
-    # What a tick is, and what holds after it.
+    # The tick, and the invariants after it.
 
     def run(self, commands: Iterable[cmd.Command], ticks: int) -> None:
-        """``commands``, and then so many ticks in all."""
+        """Execute ``commands`` in the first of ``ticks`` ticks."""
         self.tick(commands)
         for _ in range(ticks - 1):
             self.tick(())
 
     def tick(self, commands: Iterable[cmd.Command]) -> None:
-        """One tick: the session, the driver, the invariants."""
-        commands, before, self.whole = tuple(commands), self.state, False
+        """Execute one tick: the session, the driver, the invariants."""
+        commands, before, self.tick_completed = tuple(commands), self.state, False
         t = before.t + DT
         self.log.append((commands, t))
         self.note(commands)
@@ -185,38 +185,38 @@ class JointRules(RuleBasedStateMachine):
         self.check_nothing_survives(before, commands, state, t)
         self.state = self.session.observe(state, state.setpoint, state.gripper_setpoint)
         if before.stopped is None and state.stopped is not None:
-            self.ordered = self.gripped = False
+            self.may_move = self.fingers_may_move = False
             self.stop_ends = state.goal
         self.check_limits(before, state)
         self.check_rest(before, state)
         self.check_consistent(state)
-        self.whole = True
+        self.tick_completed = True
 
     def note(self, commands: tuple[cmd.Command, ...]) -> None:
-        """Take down what may move from now on."""
+        """Record whether arm and fingers may move from now on."""
         for each in commands:
             if isinstance(each, cmd.Batch):
                 self.note(each.commands)
             elif isinstance(each, cmd.Stop):
-                self.ordered = self.gripped = False
+                self.may_move = self.fingers_may_move = False
             elif isinstance(each, cmd.ClearStop) and not self.state.motion.at_rest:
-                # Cleared while it brakes, the arm brakes in another way from here.
+                # If the stop is cleared during the brake, the arm brakes differently from here.
                 self.stop_ends = None
             elif self.state.stopped is None or any(isinstance(c, cmd.ClearStop) for c in commands):
-                self.ordered |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
-                self.gripped |= isinstance(each, cmd.SetGripper)
+                self.may_move |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
+                self.fingers_may_move |= isinstance(each, cmd.SetGripper)
 
     def check_limits(self, before: State, state: State) -> None:
-        """Position, speed, acceleration, jerk; and setpoints that move as they say."""
+        """Check position, speed, acceleration and jerk, and that setpoints agree with rates."""
         limits, motion, was = self.limits, state.motion, before.motion
         assert ((motion.q >= limits.lower) & (motion.q <= limits.upper)).all()
         assert (np.abs(motion.qd) <= limits.speed * (1.0 + ROUNDING)).all()
         assert (np.abs(motion.qdd) <= limits.acceleration * (1.0 + ROUNDING)).all()
         assert ((state.goal >= limits.lower) & (state.goal <= limits.upper)).all()
-        # A jerk within its limit leaves so much between the trapezium and the way.
-        way = 0.5 * DT * (motion.qd + was.qd)
+        # With bounded jerk the trapezium rule has at most this error.
+        step = 0.5 * DT * (motion.qd + was.qd)
         slack = limits.jerk * DT**3 + limits.acceleration * DT**2 + 1e-9
-        assert (np.abs(motion.q - was.q - way) <= slack).all()
+        assert (np.abs(motion.q - was.q - step) <= slack).all()
         arm = self.session.arm
         if arm is not None:
             moved = abs(state.gripper_setpoint - before.gripper_setpoint)
@@ -224,7 +224,7 @@ class JointRules(RuleBasedStateMachine):
             assert arm.gripper.lower <= state.gripper_setpoint <= arm.gripper.upper
 
     def check_rest(self, before: State, state: State) -> None:
-        """No motion while stopped or paused, once braked, nor without a newer command."""
+        """Check that nothing moves after the brake of a stop, or without a newer command."""
         resting = state.stopped is not None or state.paused
         self.braking = self.braking + 1 if resting else 0
         same = (state.setpoint == before.setpoint).all()
@@ -232,15 +232,15 @@ class JointRules(RuleBasedStateMachine):
             assert state.gripper_setpoint == before.gripper_setpoint
             assert not before.motion.at_rest or (same and state.motion.at_rest)
             assert self.braking < REST_SECONDS / DT or state.motion.at_rest
-        if not self.gripped:
+        if not self.fingers_may_move:
             assert state.gripper_setpoint == before.gripper_setpoint
-        if not self.ordered:
+        if not self.may_move:
             assert not before.motion.at_rest or (same and state.motion.at_rest)
             if self.stop_ends is not None and state.motion.at_rest:
                 np.testing.assert_allclose(state.setpoint, self.stop_ends, rtol=0, atol=1e-6)
 
     def check_consistent(self, state: State) -> None:
-        """Flags, findings and mode agree."""
+        """Check that flags, findings and mode agree."""
         reasons = {finding.reason for finding in state.findings}
         assert Reason.INTERNAL not in reasons
         assert (Reason.STOPPED in reasons) == (state.stopped is not None)
@@ -265,7 +265,7 @@ class JointRules(RuleBasedStateMachine):
     def check_nothing_survives(
         self, before: State, commands: tuple[cmd.Command, ...], after: State, t: float
     ) -> None:
-        """A command that supersedes a mode does the same as if that mode had never been."""
+        """Check that a command which supersedes a mode has the same effect as without that mode."""
         if len(commands) != 1 or before.following is not None:
             return
         (command,) = commands
@@ -279,11 +279,11 @@ class JointRules(RuleBasedStateMachine):
         assert type(other.mode) is type(after.mode)
 
     def teardown(self) -> None:
-        """Everything comes to an end, and comes to the same again."""
-        if not self.whole:
+        """Check that every motion ends, and that a replay gives the same state."""
+        if not self.tick_completed:
             return
         self.run([cmd.ClearStop(), cmd.Resume(), cmd.SpeedScale(1.0)], 30)
-        for _ in range(round(LONGEST_SECONDS / DT)):
+        for _ in range(round(MAX_MOTION_SECONDS / DT)):
             if not self.state.moving:
                 break
             self.tick(())
@@ -297,7 +297,7 @@ class JointRules(RuleBasedStateMachine):
 
 
 def _bits(state: State) -> tuple[object, ...]:
-    """What of a state goes to the arm or to people."""
+    """Return the parts of a state that the arm or people can see."""
     motion = state.motion
     arrays = (motion.q, motion.qd, motion.qdd, state.goal)
     rest = (state.gripper_setpoint, state.gripper_goal, state.blocked, state.paused, state.speed)

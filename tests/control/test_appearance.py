@@ -1,4 +1,4 @@
-"""How parts are shown: what can be changed of it, and what a session makes of that."""
+"""Appearance of parts: the traits that can be changed, and their effect in a session."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ names = st.sampled_from(["pan_link", "cup", "basin"])
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(names, changes), max_size=12))
 def test_appearance_keeps_only_changed_parts(
-    said: list[tuple[str, tuple[AppearanceTrait, Any]]],
+    edits: list[tuple[str, tuple[AppearanceTrait, Any]]],
 ) -> None:
     looks, each_alone = Appearance(), dict.fromkeys(("pan_link", "cup", "basin"), AS_MADE)
-    for name, (trait, value) in said:
+    for name, (trait, value) in edits:
         looks = looks.having(name, trait, value)
         each_alone[name] = each_alone[name].having(trait, value)
     assert {name: looks.of(name) for name in each_alone} == each_alone
@@ -53,7 +53,7 @@ def test_appearance_keeps_only_changed_parts(
     assert pickle.loads(pickle.dumps(looks)) == looks
 
 
-def test_paint_is_seen_at_once_and_goes_when_none_of_it_is_left() -> None:
+def test_new_paint_is_shown_until_all_of_it_is_restored() -> None:
     red = AS_MADE.having(AppearanceTrait.COLOUR, (1, 0, 0))
     assert red == LinkAppearance(DisplayMode.PAINTED, (1.0, 0.0, 0.0))
     glass = red.having(AppearanceTrait.TRANSPARENCY, 0.5)
@@ -69,7 +69,7 @@ def test_paint_is_seen_at_once_and_goes_when_none_of_it_is_left() -> None:
 
 
 @pytest.mark.parametrize(
-    ("trait", "value", "said"),
+    ("trait", "value", "message"),
     [
         (AppearanceTrait.CHOICE, 2, "-1 for hidden"),
         (AppearanceTrait.CHOICE, 0.5, "-1 for hidden"),
@@ -82,8 +82,8 @@ def test_paint_is_seen_at_once_and_goes_when_none_of_it_is_left() -> None:
         (AppearanceTrait.TRANSPARENCY, math.inf, "finite"),
     ],
 )
-def test_invalid_look_is_refused_by_the_api(trait: AppearanceTrait, value: Any, said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_invalid_appearance_is_refused(trait: AppearanceTrait, value: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         cmd.SetAppearance("pan_link", trait, value)
     with pytest.raises(InputError, match="1 to 100 characters"):
         cmd.SetAppearance("x" * 101, AppearanceTrait.CHOICE, 0)
@@ -102,13 +102,13 @@ def test_remembered_outcomes_are_bounded() -> None:
 def test_batch_is_executed_in_one_tick_or_not_at_all(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     q = session.ready + np.array((0.1, 0.0, 0.05, 0.0, 0.0))
-    said = cmd.Batch(
+    batch = cmd.Batch(
         (
             cmd.SetAxes(((0, float(q[0])), (2, float(q[2])))),
             cmd.SetAppearance("pan_link", AppearanceTrait.CHOICE, -1),
         )
     )
-    state = session.step(state, [said], 0.01)
+    state = session.step(state, [batch], 0.01)
     np.testing.assert_array_equal(state.goal, q)
     assert state.appearance.of("pan_link").choice is DisplayMode.HIDDEN
     for bad in (cmd.SetAxes(((5, 0.0),)), cmd.SetTool("spoon")):
@@ -117,22 +117,22 @@ def test_batch_is_executed_in_one_tick_or_not_at_all(session: Session) -> None:
                 cmd.Batch((cmd.SetAppearance("pan_link", AppearanceTrait.CHOICE, 0), bad))
             )
     with pytest.raises(InputError, match="singly"):
-        cmd.Batch((said,))
+        cmd.Batch((batch,))
     with pytest.raises(InputError, match="finite"):
         cmd.SetAxes(((0, math.nan),))
 
 
-def test_a_stop_lets_parts_be_painted_and_no_joint_be_moved(session: Session) -> None:
+def test_stopped_arm_accepts_paint_but_no_motion(session: Session) -> None:
     state = session.step(session.begin(session.ready, 0.0, 0.0), [cmd.Stop()], 0.01)
-    said = cmd.Batch(
+    batch = cmd.Batch(
         (cmd.SetAxes(((0, 0.5),)), cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1))
     )
-    state = session.step(state, [said], 0.02)
+    state = session.step(state, [batch], 0.02)
     np.testing.assert_array_equal(state.goal, session.ready)
     assert appearance_of(state, "cup").choice is DisplayMode.HIDDEN
 
 
-def test_a_object_is_shifted_by_halves_and_takes_its_paint_with_it_when_it_goes(
+def test_object_moves_and_turns_separately_and_is_removed_with_its_paint(
     session: Session,
 ) -> None:
     cube = SceneObject("cube", Shape.BOX, (0.1, 0.1, 0.1), np.eye(4))

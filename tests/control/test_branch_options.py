@@ -1,4 +1,4 @@
-"""Readings and branches: what a person chooses, and what the arm makes of it."""
+"""Priorities and branches: the choices of a person, and their effect on the arm."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from katana450.maths.kinematics.priority import Priority
 
 TICK = 0.01
 SPLIT = np.array([0.4353, 0.0, 0.0323])
-"""A place that front-up reaches with pitches in two ranges, and the way across its edge."""
+"""A place that front-up reaches with pitches in two ranges, and the direction across its edge."""
 SPLIT_PITCH = -0.205
 ACROSS = np.array([-0.81, 0.0, -0.586])
 OUT, _, UP = np.eye(3)
@@ -40,7 +40,7 @@ def point(arm: ArmModel, q: FloatArray) -> FloatArray:
 
 
 def at_the_edge(session: Session, state: State) -> State:
-    """Dragged slowly until the limits let the pitch go no further."""
+    """Return the state of a slow drag to the place where the limits stop the pitch."""
     T = se3.from_rotation_translation(so3.rotation_y(SPLIT_PITCH), SPLIT - 0.02 * ACROSS)
     before = take(session, state, cmd.SetPose(T), cmd.EndDrag())
     assert before.status is Status.OK
@@ -49,35 +49,33 @@ def at_the_edge(session: Session, state: State) -> State:
     return before
 
 
-def test_held_at_the_edge_of_a_gap_the_panel_can_say_why(session: Session, state: State) -> None:
+def test_gap_is_reported_with_axis_and_leap(session: Session, state: State) -> None:
     held = at_the_edge(session, state)
     assert held.status is Status.GAP
     first = held.findings[0]
     assert first.reason is Reason.ACROSS_GAP
     assert first.axis in (1, 3)
     assert first.amount > 1.0
-    # The place itself is not out of reach, and it is not said to be.
+    # The position is not out of reach, so no such finding is reported.
     assert Reason.OUT_OF_REACH not in reasons(held)
 
 
-def test_a_person_may_ask_for_the_other_side_of_a_gap(
-    arm: ArmModel, session: Session, state: State
-) -> None:
+def test_branch_change_crosses_a_gap(arm: ArmModel, session: Session, state: State) -> None:
     held = at_the_edge(session, state)
     across = take(session, held, cmd.TakeBranch(held.branch))
     assert across.branch == held.branch
     assert np.abs(across.goal - held.goal).max() > 1.0
-    wish = SPLIT + 0.0195 * ACROSS
-    assert np.allclose(point(arm, across.goal), wish, atol=1e-9)
+    desired = SPLIT + 0.0195 * ACROSS
+    assert np.allclose(point(arm, across.goal), desired, atol=1e-9)
     assert across.status is Status.LIMITED
     assert isinstance(across.target, ToolTarget)
-    # From there the drag goes on.
-    on = take(session, across, cmd.MoveTool(wish + 0.001 * ACROSS))
+    # The drag continues from there.
+    on = take(session, across, cmd.MoveTool(desired + 0.001 * ACROSS))
     assert np.abs(on.goal - across.goal).max() < 0.1
     assert on.status is not Status.GAP
 
 
-def test_typed_poses_and_joints_leap_at_joint_speed(
+def test_typed_poses_and_joints_are_reached_at_joint_speed(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     held = at_the_edge(session, state)
@@ -90,10 +88,10 @@ def test_typed_poses_and_joints_leap_at_joint_speed(
 
 
 @pytest.mark.parametrize("branch", BRANCHES, ids=str)
-def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
+def test_branch_change_keeps_limits_and_joint_speed(
     arm: ArmModel, session: Session, state: State, branch: Branch
 ) -> None:
-    """From a place that all four branches reach: high over the base."""
+    """The place high over the base is reached by all four branches."""
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
     state = take(session, state, cmd.SetPose(T), cmd.EndDrag())
     metrics = branch_options(arm, state)[BRANCHES.index(branch)].metrics
@@ -109,7 +107,7 @@ def test_a_branch_is_taken_inside_the_limits_at_joint_speed(
         assert arm.chain.within_limits(taken.setpoint, slack=0.0)
     on = branch_of(arm.chain, taken.setpoint)
     assert on == branch
-    # Dragging keeps to it from now on.
+    # Later drags keep the new branch.
     dragged = take(session, taken, cmd.MoveTool(point(arm, taken.goal) - 0.01 * UP))
     assert dragged.branch == branch
     assert branch_of(arm.chain, dragged.goal) == branch
@@ -119,10 +117,10 @@ def test_target_is_kept_on_the_other_shoulder(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     """Pitch and roll are counted in the arm's plane, which then faces the other way."""
-    wish = np.array([0.05, 0.02, 0.40])
+    desired = np.array([0.05, 0.02, 0.40])
     for fraction in np.linspace(0.05, 1.0, 20):
         start = point(arm, session.ready)
-        state = take(session, state, cmd.MoveTool(start + fraction * (wish - start)))
+        state = take(session, state, cmd.MoveTool(start + fraction * (desired - start)))
     assert isinstance(state.target, ToolTarget)
     back = take(session, state, cmd.TakeBranch(Branch("back", "up")))
     assert isinstance(back.target, ToolTarget)
@@ -162,7 +160,7 @@ def test_branch_options_predict_the_result_of_taking_them(
         assert metrics.distance == np.abs(metrics.q - state.q).max()
 
 
-# A target whose pitch the arm cannot have where it is, whose yaw it cannot have anywhere.
+# The arm cannot have the pitch of the target at this position, nor its yaw at any position.
 SIDEWAYS = so3.rotation_z(0.5) @ so3.rotation_y(1.2)
 FAR_OUT = np.array([0.55, 0.0, 0.0])
 
@@ -199,7 +197,7 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
 
 
 @pytest.mark.parametrize("priority", Priority)
-def test_dragging_outwards_each_reading_gives_way_in_its_own_manner(
+def test_each_priority_loses_its_own_part_in_a_drag_out_of_reach(
     arm: ArmModel, session: Session, state: State, priority: Priority
 ) -> None:
     state = take(session, state, cmd.SetPriority(priority))

@@ -15,9 +15,9 @@ NAN = math.nan
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
-        (lambda: cmd.SetJoint(0, NAN), "axis 1 has to be a finite number"),
+        (lambda: cmd.SetJoint(0, NAN), "axis 1 must be a finite number"),
         (lambda: cmd.SetJoint(2, math.inf), "axis 3"),
         (lambda: cmd.SetJoint(-1, 0.0), "whole number from 0"),
         (lambda: cmd.SetJoint(True, 0.0), "whole number from 0"),
@@ -42,12 +42,14 @@ NAN = math.nan
         (lambda: cmd.TakeBranch(None), "front-up, front-down"),  # type: ignore[arg-type]
     ],
 )
-def test_invalid_command_is_refused_with_the_reason(make: Callable[[], object], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_invalid_command_is_refused_with_the_reason(
+    make: Callable[[], object], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
         make()
 
 
-def test_a_command_does_not_change_with_the_array_it_was_made_of() -> None:
+def test_command_copies_its_array() -> None:
     q = np.zeros(5)
     command = cmd.SetJoints(q)
     q[0] = 1.0

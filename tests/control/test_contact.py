@@ -1,4 +1,4 @@
-"""Driven at full speed into table, itself and a cup, the arm stops, says so and goes away."""
+"""The arm at full speed stops before the table, itself and a cup, reports it and moves away."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from katana450.maths.geometry.arrays import FloatArray
 TICK = 0.01
 SLIGHTLY = 2e-5  # m
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
-"""The fingers a hand's breadth above the table."""
+"""Posture with the fingers about 10 cm above the table."""
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def clearance(world: CollisionWorld, state: State) -> float:
 def run(
     session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 500
 ) -> tuple[State, list[float]]:
-    """Until the arm rests: its last state, and how near anything was after each tick."""
+    """Return the last state when the arm rests, and the clearance after each tick [m]."""
     commands = list(commands)
     near = []
     for _ in range(ticks):
@@ -64,7 +64,7 @@ INTO: dict[str, tuple[FloatArray, list[cmd.Command], set[str]]] = {
 
 
 @pytest.mark.parametrize("what", INTO)
-def test_at_full_speed_it_stops_before(guarded: Session, what: str) -> None:
+def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> None:
     start, commands, met = INTO[what]
     state, near = run(guarded, standing(guarded, start), commands)
     assert min(near) >= STOP - SLIGHTLY
@@ -80,7 +80,7 @@ def test_at_full_speed_it_stops_before(guarded: Session, what: str) -> None:
 
 
 @pytest.mark.parametrize("what", INTO)
-def test_without_a_world_it_would_have_gone_in(
+def test_arm_without_collision_world_collides(
     session: Session, world: CollisionWorld, what: str
 ) -> None:
     start, commands, _ = INTO[what]
@@ -93,7 +93,7 @@ def test_without_a_world_it_would_have_gone_in(
 
 
 @pytest.mark.parametrize("what", INTO)
-def test_it_goes_away_at_full_speed(guarded: Session, what: str) -> None:
+def test_arm_leaves_a_contact_at_full_speed(guarded: Session, what: str) -> None:
     start, commands, _ = INTO[what]
     blocked, _ = run(guarded, standing(guarded, start), commands)
     back = cmd.SetJoints(start)
@@ -107,7 +107,7 @@ def test_it_goes_away_at_full_speed(guarded: Session, what: str) -> None:
     assert min(near) >= STOP - SLIGHTLY
 
 
-def test_an_arm_that_waits_keeps_still_to_the_bit(guarded: Session) -> None:
+def test_blocked_arm_stays_still_to_the_bit(guarded: Session) -> None:
     start, commands, _ = INTO["table"]
     blocked, _ = run(guarded, standing(guarded, start), commands)
     state = blocked
@@ -117,7 +117,7 @@ def test_an_arm_that_waits_keeps_still_to_the_bit(guarded: Session) -> None:
         assert state.findings == blocked.findings
 
 
-def test_an_arm_that_waits_goes_on_once_the_way_is_free(
+def test_blocked_arm_continues_once_its_path_is_clear(
     guarded: Session, world: CollisionWorld
 ) -> None:
     start, commands, _ = INTO["cup"]
@@ -131,7 +131,7 @@ def test_an_arm_that_waits_goes_on_once_the_way_is_free(
     assert state.status is Status.OK
 
 
-def test_letting_go_before_a_contact_gives_the_rest_of_the_way_up(guarded: Session) -> None:
+def test_end_of_a_drag_before_a_contact_drops_the_rest_of_the_path(guarded: Session) -> None:
     state = standing(guarded, LOW)
     blocked, _ = run(guarded, state, [cmd.MoveTool(np.array([0.40, 0.23, -0.35]))])
     assert blocked.blocked
@@ -142,7 +142,7 @@ def test_letting_go_before_a_contact_gives_the_rest_of_the_way_up(guarded: Sessi
     assert let_go.findings[0].reason is Reason.CONTACT
 
 
-def test_hold_forgets_the_contact(guarded: Session) -> None:
+def test_hold_clears_the_contact_finding(guarded: Session) -> None:
     start, commands, _ = INTO["table"]
     blocked, _ = run(guarded, standing(guarded, start), commands)
     held = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
@@ -150,8 +150,8 @@ def test_hold_forgets_the_contact(guarded: Session) -> None:
     assert held.status is Status.OK
 
 
-def test_fingers_do_not_open_into_a_cup_and_the_arm_goes_on(guarded: Session) -> None:
-    """The tool beside the cup, closed; then both are told to move."""
+def test_fingers_wait_before_a_cup_until_the_arm_moves_away(guarded: Session) -> None:
+    """The closed tool is beside the cup; then the fingers open, and the arm moves."""
     start, commands, _ = INTO["cup"]
     blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), commands)
     at_cup = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
@@ -166,8 +166,8 @@ def test_fingers_do_not_open_into_a_cup_and_the_arm_goes_on(guarded: Session) ->
     assert min(near) >= STOP - SLIGHTLY
 
 
-def test_an_arm_found_in_a_contact_may_leave_it(guarded: Session, world: CollisionWorld) -> None:
-    """As when a cup is put where the arm already is."""
+def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWorld) -> None:
+    """A contact can exist at the start if a cup is put where the arm already is."""
     inside = np.radians((-13.0, -40.0, 95.0, -20.0, 0.0))
     state = standing(guarded, inside)
     depth = clearance(world, state)
@@ -180,14 +180,14 @@ def test_an_arm_found_in_a_contact_may_leave_it(guarded: Session, world: Collisi
     assert near[-1] > STOP
 
 
-def test_guarded_steps_are_a_fold_that_can_be_replayed_to_the_bit(guarded: Session) -> None:
+def test_steps_with_collision_world_replay_to_the_bit(guarded: Session) -> None:
     start, commands, _ = INTO["base"]
     ends = [run(guarded, standing(guarded, start), commands)[0] for _ in range(2)]
     assert ends[0].setpoint.tobytes() == ends[1].setpoint.tobytes()
     assert ends[0].findings == ends[1].findings
 
 
-def test_far_from_everything_a_world_changes_nothing(session: Session, guarded: Session) -> None:
+def test_distant_collision_world_does_not_change_motion(session: Session, guarded: Session) -> None:
     commands: list[cmd.Command] = [cmd.SetJoint(0, 1.0), cmd.SetGripper(0.2)]
     free, kept = (each.begin(each.ready, 0.0, 0.0) for each in (session, guarded))
     for _ in range(80):
@@ -200,12 +200,12 @@ def test_far_from_everything_a_world_changes_nothing(session: Session, guarded: 
 
 
 def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> None:
-    """Close to the base, where the other elbow has no room."""
+    """Close to the base the other elbow has no room."""
     state = standing(guarded, np.radians((10.5, -75.6, 94.5, 88.4, 47.8)))
-    told = {choice.metrics.branch: choice for choice in guarded.choices(state)}
-    own = told[state.branch]
+    options = {choice.metrics.branch: choice for choice in guarded.choices(state)}
+    own = options[state.branch]
     assert own.contact is None
-    met = [choice for choice in told.values() if choice.contact is not None]
+    met = [choice for choice in options.values() if choice.contact is not None]
     assert met
     for choice in met:
         assert choice.contact is not None
@@ -216,12 +216,12 @@ def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> 
 
 
 def test_braking_arm_with_a_new_target_keeps_its_finding(guarded: Session) -> None:
-    """A slider tells a new angle many times on its way; other parts are nearer at first."""
+    """A slider sends many angles on its way; at first other parts are nearer."""
     state = standing(guarded, guarded.ready)
     named = set()
     for tick, angle in enumerate(np.radians(np.linspace(-60.0, 5.0, 150))):
-        told = [] if tick % 4 else [cmd.SetJoint(1, float(angle))]
-        state = guarded.step(state, told, state.t + TICK)
+        commands = [] if tick % 4 else [cmd.SetJoint(1, float(angle))]
+        state = guarded.step(state, commands, state.t + TICK)
         named |= {f.parts for f in state.findings if f.reason is Reason.CONTACT}
     state, _ = run(guarded, state, [])
     (finding,) = (f for f in state.findings if f.reason is Reason.CONTACT)

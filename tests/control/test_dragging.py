@@ -1,4 +1,4 @@
-"""Thousands of drags: the goal never leaves the branch, never leaps, never turns away."""
+"""Thousands of drags: the goal keeps its branch, never leaps, and only approaches the target."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ from tests.kinematics.family import random_member, random_pose
 ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
 TICK = 0.01
-A_TRIP = 25
-"""Moves of the hand one after the other that go the same way, so that they get somewhere."""
+MOVES_PER_TRIP = 25
+"""Number of moves in the same direction, so that the drag covers a distance."""
 
 LONG = "KATANA450_LONG" in os.environ
 DRAGS = {Priority.POSE: 10_000 if LONG else 2_500, Priority.PITCH: 1_000, Priority.POSITION: 1_000}
-"""All of them with `make test-long`."""
-OTHERS = 500
-"""Drags of each other arm, the readings by turns."""
+"""Number of drags for each priority; `make test-long` runs all of POSE."""
+DRAGS_OF_OTHER_ARMS = 500
+"""Number of drags of each other arm, with the priorities in turn."""
 
 GRABS = (1, 5, 25)
-"""Moves of the hand between taking hold and letting go; in every fourth trip it turns the rings
-too."""
+"""Number of moves between the begin and the end of a drag. In every fourth trip the drag also turns
+the rings."""
 
 CAUSES = {Reason.ACROSS_GAP, Reason.AXIS_LIMIT, Reason.AXIS_1, Reason.LINKS}
 
-MOST_TICKS = 30
-"""To take the goal to where the hand went; the arm needs many more to go there."""
+MAX_TICKS_TO_GOAL = 30
+"""Maximum number of ticks until the goal reaches the target; the arm needs many more."""
 
 ROUNDING = 1e-9
 
 TINY = 1e-8
-"""[rad/s], [rad/s^2] What planning each tick anew leaves open."""
+"""[rad/s], [rad/s^2] Tolerance for planning each tick again."""
 
 
 def tool(chain: Chain, q: FloatArray) -> FloatArray:
@@ -60,7 +60,7 @@ def tool(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def on_branch(chain: Chain, q: FloatArray, branch: Branch, over: float) -> bool:
-    """Whether ``q`` is on ``branch``, or its seam, or ``over`` it [m]."""
+    """Return whether ``q`` is on ``branch``, on its seam, or beyond it by at most ``over`` [m]."""
     arm = arm_of(chain)
     alpha1, _, alpha3, _, _ = arm.canonical(q)
     x, y = arm.pose(forward(chain, q))[:2, 3]
@@ -71,16 +71,21 @@ def on_branch(chain: Chain, q: FloatArray, branch: Branch, over: float) -> bool:
 
 
 def on_elbow(chain: Chain, q: FloatArray, branch: Branch) -> bool:
-    """Whether ``q`` has the elbow of ``branch``, or none."""
+    """Return whether ``q`` has the elbow of ``branch``, or is stretched."""
     bend = math.sin(arm_of(chain).canonical(q)[2])
     return (bend if branch.elbow == "up" else -bend) >= -ROUNDING
 
 
 @dataclasses.dataclass(frozen=True)
 class Trip:
-    """Where it starts [rad], what a move of the hand adds [m], and moves between grabs.
+    """A series of moves in one direction.
 
-    turns: how far a move of the rings turns them [rad], 0 where the hand leaves them alone.
+    Attributes:
+        q: posture at the start [rad].
+        way: change of the target per move [m].
+        grab: number of moves per drag.
+        turns: standard deviation of the turns of the rings [rad]; 0 for no turns.
+        priority: the priority of the drags.
     """
 
     q: FloatArray
@@ -91,10 +96,10 @@ class Trip:
 
 
 def trips(chain: Chain, priorities: tuple[Priority, ...], drags: int) -> Iterator[Trip]:
-    """A third goes across axis 1, the others anywhere, most of them out of the workspace."""
+    """Yield trips: a third across axis 1, the others anywhere, most out of the workspace."""
     T_C_S = arm_of(chain).T_C_S
     size = arm_of(chain).reach
-    for number in range(drags // A_TRIP):
+    for number in range(drags // MOVES_PER_TRIP):
         rng = np.random.default_rng([450, number])
         q = rng.uniform(chain.lower, chain.upper)
         way = rng.normal(size=3)
@@ -102,7 +107,7 @@ def trips(chain: Chain, priorities: tuple[Priority, ...], drags: int) -> Iterato
             x, y, _ = T_C_S[:3, :3] @ tool(chain, q) + T_C_S[:3, 3]
             across = np.array([-x, -y, 0.05 * rng.normal()]) + rng.normal(scale=0.02, size=3)
             way = T_C_S[:3, :3].T @ across
-        # Mostly slow, some as fast as a hand can.
+        # Most trips are slow, some as fast as a person can move.
         length = rng.uniform(0.003, 0.03) * size if number % 20 else (0.1, 0.4)[number // 20 % 2]
         yield Trip(
             q,
@@ -114,14 +119,14 @@ def trips(chain: Chain, priorities: tuple[Priority, ...], drags: int) -> Iterato
 
 
 def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[State]:
-    """The states after each move of the hand, every tick of them checked."""
+    """Yield the state after each move, with every tick checked."""
     rng = np.random.default_rng([seed, 1])
     state = session.begin(trip.q, 0.0, 0.0)
     state = session.step(state, [cmd.SetPriority(trip.priority)], state.t + TICK)
     branch = state.branch
     target = tool(chain, trip.q)
     limit, turning = 3.0 * arm_of(chain).reach, trip.turns > 0.0
-    for number in range(A_TRIP):
+    for number in range(MOVES_PER_TRIP):
         if turning and number % 3 == 2:
             desired = current_target(session.require_arm(), state)
             turn = rng.normal(scale=trip.turns, size=2)
@@ -133,7 +138,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
         state = check_tick(chain, session, state, command)
         ticks = 1
         while state.since is not None:
-            assert ticks < MOST_TICKS
+            assert ticks < MAX_TICKS_TO_GOAL
             state = check_tick(chain, session, state)
             ticks += 1
         assert isinstance(state.target, ToolTarget)
@@ -148,7 +153,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
 
 
 def misses(chain: Chain, q: FloatArray, target: ToolTarget, priority: Priority) -> list[float]:
-    """What counts most of what ``q`` misses of the target, in order."""
+    """Return the distances of ``q`` from the target, in the order of the priority."""
     pitch, _ = pitch_and_roll(chain, q)
     position = math.dist(tool(chain, q), target.position)
     if priority is Priority.PITCH:
@@ -157,7 +162,7 @@ def misses(chain: Chain, q: FloatArray, target: ToolTarget, priority: Priority) 
 
 
 def check_goal(chain: Chain, before: State, state: State, target: ToolTarget) -> None:
-    """However many hops it took, no move of the hand leads the goal away from its target."""
+    """Check that a move never leads the goal away from its target, however many hops it takes."""
     was, now = (misses(chain, s.goal, target, state.priority) for s in (before, state))
     for a, b in zip(was, now, strict=True):
         assert b <= a + ROUNDING
@@ -167,10 +172,10 @@ def check_goal(chain: Chain, before: State, state: State, target: ToolTarget) ->
 
 
 def check_findings(chain: Chain, state: State, target: ToolTarget) -> None:
-    """Whatever is given up is told, and with a cause that a person can act on."""
+    """Check that every loss is reported, with a cause that a person can act on."""
     reasons = {finding.reason for finding in state.findings}
-    given_up = math.dist(tool(chain, state.goal), target.position) > POSITION_WORTH_TELLING
-    assert reasons or not given_up
+    lost = math.dist(tool(chain, state.goal), target.position) > POSITION_WORTH_TELLING
+    assert reasons or not lost
     assert not reasons or reasons & CAUSES
 
 
@@ -180,9 +185,9 @@ def check_tick(
     before: State,
     *commands: cmd.Command,
 ) -> State:
-    """A tick: the arm keeps to its speeds, limits and elbow, and the goal to its branch.
+    """Execute a tick; check speeds, limits and elbow of the arm, and the branch of the goal.
 
-    The arm itself has mass: it follows the goal as fast as it may, and turns no corner at once.
+    The arm follows its goal with limited acceleration, so it turns no corner at once.
     """
     state = session.step(before, commands, before.t + TICK)
     limits = session.require_arm().limits
@@ -198,19 +203,21 @@ def check_tick(
 
 
 @pytest.mark.parametrize("priority", Priority)
-def test_thousands_of_drags(arm: ArmModel, session: Session, priority: Priority) -> None:
+def test_drags_keep_branch_limits_and_progress(
+    arm: ArmModel, session: Session, priority: Priority
+) -> None:
     seen: Counter[Status] = Counter()
     for number, trip in enumerate(trips(arm.chain, (priority,), DRAGS[priority])):
         seen.update(state.status for state in drag(arm.chain, session, trip, number))
     assert sum(seen.values()) == DRAGS[priority]
-    # It did go through all of it.
+    # The drags have reached every status.
     assert all(
         seen[status] > DRAGS[priority] // 20 for status in (Status.OK, Status.LIMITED, Status.GAP)
     ), seen
 
 
-def others() -> Iterator[tuple[str, Chain]]:
-    """Arms with offsets of every kind, and tool points beside their roll axis."""
+def other_arms() -> Iterator[tuple[str, Chain]]:
+    """Yield arms with offsets of every kind, and tool points beside their roll axis."""
     for name in ("pincherx_150", "youbot_arm"):
         yield name, load(ARMS / f"{name}.urdf").require_arm().chain
     for seed in (1, 2, 3):
@@ -222,12 +229,12 @@ def others() -> Iterator[tuple[str, Chain]]:
         yield f"member {seed} beside", limited.with_tool(chain.M @ random_pose(rng, 0.02))
 
 
-@pytest.mark.parametrize("chain", [pytest.param(chain, id=name) for name, chain in others()])
-def test_hundreds_of_drags_of_other_arms(chain: Chain) -> None:
+@pytest.mark.parametrize("chain", [pytest.param(chain, id=name) for name, chain in other_arms()])
+def test_drags_of_other_arms_keep_branch_limits_and_progress(chain: Chain) -> None:
     arm = ArmModel(chain, {"tool": chain.M}, "tool", NO_GRIPPER)
     session = Session(arm, 0.5 * (chain.lower + chain.upper))
     seen: Counter[Status] = Counter()
-    for number, trip in enumerate(trips(chain, tuple(Priority), OTHERS)):
+    for number, trip in enumerate(trips(chain, tuple(Priority), DRAGS_OF_OTHER_ARMS)):
         seen.update(state.status for state in drag(chain, session, trip, number))
-    assert sum(seen.values()) == OTHERS
+    assert sum(seen.values()) == DRAGS_OF_OTHER_ARMS
     assert set(seen) == {Status.OK, Status.LIMITED, Status.GAP}

@@ -1,4 +1,4 @@
-"""No silent stop: whatever holds the arm back is an entry, once, and has a sentence."""
+"""Every cause that holds the arm back makes one entry in the event log, and has a text."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_end_of_a_finding_is_logged(session: Session, state: State) -> None:
     assert released.findings == ()
 
 
-def test_a_number_that_changes_is_no_news(session: Session, state: State) -> None:
+def test_changed_amount_makes_no_entry(session: Session, state: State) -> None:
     far, _ = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))], 40)
     farther, more = run(session, far, [cmd.MoveTool(np.array([0.95, 0.0, 0.1]))], 40)
     assert farther.findings[0].reason is Reason.OUT_OF_REACH
@@ -60,11 +60,11 @@ def test_a_number_that_changes_is_no_news(session: Session, state: State) -> Non
 
 
 @pytest.mark.parametrize("reason", Reason)
-def test_every_reason_has_its_sentence(reason: Reason) -> None:
-    said = REASONS[reason](Finding(reason, 0.0123, axis=2, parts=("base_link", "table"), time=0.4))
-    assert len(said) > 10
+def test_every_reason_has_a_text(reason: Reason) -> None:
+    text = REASONS[reason](Finding(reason, 0.0123, axis=2, parts=("base_link", "table"), time=0.4))
+    assert len(text) > 10
 
 
 @pytest.mark.parametrize("status", Status)
-def test_every_status_has_its_words(status: Status) -> None:
+def test_every_status_has_a_text(status: Status) -> None:
     assert STATUS[status]

@@ -1,4 +1,4 @@
-"""Plans in the session: on the path and inside every limit, whatever a person does meanwhile."""
+"""Plans in the session: on the path and inside every limit, whatever commands come meanwhile."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from katana450.settings import Settings
 TICK = 0.01
 SLIGHTLY = 2e-5  # m
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
-"""The fingers a hand's breadth above the table."""
+"""Posture with the fingers about 10 cm above the table."""
 BEYOND_CUP = LOW - (1.1, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
 def poured(arm: ArmModel) -> Plan:
-    """A cup lifted, taken round an arc and poured out: three paths with a rest between them."""
+    """A plan that lifts a cup, carries it along an arc and pours: three paths, with rests."""
     chain = arm.chain
     start = np.radians((-20.0, -75.0, 100.0, -25.0, 0.0))
     branch, at = branch_of(chain, start), ToolTarget.at(chain, start)
@@ -62,14 +62,14 @@ def guarded(arm: ArmModel, world: CollisionWorld) -> Session:
 
 @pytest.fixture(scope="module")
 def round_cup(arm: ArmModel, world: CollisionWorld, guarded: Session) -> Plan:
-    """From one side of the cup to the other, where the straight way would hit it."""
+    """A plan from one side of the cup to the other, where the straight path would hit it."""
     return plan_to(arm, world, guarded.begin(LOW, 0.0, 0.0), BEYOND_CUP, seed=1)
 
 
 def trace(
     session: Session, state: State, commands: dict[int, list[cmd.Command]], ticks: int
 ) -> list[State]:
-    """The states of ``ticks`` turns of the loop, ``commands`` at some of them."""
+    """Return the states of ``ticks`` ticks, with ``commands`` at some of them."""
     states = []
     for tick in range(ticks):
         state = session.step(state, commands.get(tick, []), state.t + TICK)
@@ -81,7 +81,7 @@ def trace(
 def run(
     session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 2000
 ) -> list[State]:
-    """Until the arm rests."""
+    """Return the states until the arm rests."""
     states = [session.step(state, commands, state.t + TICK)]
     while states[-1].moving:
         states.append(session.step(states[-1], [], states[-1].t + TICK))
@@ -90,7 +90,7 @@ def run(
 
 
 def check_limits(session: Session, states: list[State]) -> None:
-    """Finite differences over a tick are means of the derivative, so they keep its limits."""
+    """Check that finite differences over a tick keep the limits of the derivatives."""
     limits, rounding = session.require_arm().limits, 1e-12
     q = np.array([state.setpoint for state in states])
     for order, limit in enumerate((limits.speed, limits.acceleration, limits.jerk), 1):
@@ -100,14 +100,14 @@ def check_limits(session: Session, states: list[State]) -> None:
     points = np.array([forward(chain, each)[:3, 3] for each in q])
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= TOOL_SPEED * TICK + 1e-12
     for before, after in pairwise(states):
-        # The motion that is told is that of the setpoints.
+        # The reported rates agree with the setpoints.
         mean = 0.5 * (before.motion.qd + after.motion.qd)
         step = after.setpoint - before.setpoint
         assert np.abs(step - TICK * mean).max() <= (limits.jerk * TICK**3 / 12.0).max() + 1e-12
 
 
 def off_path(states: list[State], plan: Plan) -> float:
-    """The farthest setpoint from the plan's path at the place it is said to be at [rad]."""
+    """Return the maximum distance of a setpoint from its reported place on the plan [rad]."""
     worst = 0.0
     for state in states:
         assert state.following is not None
@@ -118,7 +118,7 @@ def off_path(states: list[State], plan: Plan) -> float:
     return worst
 
 
-def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, state: State) -> None:
+def test_plan_is_followed_to_its_end_in_its_duration(session: Session, state: State) -> None:
     goal = np.array([1.0, -0.8, 0.9, 0.5, 1.2])
     plan = plan_to(session.require_arm(), None, state, goal)
     states = run(session, state, [cmd.Follow(plan)])
@@ -135,10 +135,10 @@ def test_a_plan_is_followed_to_its_end_in_the_time_it_says(session: Session, sta
     check_limits(session, [state, state, state, *states])
 
 
-def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
+def test_cup_stays_level_and_on_its_path_under_any_pacing(
     arm: ArmModel, session: Session, poured: Plan
 ) -> None:
-    """Pauses, ways back, stops at any place and changes of speed, at any time."""
+    """Pauses, motion back, stops at any place and changes of speed come at any time."""
     random = np.random.default_rng(11)
     commands: dict[int, list[cmd.Command]] = {0: [cmd.Follow(poured)]}
     for tick in np.cumsum(random.integers(5, 90, 40)).tolist():
@@ -178,7 +178,7 @@ def test_a_cup_stays_level_and_on_its_way_whatever_is_asked_of_it(
     assert sum(turned) > 100
 
 
-def test_the_way_goes_by_steps_from_rest_to_rest(session: Session, poured: Plan) -> None:
+def test_plan_can_be_followed_step_by_step(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     state = session.step(start, [cmd.Follow(poured), cmd.Pause()], TICK)
     for begin in poured.begins[1:]:
@@ -192,7 +192,7 @@ def test_the_way_goes_by_steps_from_rest_to_rest(session: Session, poured: Plan)
     assert (back.setpoint == poured.start).all()
 
 
-def test_a_plan_that_begins_elsewhere_is_refused(session: Session, poured: Plan) -> None:
+def test_plan_from_another_posture_is_refused(session: Session, poured: Plan) -> None:
     state = session.begin(poured.start + np.array([0.0, 0.0, 0.0, 0.0, 0.01]), 0.0, 0.0)
     after = session.step(state, [cmd.Follow(poured)], TICK)
     (finding,) = after.findings
@@ -206,14 +206,14 @@ def test_a_plan_that_begins_elsewhere_is_refused(session: Session, poured: Plan)
 
 
 @pytest.mark.parametrize("fraction", [-0.1, 1.1, math.nan, "end"])
-def test_orders_that_are_none_are_refused(fraction: object) -> None:
+def test_invalid_plan_commands_are_refused(fraction: object) -> None:
     with pytest.raises(InputError, match="fraction"):
         cmd.GoAlong(fraction)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="plan"):
         cmd.Follow(fraction)  # type: ignore[arg-type]
 
 
-def test_a_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured: Plan) -> None:
+def test_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured: Plan) -> None:
     S = np.array(arm.chain.S)
     S[3:, 1] += 0.01 * S[[2, 0, 1], 1]
     other = Session(replace(arm, chain=replace(arm.chain, S=S)), session.ready)
@@ -221,14 +221,14 @@ def test_a_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, pour
         other.check(cmd.Follow(poured))
 
 
-def test_without_a_plan_there_is_nowhere_to_go_along(session: Session, state: State) -> None:
+def test_go_along_without_a_plan_does_nothing(session: Session, state: State) -> None:
     after = session.step(state, [cmd.GoAlong(1.0)], TICK)
     assert after.setpoint is state.setpoint
     assert after.following is None
 
 
 @pytest.mark.parametrize(
-    "order",
+    "command",
     [
         cmd.SetJoint(0, 0.3),
         cmd.Home(),
@@ -237,13 +237,13 @@ def test_without_a_plan_there_is_nowhere_to_go_along(session: Session, state: St
         cmd.Hold(),
     ],
 )
-def test_any_other_motion_ends_it_inside_the_limits(
-    session: Session, poured: Plan, order: cmd.Command
+def test_other_motion_ends_the_plan_inside_the_limits(
+    session: Session, poured: Plan, command: cmd.Command
 ) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)
     assert not under_way[-1].motion.at_rest
-    after = run(session, under_way[-1], [order])
+    after = run(session, under_way[-1], [command])
     assert after[-1].following is None
     assert not after[-1].moving
     limits, slack = session.require_arm().limits, 1.0 + 1e-6
@@ -253,32 +253,32 @@ def test_any_other_motion_ends_it_inside_the_limits(
         assert (change <= limits.acceleration * TICK * slack + 1e-8).all()
 
 
-def test_turning_a_plan_s_tool_or_fingers_does_not_end_it(session: Session, poured: Plan) -> None:
+def test_tool_and_gripper_commands_do_not_end_the_plan(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
-    orders: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.EndDrag()]
-    states = trace(session, start, {0: [cmd.Follow(poured)], 50: orders}, 900)
+    commands: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.EndDrag()]
+    states = trace(session, start, {0: [cmd.Follow(poured)], 50: commands}, 900)
     assert (states[-1].setpoint == poured.end).all()
     assert states[-1].gripper_setpoint == 0.2
     assert off_path(states, poured) <= 1e-15
 
 
-def test_a_stop_is_as_quick_as_the_joints_allow(session: Session, poured: Plan) -> None:
+def test_stop_on_a_plan_is_as_fast_as_the_joints_allow(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)[-1]
     stopped = run(session, under_way, [cmd.Stop()])
     (finding,) = stopped[-1].findings
     assert finding.reason is Reason.STOPPED
     assert len(stopped) * TICK == pytest.approx(finding.time, abs=2 * TICK)
-    way = math.dist(
+    travel = math.dist(
         *(
             forward(session.require_arm().chain, each.setpoint)[:3, 3]
             for each in (under_way, stopped[-1])
         )
     )
-    assert finding.amount == pytest.approx(way, abs=1e-4)
+    assert finding.amount == pytest.approx(travel, abs=1e-4)
     assert stopped[0].following is None
-    for order in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
-        after = trace(session, stopped[-1], {0: [order]}, 20)[-1]
+    for command in (cmd.GoAlong(1.0), cmd.Follow(poured), cmd.Resume()):
+        after = trace(session, stopped[-1], {0: [command]}, 20)[-1]
         assert (after.setpoint == stopped[-1].setpoint).all()
     free = trace(session, stopped[-1], {0: [cmd.ClearStop()]}, 50)[-1]
     assert (free.setpoint == stopped[-1].setpoint).all()
@@ -290,7 +290,7 @@ def clearance(world: CollisionWorld, state: State) -> float:
     return contact.distance
 
 
-def test_it_goes_round_the_cup_where_the_straight_way_is_blocked(
+def test_plan_goes_around_the_cup_if_the_straight_path_is_blocked(
     arm: ArmModel, world: CollisionWorld, guarded: Session, round_cup: Plan
 ) -> None:
     state, plan = guarded.begin(LOW, 0.0, 0.0), round_cup
@@ -304,16 +304,16 @@ def test_it_goes_round_the_cup_where_the_straight_way_is_blocked(
     assert not any(each.blocked for each in states)
     near = min(clearance(world, each) for each in states)
     assert near >= STOP
-    # The least clearance said is found to a tenth, and holds between the ticks as well.
+    # The reported clearance is accurate to a tenth, and also holds between the ticks.
     assert 0.89 * plan.nearest.contact.distance - 1e-4 <= near
     assert near <= plan.nearest.contact.distance * 1.1 + 1e-3
     check_limits(guarded, [state, state, state, *states])
 
 
-def test_a_stop_beside_the_cup_keeps_clear_of_it(
+def test_stop_beside_the_cup_keeps_clear_of_it(
     world: CollisionWorld, guarded: Session, round_cup: Plan
 ) -> None:
-    """Braked joint by joint the arm would leave its path, and not everywhere is room for that."""
+    """A joint-by-joint brake would leave the path, and there is not room for that everywhere."""
     start = guarded.begin(LOW, 0.0, 0.0)
     states = run(guarded, start, [cmd.Follow(round_cup)])
     along = 0
@@ -344,7 +344,7 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     assert "cup" in (states[-1].findings[0].parts or ())
     assert min(clearance(world, each) for each in states) >= STOP - SLIGHTLY
     assert off_path(states, plan) <= 1e-15
-    # Back is free, and so is on when the cup is gone.
+    # The path back is clear, and so is the path onwards without the cup.
     back = run(guarded, states[-1], [cmd.GoAlong(0.0)])
     assert (back[-1].setpoint == LOW).all()
     assert back[-1].status is Status.OK
@@ -352,7 +352,7 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     assert (run(freed, states[-1], [])[-1].setpoint == BEYOND_CUP).all()
 
 
-def test_a_goal_in_the_table_is_refused(
+def test_goal_in_the_table_is_refused(
     arm: ArmModel, world: CollisionWorld, guarded: Session
 ) -> None:
     state = guarded.begin(LOW, 0.0, 0.0)
@@ -360,15 +360,13 @@ def test_a_goal_in_the_table_is_refused(
         plan_to(arm, world, state, LOW + np.radians([0.0, 23.0, 0.0, 0.0, 0.0]))
 
 
-def test_a_goal_that_is_none_is_refused(arm: ArmModel, state: State) -> None:
+def test_invalid_goal_is_refused(arm: ArmModel, state: State) -> None:
     for goal in (np.full(5, math.nan), np.zeros(4), state.setpoint, np.full(5, 9.0)):
         with pytest.raises(InputError):
             plan_to(arm, None, state, goal)
 
 
-def test_following_is_a_fold_that_can_be_replayed_to_the_bit(
-    session: Session, poured: Plan
-) -> None:
+def test_plan_replays_to_the_bit(session: Session, poured: Plan) -> None:
     commands: dict[int, list[cmd.Command]] = {
         0: [cmd.Follow(poured)],
         70: [cmd.GoAlong(0.0)],

@@ -1,4 +1,4 @@
-"""Cup in hand: fingers feel it, take it, carry it, and let it stand again."""
+"""The cup in the hand: the fingers touch it, hold it, carry it, and put it down."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from katana450.settings import Settings
 OPEN = 0.3
 PITCH = np.deg2rad(40.0)
 HEIGHT = 0.07
-"""[m] At which the cup is taken, above the table."""
+"""[m] Height above the table at which the cup is grasped."""
 
 BEFORE, AT = 0.08, 0.016
-"""[m] Of the cup's axis: where the open fingers come from, and where they close. Tilted as it is,
-the palm would be in the cup if the grasp frame came any nearer."""
+"""[m] Distances from the cup's axis at which the open fingers approach, and at which they close. If
+the grasp frame came nearer, the tilted palm would be in the cup."""
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def run(session: Session, state: State, *commands: cmd.Command, seconds: float =
             return state
         state = session.step(state, (), state.t + 0.01)
         state = session.observe(state, state.setpoint, state.gripper_setpoint)
-    raise AssertionError(f"still on its way: {state.findings}")
+    raise AssertionError(f"The arm still moves: {state.findings}")
 
 
 def cup_of(session: Session, state: State) -> tuple[SceneObject, FloatArray]:
@@ -70,9 +70,9 @@ def cup_of(session: Session, state: State) -> tuple[SceneObject, FloatArray]:
 def before_cup(
     session: Session, arm: MountedArm, state: State, back: float, beside: float = 0.0
 ) -> FloatArray:
-    """(5,) joints with the grasp frame ``back`` [m] before the cup's axis, along the tool.
+    """Return the joints (5,) with the grasp frame ``back`` [m] before the cup's axis.
 
-    beside: [m] to the left of it.
+    The distance is along the tool. beside: distance to the left of the axis [m].
     """
     chain = arm.chain_to("grasp")
     _, T = cup_of(session, state)
@@ -93,7 +93,7 @@ def before_cup(
 
 @pytest.fixture(scope="module")
 def holding(session: Session, arm: MountedArm) -> State:
-    """With the cup between the fingers, on the table."""
+    """The state with the cup between the fingers, on the table."""
     state = session.begin(session.ready, 0.0, 0.0)
     state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
     before = before_cup(session, arm, state, BEFORE)
@@ -104,9 +104,7 @@ def holding(session: Session, arm: MountedArm) -> State:
     return run(session, state, cmd.SetGripper(-0.44))
 
 
-def test_fingers_that_close_on_the_cup_hold_it_where_it_stands(
-    session: Session, holding: State
-) -> None:
+def test_closed_fingers_hold_the_cup_in_place(session: Session, holding: State) -> None:
     cup, T = cup_of(session, holding)
     assert cup.held
     assert holding.grip == holding.gripper_setpoint
@@ -125,7 +123,7 @@ def test_fingers_that_close_on_the_cup_hold_it_where_it_stands(
 
 
 def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
-    """With the tool ``by`` [m] higher, pitch and roll as they are."""
+    """Return the state with the tool ``by`` [m] higher, with the same pitch and roll."""
     chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, state.q)
     up = replace(at, position=at.position + np.array((0.0, 0.0, by)))
@@ -145,7 +143,7 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     _, T_up = cup_of(session, up)
     np.testing.assert_allclose(T_up[:3, :3], T[:3, :3], rtol=0, atol=1e-9)
     np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-9)
-    # Back down by more than there is room for: cup, not fingers, meets the table.
+    # A move down by more than the free height: the cup meets the table, not the fingers.
     chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, up.q)
     down = run(session, up, cmd.MoveTool(at.position - [0.0, 0.0, 0.2]))
@@ -154,12 +152,12 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     assert set(met.parts) == {"cup", "table"}
     assert 0.005 <= met.amount < 0.01
     cup, T = cup_of(session, down)
-    # The way down tilted it a little: what is lowest is an edge of its foot.
+    # The path down has tilted the cup a little, so an edge of its foot is lowest.
     lowest = T[2, 3] - cup.size[0] * np.sqrt(1.0 - T[2, 2] ** 2)
     assert met.amount == pytest.approx(lowest, abs=1e-5)
 
 
-def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
+def test_holding_hand_closes_no_further_and_keeps_the_cup_in_a_stop(
     session: Session, holding: State
 ) -> None:
     tight = run(session, holding, cmd.SetGripper(-0.44))
@@ -173,7 +171,7 @@ def test_a_hand_that_holds_closes_no_further_and_a_stop_drops_nothing(
     assert stopped.stopped is not None
 
 
-def test_fingers_that_open_let_the_cup_stand_on_the_table(
+def test_opened_fingers_leave_the_cup_on_the_table(
     session: Session, arm: MountedArm, holding: State
 ) -> None:
     up = lifted(session, arm, holding, 0.03)
@@ -185,7 +183,7 @@ def test_fingers_that_open_let_the_cup_stand_on_the_table(
     np.testing.assert_allclose(T[:2, 3], T_up[:2, 3], rtol=0, atol=1e-12)
     assert T[2, 3] == 0.0
     np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=1e-12)
-    # And what stands between open fingers may be left behind.
+    # The arm may move away from an object between its open fingers.
     back = before_cup(session, arm, left, BEFORE)
     away = run(session, left, cmd.SetJoints(back))
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
@@ -222,7 +220,7 @@ def scene_object(name: str = "box", **changed: Any) -> SceneObject:
     return SceneObject(**(given | changed))
 
 
-def test_a_object_put_in_the_way_is_met_at_rest_and_gone_once_taken_away(session: Session) -> None:
+def test_object_on_the_path_blocks_the_arm_until_it_is_removed(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     high = scene_object(
         size=(0.05, 0.4, 0.6), T=se3.from_rotation_translation(np.eye(3), (0.2, 0.35, 0))
@@ -236,7 +234,7 @@ def test_a_object_put_in_the_way_is_met_at_rest_and_gone_once_taken_away(session
     assert free.q[0] == pytest.approx(1.2)
 
 
-def test_objects_are_put_elsewhere_by_name_and_bounded_in_number(session: Session) -> None:
+def test_objects_are_replaced_by_name_and_limited_in_number(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     commands: list[cmd.Command] = [
         cmd.PlaceObject(scene_object(f"box {n}")) for n in range(2 * MAX_OBJECTS)
@@ -274,6 +272,6 @@ def test_held_object_cannot_be_moved_or_removed(session: Session, holding: State
         {"T": np.full((4, 4), np.nan)},
     ],
 )
-def test_a_object_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+def test_invalid_object_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError):
         scene_object(**wrong)

@@ -1,4 +1,4 @@
-"""A mechanism driven joint by joint: limits, stops and streams by the rules of an arm."""
+"""A mechanism driven joint by joint, with the limits, stops and streams of an arm."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def ticks(session: Session, state: State, seconds: float, *first: cmd.Command) -
             return
 
 
-def test_it_begins_as_near_to_zero_as_its_limits_let_it(state: State) -> None:
+def test_session_begins_at_the_posture_nearest_to_zero(state: State) -> None:
     np.testing.assert_array_equal(state.q, (0.05, 0.0, 0.0))
     assert (state.status, state.moving, state.tool) == (Status.OK, False, "")
 
@@ -70,17 +70,17 @@ joint_vectors = st.tuples(st.floats(-0.5, 0.9), st.floats(-4.0, 4.0), st.floats(
     st.lists(st.tuples(joint_vectors, st.floats(0.02, 0.6)), min_size=1, max_size=4),
     st.sampled_from([1.0, 0.3]),
 )
-def test_no_target_breaks_a_limit_and_the_last_is_reached(
-    wishes: list[tuple[tuple[float, float, float], float]], fraction: float
+def test_targets_keep_all_limits_and_the_last_is_reached(
+    targets: list[tuple[tuple[float, float, float], float]], fraction: float
 ) -> None:
     rules = Session(JOINTS, JOINTS.ready)
     state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.SpeedScale(fraction))
     limits, seen = JOINTS.limits, [state]
-    for wish, seconds in wishes:
-        seen += ticks(rules, state, seconds, cmd.SetJoints(np.array(wish)))
+    for target, seconds in targets:
+        seen += ticks(rules, state, seconds, cmd.SetJoints(np.array(target)))
         state = seen[-1]
     state = after(rules, state, 20.0)
-    goal = np.clip(wishes[-1][0], limits.lower, limits.upper)
+    goal = np.clip(targets[-1][0], limits.lower, limits.upper)
     np.testing.assert_array_equal(state.q, goal)
     for before, now in pairwise(seen):
         motion = now.motion
@@ -93,13 +93,13 @@ def test_no_target_breaks_a_limit_and_the_last_is_reached(
 
 def test_clamped_value_is_reported_in_its_unit(session: Session, state: State) -> None:
     there = after(session, state, DT, cmd.SetAxes(((0, 9.0), (1, 9.0), (2, 0.1))))
-    told = [(f.reason, f.axis, f.amount) for f in there.findings]
-    assert told == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
+    findings = [(f.reason, f.axis, f.amount) for f in there.findings]
+    assert findings == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
     assert there.status is Status.LIMITED
     assert after(session, there, 10.0, cmd.SetAxes(((0, 0.1), (1, 0.0)))).findings == ()
 
 
-def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
+def test_stop_takes_the_reported_distance_and_holds_until_cleared(
     session: Session, state: State
 ) -> None:
     moving = after(session, state, 0.8, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
@@ -121,7 +121,7 @@ def test_a_stop_brakes_as_it_said_and_holds_until_it_is_released(
     np.testing.assert_array_equal(home.q, JOINTS.ready)
 
 
-def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: Session, state: State) -> None:
+def test_pause_keeps_the_goal_and_hold_drops_it(session: Session, state: State) -> None:
     goal = np.array((0.3, 2.0, 0.1))
     moving = after(session, state, 0.8, cmd.SetJoints(goal))
     paused = after(session, moving, 3.0, cmd.Pause())
@@ -135,12 +135,12 @@ def test_a_pause_keeps_the_goal_and_a_hold_forgets_it(session: Session, state: S
     assert not np.allclose(held.q, goal)
 
 
-def test_a_stream_is_followed_and_its_end_is_a_rest(session: Session, state: State) -> None:
+def test_stream_is_followed_and_ends_at_rest(session: Session, state: State) -> None:
     q = np.array(JOINTS.ready)
     for _ in range(200):
         q = q + np.array((0.1, 0.5, 0.0)) * DT
         state = after(session, state, DT, cmd.Servo(q))
-    # A tick ahead of what it heard, as the stream will be by then.
+    # The setpoint is one tick ahead of the newest sample, where the stream will be then.
     np.testing.assert_allclose(state.q, q, rtol=0, atol=0.5 * DT * 2.1)
     over = after(session, state, 2.0)
     assert over.servo is None
@@ -164,20 +164,22 @@ def test_tool_command_without_an_arm_is_refused_with_the_reason(
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "message"),
     [
-        (cmd.SetJoint(3, 0.0), "axis 4, only 3"),
+        (cmd.SetJoint(3, 0.0), "axis 4: the robot has 3"),
         (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
-        (cmd.SetJoints(np.zeros(5)), "3 driven joints, the command 5"),
-        (cmd.Servo(np.zeros(2)), "3 driven joints, the command 2"),
+        (cmd.SetJoints(np.zeros(5)), "3 driven joints, but the command has 5"),
+        (cmd.Servo(np.zeros(2)), "3 driven joints, but the command has 2"),
     ],
 )
-def test_what_does_not_fit_is_refused(session: Session, command: cmd.Command, said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_command_for_other_joints_is_refused(
+    session: Session, command: cmd.Command, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
         session.check(command)
 
 
-def test_a_late_tick_is_no_leap_and_an_error_of_ours_holds(session: Session, state: State) -> None:
+def test_late_tick_makes_no_leap_and_internal_error_holds(session: Session, state: State) -> None:
     moving = after(session, state, 0.5, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
     late = session.step(moving, (), moving.t + 5.0)
     on_time = session.step(moving, (), moving.t + MAX_STEP_TIME)

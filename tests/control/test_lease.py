@@ -1,4 +1,4 @@
-"""The lease: every event, from everybody, in every state, does what is written or nothing."""
+"""The lease: every event by every person in every state has its defined effect, or none."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ PEOPLE = (ANNA, BERT, CARA, DORA)
 Event = Callable[[Lease, Person, Person, float], Lease]
 
 EVENTS: dict[str, Event] = {
-    "acquire": lambda lease, who, _, t: lease.acquire(who, t),
-    "take": lambda lease, who, _, t: lease.take(who, t),
-    "request": lambda lease, who, _, __: lease.request(who),
-    "withdraw": lambda lease, who, _, __: lease.withdraw(who),
-    "hand over": lambda lease, who, to, t: lease.hand_over(who, to, t),
-    "release": lambda lease, who, _, __: lease.release(who),
-    "hear": lambda lease, who, _, t: lease.hear(who, t),
-    "leave": lambda lease, who, _, __: lease.leave(who),
+    "acquire": lambda lease, person, _, t: lease.acquire(person, t),
+    "take": lambda lease, person, _, t: lease.take(person, t),
+    "request": lambda lease, person, _, __: lease.request(person),
+    "withdraw": lambda lease, person, _, __: lease.withdraw(person),
+    "hand over": lambda lease, person, to, t: lease.hand_over(person, to, t),
+    "release": lambda lease, person, _, __: lease.release(person),
+    "hear": lambda lease, person, _, t: lease.hear(person, t),
+    "leave": lambda lease, person, _, __: lease.leave(person),
     "expire": lambda lease, _, __, t: lease.expire(t),
 }
 
 
-def legal(event: str, lease: Lease, who: Person, to: Person) -> bool:
-    """What is written in the lease's own words, once more."""
-    free, mine = lease.holder is None, lease.holder == who
-    drives = who.role is not Role.VIEWER
+def legal(event: str, lease: Lease, person: Person, to: Person) -> bool:
+    """Return whether the rules of the lease allow the event, written independently of the code."""
+    free, mine = lease.holder is None, lease.holder == person
+    drives = person.role is not Role.VIEWER
     match event:
         case "acquire":
             return free and drives
         case "take":
-            return drives and not mine and (free or who.role is Role.ADMIN)
+            return drives and not mine and (free or person.role is Role.ADMIN)
         case "request":
-            return drives and not free and not mine and who not in lease.waiting
+            return drives and not free and not mine and person not in lease.waiting
         case "withdraw":
-            return who in lease.waiting
+            return person in lease.waiting
         case "hand over":
-            return mine and to != who and to.role is not Role.VIEWER
+            return mine and to != person and to.role is not Role.VIEWER
         case "release" | "hear":
             return mine
     return True
 
 
 def leases() -> list[Lease]:
-    """Every holder with every queue of the others."""
+    """Return leases with every holder and every queue of the others."""
     found = []
     for holder in (None, ANNA, BERT, CARA):
         others = [each for each in (ANNA, BERT, CARA) if each != holder]
@@ -67,17 +67,17 @@ def leases() -> list[Lease]:
 
 @pytest.mark.parametrize("event", EVENTS)
 def test_checks_raise_exactly_for_forbidden_actions(event: str) -> None:
-    tried = 0
-    for lease, who, to in itertools.product(leases(), PEOPLE, PEOPLE):
+    count = 0
+    for lease, person, to in itertools.product(leases(), PEOPLE, PEOPLE):
         before = replace(lease)
-        if legal(event, lease, who, to):
-            EVENTS[event](lease, who, to, 11.0)
+        if legal(event, lease, person, to):
+            EVENTS[event](lease, person, to, 11.0)
         else:
             with pytest.raises(LeaseError):
-                EVENTS[event](lease, who, to, 11.0)
+                EVENTS[event](lease, person, to, 11.0)
         assert lease == before
-        tried += 1
-    assert tried == len(leases()) * 16
+        count += 1
+    assert count == len(leases()) * 16
 
 
 @given(
@@ -95,26 +95,26 @@ def test_lease_has_at_most_one_holder_who_never_waits_for_it(
     story: list[tuple[str, Person, Person, float]],
 ) -> None:
     lease, t = Lease(), 0.0
-    for event, who, to, dt in story:
+    for event, person, to, dt in story:
         t += dt
         before = lease
         try:
-            lease = EVENTS[event](lease, who, to, t)
+            lease = EVENTS[event](lease, person, to, t)
         except LeaseError:
-            assert not legal(event, before, who, to)
+            assert not legal(event, before, person, to)
             continue
         assert lease.holder is None or lease.holder.role is not Role.VIEWER
         assert lease.holder not in lease.waiting
         assert len(set(lease.waiting)) == len(lease.waiting)
         assert DORA not in lease.waiting
         if lease.holder != before.holder and before.holder is not None:
-            # Nobody loses the arm but by these.
+            # Only these events take the arm from its holder.
             assert event in {"take", "hand over", "release", "expire"}
         if event == "hear":
             assert lease == replace(before, heard=t)
 
 
-def test_free_lease_is_granted_and_a_held_one_is_not() -> None:
+def test_only_a_free_lease_is_granted() -> None:
     lease = Lease().acquire(ANNA, 1.0)
     assert lease.holder == ANNA
     with pytest.raises(LeaseError, match="Anna holds the arm"):
@@ -143,7 +143,7 @@ def test_lease_goes_to_the_first_in_the_queue() -> None:
     assert lease.acquire(CARA, 3.0).waiting == ()
 
 
-def test_silence_ends_it_and_a_sign_of_life_keeps_it() -> None:
+def test_silence_ends_the_lease_and_a_heartbeat_keeps_it() -> None:
     lease = Lease().acquire(ANNA, 1.0)
     assert lease.silence(1.25) == 0.25
     assert lease.expire(1.0 + LEASE_TIMEOUT - 1e-9) is lease
@@ -151,11 +151,11 @@ def test_silence_ends_it_and_a_sign_of_life_keeps_it() -> None:
     heard = lease.hear(ANNA, 2.0)
     assert heard.expire(1.0 + LEASE_TIMEOUT).holder == ANNA
     assert heard.expire(2.0 + LEASE_TIMEOUT).holder is None
-    # Nobody is silent where nobody holds it.
+    # A free lease has no silence.
     assert Lease().silence(1e9) == 0.0
 
 
-def test_a_clock_that_stands_or_goes_back_takes_no_life_away() -> None:
+def test_clock_that_stands_or_runs_back_does_not_shorten_the_lease() -> None:
     lease = Lease().acquire(ANNA, 5.0)
     assert lease.hear(ANNA, 4.0).heard == 5.0
     assert lease.silence(4.0) == 0.0

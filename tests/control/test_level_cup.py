@@ -1,4 +1,4 @@
-"""A level cup typed with yaw 0 in the live session, from any posture the arm may stand in."""
+"""A level cup typed with yaw 0 in the live session, from any posture that the arm may have."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from katana450.maths.kinematics.projection import project
 COUNT = 300
 
 LEVEL = 1e-6
-"""[rad]"""
+"""[rad] Tolerance of a level cup."""
 
 
 def typed(session: Session, q: FloatArray, T: FloatArray) -> State:
-    """The state just after the pose ``T`` (4, 4) is typed with the arm at ``q`` (5,) [rad]."""
+    """Return the state just after ``T`` (4, 4) is typed with the arm at ``q`` (5,) [rad]."""
     state = session.begin(q, 0.0, 0.0)
     return session.step(state, (cmd.SetPriority(Priority.PITCH), cmd.SetPose(T)), 0.01)
 
 
 def tilt(session: Session, q: FloatArray) -> float:
-    """Angle [rad] between the tool's z axis and the vertical at ``q`` (5,) [rad]."""
+    """Return the angle [rad] between the tool's z axis and the vertical at ``q`` (5,) [rad]."""
     T = forward(session.require_arm().chain, q)
     return math.atan2(math.hypot(T[0, 2], T[1, 2]), T[2, 2])
 
@@ -53,7 +53,7 @@ def test_typed_level_cup_stays_level_from_any_posture(session: Session) -> None:
             assert (Reason.POSITION_CHANGED in reasons) == (away > 5e-5)
             gave_way += away > 5e-5
         else:
-            # Bent over backwards the cup is level with a roll of 180 deg, which axis 5 has not.
+            # Bent over backwards, a level cup needs a roll of 180 deg, which axis 5 lacks.
             limit = math.pi - float(chain.upper[4])
             assert tilt(session, state.goal) <= limit + LEVEL
             assert abs(reasons[Reason.ROLL_CHANGED].amount - limit) < LEVEL
@@ -62,7 +62,7 @@ def test_typed_level_cup_stays_level_from_any_posture(session: Session) -> None:
     assert behind > 20
 
 
-def test_kept_pitch_is_still_kept_when_the_arm_arrives(session: Session) -> None:
+def test_pitch_kept_in_the_goal_is_kept_on_arrival(session: Session) -> None:
     azimuth = math.radians(-160.0)
     place = np.array((0.3 * math.cos(azimuth), 0.3 * math.sin(azimuth), 0.25))
     T = se3.from_rotation_translation(np.eye(3), place)

@@ -1,4 +1,4 @@
-"""How near the arm is to what it cannot pass, counted out one by one."""
+"""Margins of the arm to its boundaries, compared with a separate count of each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def session(robot: Robot, arm: MountedArm) -> Session:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_each_margin_is_the_least_there_is(session: Session, seed: int) -> None:
+def test_each_margin_is_the_minimum(session: Session, seed: int) -> None:
     rng = np.random.default_rng(seed)
     chain = session.require_arm().chain
     q = rng.uniform(chain.lower, chain.upper)
@@ -42,7 +42,7 @@ def test_each_margin_is_the_least_there_is(session: Session, seed: int) -> None:
     rooms = [min(a - low, up - a) for a, low, up in zip(q, chain.lower, chain.upper, strict=True)]
     assert found.limit == min(rooms) == rooms[found.axis]
 
-    # Its square is the least eigenvalue of J^T J, lengths counted in the arm's own.
+    # Its square is the least eigenvalue of J^T J, in units of the characteristic length.
     J = jacobian_body(chain, q)
     scaled = np.vstack((J[:3], J[3:] / characteristic_length(chain)))
     least = float(np.linalg.eigvalsh(scaled.T @ scaled)[0])
@@ -55,7 +55,7 @@ def test_each_margin_is_the_least_there_is(session: Session, seed: int) -> None:
     assert gaps[found.nearest.parts] == pytest.approx(found.nearest.distance, abs=1e-9)
 
 
-def test_beyond_a_limit_the_margin_is_negative(session: Session) -> None:
+def test_margin_is_negative_beyond_a_limit(session: Session) -> None:
     chain = session.require_arm().chain
     q = np.array(session.ready)
     q[3] = chain.upper[3] + 0.01

@@ -1,4 +1,4 @@
-"""Jog, stream and drag replace each other: the later one counts, and nothing of the other stays."""
+"""Jog, stream and drag replace each other, and nothing of the earlier mode remains."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ TICK = 0.01
 JOG = cmd.Jog(np.array([0.0, 0.08, 0.0, 0.0, 0.0]))
 
 FAR_DRAG = cmd.MoveTool(np.array([-0.2, 0.35, 0.1]))
-"""Farther than one tick has time for."""
+"""A target farther than one tick can track."""
 
 
 def run(session: Session, state: State, command: cmd.Command | None, ticks: int = 1) -> State:
-    """``ticks`` ticks with ``command`` in each of them."""
+    """Run ``ticks`` ticks with ``command`` in each of them."""
     for _ in range(ticks):
         commands = [] if command is None else [command]
         state = session.step(state, commands, state.t + TICK)
@@ -34,7 +34,7 @@ def run(session: Session, state: State, command: cmd.Command | None, ticks: int 
 
 
 def streamed(session: Session, state: State, ticks: int) -> State:
-    """A stream that turns axis 1."""
+    """Return the state after a stream that turns axis 1."""
     q = np.array(state.goal)
     for _ in range(ticks):
         q[0] += 0.2 * TICK
@@ -46,7 +46,7 @@ def point(session: Session, q: FloatArray) -> FloatArray:
     return forward(session.require_arm().chain, q)[:3, 3]
 
 
-def test_a_jog_held_after_a_stream_keeps_going(session: Session, state: State) -> None:
+def test_jog_after_a_stream_continues(session: Session, state: State) -> None:
     state = streamed(session, state, 40)
     jogged = run(session, state, JOG, 2)
     for _ in range(60):
@@ -57,16 +57,14 @@ def test_a_jog_held_after_a_stream_keeps_going(session: Session, state: State) -
     assert moved[1] > 0.04
 
 
-def test_a_drag_during_a_jog_is_followed_and_leaves_nothing_behind(
-    session: Session, state: State
-) -> None:
+def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
     state = run(session, state, JOG, 30)
     dragged = run(session, state, FAR_DRAG)
     assert dragged.jogging is None
     dragged = run(session, dragged, None, 300)
-    wanted = FAR_DRAG.position
-    np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
-    # The next drag takes its goal along its own line.
+    desired = FAR_DRAG.position
+    np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
+    # The next drag moves the goal along its own line.
     settled = run(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
     for fraction in np.linspace(0.05, 1.0, 20):
@@ -75,11 +73,11 @@ def test_a_drag_during_a_jog_is_followed_and_leaves_nothing_behind(
         assert np.linalg.norm(np.cross(off, way)) / np.linalg.norm(way) < 1e-6
 
 
-def test_a_drag_during_a_stream_is_followed(session: Session, state: State) -> None:
+def test_drag_replaces_a_stream(session: Session, state: State) -> None:
     state = streamed(session, state, 40)
-    wanted = np.add(point(session, state.goal), (0.0, 0.0, 0.05))
-    dragged = run(session, run(session, state, cmd.MoveTool(wanted)), None, 200)
-    np.testing.assert_allclose(point(session, dragged.setpoint), wanted, rtol=0, atol=1e-9)
+    desired = np.add(point(session, state.goal), (0.0, 0.0, 0.05))
+    dragged = run(session, run(session, state, cmd.MoveTool(desired)), None, 200)
+    np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
 
 
 BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
@@ -90,7 +88,7 @@ BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
 
 
 @pytest.mark.parametrize(("first", "second"), list(itertools.permutations(BEGINNINGS, 2)))
-def test_the_later_mode_replaces_the_earlier_one(
+def test_later_mode_replaces_the_earlier_one(
     session: Session, state: State, first: type, second: type
 ) -> None:
     begun = BEGINNINGS[first](session, state)
@@ -98,7 +96,7 @@ def test_the_later_mode_replaces_the_earlier_one(
     assert isinstance(BEGINNINGS[second](session, begun).mode, second)
 
 
-def test_every_mode_of_a_random_order_comes_to_an_end(session: Session, state: State) -> None:
+def test_modes_in_random_order_all_end(session: Session, state: State) -> None:
     rng = np.random.default_rng(13)
     kinds: list[Callable[[State], cmd.Command]] = [
         lambda _: JOG,
@@ -119,7 +117,7 @@ def test_every_mode_of_a_random_order_comes_to_an_end(session: Session, state: S
         state = run(session, state, command, int(rng.integers(1, 4)))
         if state.stopped is not None:
             assert isinstance(state.mode, Idle)
-    # Left alone, every mode but a pause comes to an end.
+    # Without further commands every mode but a pause ends.
     state = run(session, run(session, state, cmd.ClearStop()), cmd.Resume())
     assert not math.isnan(state.setpoint.sum())
     over = run(session, state, None, 600)

@@ -1,4 +1,4 @@
-"""Stop, pause, speed and jog: what a hand on the arm must be able to trust."""
+"""Stop, pause, speed and jog of the arm, on which a person has to rely."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def point(chain: Chain, q: FloatArray) -> FloatArray:
     return forward(chain, q)[:3, 3]
 
 
-def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
+def test_stop_brings_the_arm_to_rest_and_reports_its_distance(
     session: Session, state: State
 ) -> None:
     chain = session.require_arm().chain
@@ -59,7 +59,7 @@ def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
     assert finding.reason is Reason.STOPPED
     ticks = 1
     while stopped.moving:
-        # Braking from the first tick on.
+        # The arm brakes from the first tick on.
         before, stopped = stopped, run(session, stopped, [])
         assert speed(chain, stopped.motion) <= speed(chain, before.motion) + 0.05
         ticks += 1
@@ -70,7 +70,7 @@ def test_a_stop_brings_the_arm_to_rest_and_says_how_far_it_took(
     assert stopped.findings == (finding,)
 
 
-ORDERS: list[cmd.Command] = [
+COMMANDS: list[cmd.Command] = [
     cmd.SetJoint(0, 1.0),
     cmd.SetJoints(FAR),
     cmd.MoveTool(np.array([0.3, 0.2, 0.1])),
@@ -93,9 +93,9 @@ def test_stopped_arm_moves_only_after_clear_stop_and_a_new_command(
     moving = run(session, state, [cmd.SetJoints(FAR), cmd.SetGripper(0.3)], 30)
     stopped = run(session, moving, [cmd.Stop()], 200)
     grip = moving.gripper_setpoint
-    for order in ORDERS:
-        after = run(session, stopped, [order], 50)
-        assert (after.setpoint == stopped.setpoint).all(), order
+    for command in COMMANDS:
+        after = run(session, stopped, [command], 50)
+        assert (after.setpoint == stopped.setpoint).all(), command
         assert after.gripper_setpoint == stopped.gripper_setpoint == grip
         assert after.status is Status.STOPPED
     released = run(session, stopped, [cmd.ClearStop()], 100)
@@ -106,7 +106,7 @@ def test_stopped_arm_moves_only_after_clear_stop_and_a_new_command(
     assert run(session, released, [cmd.SetJoint(0, 1.0)], 5).moving
 
 
-def test_a_stop_in_the_same_tick_beats_what_came_with_it(session: Session, state: State) -> None:
+def test_stop_overrides_motion_in_the_same_tick(session: Session, state: State) -> None:
     batches: list[list[cmd.Command]] = [
         [cmd.Stop(), cmd.SetJoints(FAR)],
         [cmd.SetJoints(FAR), cmd.Stop()],
@@ -117,7 +117,7 @@ def test_a_stop_in_the_same_tick_beats_what_came_with_it(session: Session, state
         assert after.status is Status.STOPPED
 
 
-def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
+def test_second_stop_changes_nothing(session: Session, state: State) -> None:
     moving = run(session, state, [cmd.SetJoints(FAR)], 60)
     once = run(session, moving, [cmd.Stop()], 20)
     twice = run(session, once, [cmd.Stop()])
@@ -125,7 +125,7 @@ def test_a_second_stop_changes_nothing(session: Session, state: State) -> None:
     assert twice.stopped == once.stopped
 
 
-def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: State) -> None:
+def test_pause_stays_on_the_path_and_resume_continues(session: Session, state: State) -> None:
     start = state.setpoint
     moving = run(session, state, [cmd.SetJoints(FAR)], 60)
     paused = run(session, moving, [cmd.Pause()], 150)
@@ -139,14 +139,14 @@ def test_a_pause_keeps_to_the_path_and_resume_goes_on(session: Session, state: S
     again = run(session, paused, [cmd.Resume()], 400)
     assert (again.setpoint == FAR).all()
     assert again.findings == ()
-    # What is asked meanwhile is gone for when it goes on.
-    told = run(session, paused, [cmd.Home()], 50)
-    assert (told.setpoint == paused.setpoint).all()
-    assert {f.reason for f in told.findings} == {Reason.PAUSED}
-    assert (run(session, told, [cmd.Resume()], 400).setpoint == session.ready).all()
+    # A command during the pause takes effect on Resume.
+    redirected = run(session, paused, [cmd.Home()], 50)
+    assert (redirected.setpoint == paused.setpoint).all()
+    assert {f.reason for f in redirected.findings} == {Reason.PAUSED}
+    assert (run(session, redirected, [cmd.Resume()], 400).setpoint == session.ready).all()
 
 
-def test_the_speed_scale_counts_at_once_and_for_every_joint(session: Session, state: State) -> None:
+def test_speed_scale_applies_at_once_to_every_joint(session: Session, state: State) -> None:
     moving = run(session, state, [cmd.SetJoints(FAR)], 70)
     slow = run(session, moving, [cmd.SpeedScale(0.1)], 120)
     limits = session.require_arm().limits
@@ -157,12 +157,12 @@ def test_the_speed_scale_counts_at_once_and_for_every_joint(session: Session, st
 
 
 @pytest.mark.parametrize("fraction", [0.0, -0.1, 1.1, math.nan, math.inf, True, "1"])
-def test_a_speed_that_is_none_is_refused(fraction: float) -> None:
+def test_invalid_speed_is_refused(fraction: float) -> None:
     with pytest.raises(InputError, match="speed"):
         cmd.SpeedScale(fraction)
 
 
-def test_the_tool_is_never_faster_than_it_may_be(session: Session, state: State) -> None:
+def test_tool_keeps_its_maximum_speed(session: Session, state: State) -> None:
     rng = np.random.default_rng(7)
     chain, fastest = session.require_arm().chain, 0.0
     for number in range(40):
@@ -188,7 +188,7 @@ JOGS: dict[str, tuple[list[float], JogFrame]] = {
 
 
 @pytest.mark.parametrize("name", JOGS)
-def test_a_jog_goes_where_it_is_held_to(session: Session, name: str) -> None:
+def test_jog_moves_in_its_direction(session: Session, name: str) -> None:
     rates, frame = JOGS[name]
     chain = session.require_arm().chain
     state = session.begin(np.array([0.4, -1.2, 1.6, 0.3, 0.2]), 0.0, 0.0)
@@ -199,10 +199,10 @@ def test_a_jog_goes_where_it_is_held_to(session: Session, name: str) -> None:
     after = pitch_and_roll(chain, state.setpoint)
     moved = point(chain, state.setpoint) - start
     v = np.array(rates[:3])
-    wanted = v if frame is JogFrame.BASE else R @ v
-    if wanted.any():
-        assert moved @ wanted / np.linalg.norm(wanted) > 0.02
-        assert np.linalg.norm(np.cross(moved, wanted)) < 0.1 * np.linalg.norm(moved) * 0.1
+    desired = v if frame is JogFrame.BASE else R @ v
+    if desired.any():
+        assert moved @ desired / np.linalg.norm(desired) > 0.02
+        assert np.linalg.norm(np.cross(moved, desired)) < 0.1 * np.linalg.norm(moved) * 0.1
         assert np.allclose(before, after, atol=0.02)
     else:
         turned = np.subtract(after, before)
@@ -219,7 +219,7 @@ def test_jog_without_renewal_ends(session: Session, state: State) -> None:
     while held.t < until:
         held = run(session, held, [])
     assert speed(session.require_arm().chain, held.motion) > 0.05
-    # From then on it brakes, about as fast as it can.
+    # Then it brakes approximately as fast as it can.
     fastest = Limiter(session.require_arm().limits).stopping_time(held.motion)
     while held.moving:
         held = run(session, held, [])
@@ -229,8 +229,8 @@ def test_jog_without_renewal_ends(session: Session, state: State) -> None:
     assert held.findings == ()
 
 
-def test_after_any_jog_the_arm_comes_to_rest_where_it_says(session: Session, state: State) -> None:
-    """Jogs of all directions, one after the other, until joints come up to their limits."""
+def test_arm_comes_to_rest_at_its_goal_after_a_jog(session: Session, state: State) -> None:
+    """Jogs in all directions follow each other until joints reach their limits."""
     random = np.random.default_rng(5)
     near = 0
     for _ in range(60):
@@ -245,15 +245,15 @@ def test_after_any_jog_the_arm_comes_to_rest_where_it_says(session: Session, sta
     assert near > 5
 
 
-def test_a_jog_stops_before_a_limit(session: Session, state: State) -> None:
+def test_jog_stops_before_a_limit(session: Session, state: State) -> None:
     chain = session.require_arm().chain
     for _ in range(500):
         state = run(session, state, [cmd.Jog(np.array([0.0, 0.3, 0.0, 0.0, 0.0]))])
         assert chain.within_limits(state.setpoint, slack=0.0)
 
 
-def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None:
-    """From the stretched arm axis 2 soon is at its limit, and the wrist has to make up for it."""
+def test_jog_beside_a_limit_never_reverses(session: Session) -> None:
+    """From the stretched arm axis 2 soon reaches its limit, and the wrist has to compensate."""
     chain = session.require_arm().chain
     state = session.begin(np.zeros(5), 0.0, 0.0)
     height = point(chain, state.setpoint)[2]
@@ -266,7 +266,7 @@ def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None
 
 
 @pytest.mark.parametrize(
-    ("q", "rates", "told"),
+    ("q", "rates", "expected"),
     [
         ([0.0] * 5, [-0.2, 0.0, 0.0, 0.0, 0.0], (Reason.SINGULAR, None)),
         ([0.0] * 5, [0.0, 0.2, 0.0, 0.0, 0.0], None),
@@ -275,19 +275,19 @@ def test_a_jog_beside_a_limit_never_goes_the_other_way(session: Session) -> None
     ],
 )
 def test_blocked_jog_reports_its_cause(
-    session: Session, q: list[float], rates: list[float], told: tuple[Reason, int | None] | None
+    session: Session, q: list[float], rates: list[float], expected: tuple[Reason, int | None] | None
 ) -> None:
     state = session.begin(session.require_arm().chain.clamp(np.array(q)), 0.0, 0.0)
     for _ in range(30):
         state = run(session, state, [cmd.Jog(np.array(rates))])
-    assert [(f.reason, f.axis) for f in state.findings] == ([] if told is None else [told])
+    assert [(f.reason, f.axis) for f in state.findings] == ([] if expected is None else [expected])
     assert state.moving
-    # Who lets go misses nothing any more.
+    # The end of the jog clears the finding.
     assert run(session, state, [], 200).findings == ()
 
 
 @pytest.mark.parametrize("rates", [[0.1] * 4, [math.nan] * 5, "fast", [[0.1] * 5]])
-def test_a_jog_that_is_none_is_refused(rates: object) -> None:
+def test_invalid_jog_is_refused(rates: object) -> None:
     with pytest.raises(InputError, match="jog"):
         cmd.Jog(rates)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="JogFrame"):

@@ -1,4 +1,4 @@
-"""Water in the cup that the arm holds: it stays level, is carried, poured, and kept count of."""
+"""Water in a cup that the arm holds: it is carried and poured, and its volume is conserved."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def full(session: Session) -> State:
 
 
 def held_level(session: Session, state: State) -> State:
-    """With the cup in the hand, upright where the grasp frame is."""
+    """Return ``full`` with the cup in the hand, upright at the grasp frame."""
     x = np.append(state.setpoint, state.gripper_setpoint)
     palm = session.environment.pose(replace(state.objects[0], T=np.eye(4), held=True), x)
     (cup,) = (each for each in state.objects if each.name == "cup")
@@ -66,13 +66,13 @@ def held_level(session: Session, state: State) -> State:
     return tick(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0 * ML))
 
 
-def test_water_at_rest_is_no_news(session: Session, full: State) -> None:
+def test_water_at_rest_keeps_its_value(session: Session, full: State) -> None:
     assert full.poured is not None
     assert full.poured.water.cup == FULL
     assert tick(session, full, times=3).poured is full.poured
 
 
-def test_a_cup_put_elsewhere_takes_its_water_along(session: Session, full: State) -> None:
+def test_moved_cup_keeps_its_water(session: Session, full: State) -> None:
     (cup,) = (each for each in full.objects if each.name == "cup")
     T: FloatArray = se3.from_rotation_translation(np.eye(3), (0.3, 0.1, 0.0))
     moved = tick(session, full, cmd.PlaceObject(replace(cup, T=T)), times=50)
@@ -82,7 +82,7 @@ def test_a_cup_put_elsewhere_takes_its_water_along(session: Session, full: State
     assert moved.poured.still
 
 
-def test_a_cup_turned_over_in_the_hand_loses_all_of_it_and_none_is_lost(
+def test_overturned_cup_loses_all_its_water_and_volume_is_conserved(
     session: Session, full: State
 ) -> None:
     state = held_level(session, full)
@@ -94,7 +94,9 @@ def test_a_cup_turned_over_in_the_hand_loses_all_of_it_and_none_is_lost(
     assert water.spilled + water.basin > 197 * 10**12
 
 
-def test_a_stop_in_mid_pour_leaves_what_the_tilt_holds(session: Session, full: State) -> None:
+def test_stop_during_a_pour_leaves_the_water_that_the_tilt_holds(
+    session: Session, full: State
+) -> None:
     state = held_level(session, full)
     state = tick(session, state, cmd.SpeedScale(0.2), cmd.SetJoint(4, 2.6))
     while state.poured is not None and state.poured.water.cup > 0.8 * FULL:
@@ -111,7 +113,7 @@ def test_a_stop_in_mid_pour_leaves_what_the_tilt_holds(session: Session, full: S
     assert later.poured.water.cup == state.poured.water.cup
 
 
-def test_more_than_the_cup_holds_is_refused(session: Session) -> None:
+def test_volume_above_the_capacity_is_refused(session: Session) -> None:
     for volume in (300.0 * ML, -1.0):
         with pytest.raises(InputError, match="cannot hold"):
             session.check(cmd.Fill(volume))
@@ -119,7 +121,7 @@ def test_more_than_the_cup_holds_is_refused(session: Session) -> None:
         cmd.Fill(np.nan)
 
 
-def test_without_a_cup_there_is_nothing_to_fill(session: Session, full: State) -> None:
+def test_fill_without_a_cup_is_refused(session: Session, full: State) -> None:
     gone = tick(session, full, cmd.Remove("cup"), times=2)
     assert gone.poured is None
     assert tick(session, gone, cmd.Fill(100.0 * ML)).poured is None

@@ -1,4 +1,4 @@
-"""Objects of any shape: met by the arm, fixed to its hand, exchanged all at once."""
+"""Objects of any shape: blocked by contact, fixed to the hand, and replaced together."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SLIGHTLY = 2e-5  # m
 
 
 def solid_of(mesh: trimesh.Trimesh, key: str = "a1") -> Solid:
-    """As the reader of files makes it: on z = 0, about its middle."""
+    """Return the solid as the reader of files makes it: on z = 0, about its middle."""
     (low, high), found = mesh.bounds, convex_body(mesh.vertices)
     at = np.array((*(0.5 * (low + high)[:2]), low[2]))
     return Solid(key, tuple(high - low), found.corners - at)
@@ -68,7 +68,7 @@ def run(
         states.append(state)
         if not state.moving:
             return states
-    raise AssertionError("the arm never came to rest")
+    raise AssertionError("The arm never came to rest.")
 
 
 def x_of(state: State) -> FloatArray:
@@ -76,7 +76,7 @@ def x_of(state: State) -> FloatArray:
 
 
 def outlines(session: Session, state: State) -> list[tuple[int, FloatArray, FloatArray]]:
-    """The hulls of the links: the piece each moves with, and its planes there, (m, 3) and (m,)."""
+    """Return the hulls of the links: index of the moving body, planes (m, 3) and offsets (m,)."""
     world = session.world_at(replace(state, objects=()))
     assert world is not None
     found = []
@@ -90,8 +90,8 @@ def outlines(session: Session, state: State) -> list[tuple[int, FloatArray, Floa
     return found
 
 
-def test_driven_at_full_speed_into_a_mesh_the_arm_stops_before(session: Session) -> None:
-    """Judged by places all over the triangles, not by what counts for them."""
+def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
+    """The clearance is measured on points of all triangles, not on the collision shape."""
     upright = KNOT.copy()
     upright.apply_transform(se3.from_rotation_translation(so3.rotation_x(np.pi / 2), np.zeros(3)))
     scene_object = SceneObject(
@@ -136,7 +136,7 @@ def test_attached_object_moves_with_the_hand(session: Session) -> None:
     turned = session.environment.pose(fixed, x_of(moved))
     azimuth = [np.arctan2(T[1, 3], T[0, 3]) for T in (before, turned)]
     assert azimuth[1] - azimuth[0] == pytest.approx(0.4, abs=1e-9)
-    # It is a part of the arm: met by the table, not by the hand.
+    # It is a part of the arm: it can touch the table, but not the hand.
     world = session.world_at(moved)
     assert world is not None
     assert np.isfinite(world.gap(x_of(moved), "knot", "table"))
@@ -167,7 +167,7 @@ def test_detached_object_stays_in_place_or_is_put_on_the_table(
         np.testing.assert_allclose(left.T[:3, 2], (0.0, 0.0, 1.0), atol=1e-12)
 
 
-def test_a_scene_takes_the_place_of_another_at_one_go(session: Session) -> None:
+def test_scene_is_replaced_in_one_step(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     cup = next(scene_object for scene_object in state.objects if scene_object.name == "cup")
     state = session.step(state, [cmd.ReplaceScene((cup, knot(standing(0.4, 0.3))), 1e-4)], TICK)
@@ -182,7 +182,7 @@ def test_a_scene_takes_the_place_of_another_at_one_go(session: Session) -> None:
     assert kept.poured is None
 
 
-def test_how_a_object_looks_is_a_part_of_it(session: Session) -> None:
+def test_appearance_is_part_of_the_object(session: Session) -> None:
     plain = knot(standing(0.4, 0.3))
     for other in (
         replace(plain, appearance=ObjectAppearance((1, 2, 3))),
@@ -199,8 +199,8 @@ def test_how_a_object_looks_is_a_part_of_it(session: Session) -> None:
     assert "knot" in {part.name for part in world.parts}
 
 
-def test_another_mesh_of_the_same_size_is_another_world(session: Session) -> None:
-    """Else a plan made beside the one would be taken to be clear of the other."""
+def test_mesh_of_the_same_size_changes_the_world(session: Session) -> None:
+    """Otherwise a plan made beside one mesh would count as clear of the other."""
     ball = trimesh.creation.icosphere(2, radius=0.05)
     box = trimesh.creation.box(ball.extents)
     fingerprints = []
@@ -213,7 +213,7 @@ def test_another_mesh_of_the_same_size_is_another_world(session: Session) -> Non
     assert fingerprints[1].differs_by(fingerprints[2]) == 0.0
 
 
-def test_what_cannot_be_is_refused(session: Session) -> None:
+def test_invalid_objects_are_refused(session: Session) -> None:
     T, solid = standing(0.4, 0.3), SOLID
     for wrong in (
         lambda: SceneObject("it", Shape.MESH, (), T),
@@ -243,16 +243,16 @@ def test_what_cannot_be_is_refused(session: Session) -> None:
         with pytest.raises(InputError):
             session.check(command)
     blind = Session(session.require_arm(), session.ready)
-    for asked in (
+    for unsupported in (
         cmd.Attach("it", Attachment.HAND),
         cmd.PlaceObject(knot(T, fixed=True)),
         cmd.ReplaceScene((knot(T, fixed=True),)),
     ):
-        with pytest.raises(InputError, match="not looked at"):
-            blind.check(asked)
+        with pytest.raises(InputError, match="no collision checking"):
+            blind.check(unsupported)
 
 
-def test_new_objects_stand_in_reach_and_beside_each_other() -> None:
+def test_new_objects_are_placed_in_reach_and_apart() -> None:
     objects: list[SceneObject] = []
     for number in range(12):
         new = knot(np.eye(4), f"{number}", scale=0.6)
@@ -262,7 +262,7 @@ def test_new_objects_stand_in_reach_and_beside_each_other() -> None:
     apart = np.linalg.norm(places[:, None] - places, axis=2) + np.eye(12)
     assert apart.min() >= 2.0 * girth(objects[0])
     assert np.linalg.norm(places, axis=1).max() <= 0.6
-    # What the hand carries takes no place, and neither does the object itself.
+    # A carried object and the object itself take no place.
     carried = [replace(objects[0], fixed=True), *objects[1:]]
     np.testing.assert_array_equal(
         free_place(knot(np.eye(4), "new", scale=0.6), carried)[:2, 3], places[0]

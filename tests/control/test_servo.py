@@ -1,4 +1,4 @@
-"""A stream of joint angles is kept up with, under every limit."""
+"""A stream of joint angles is followed under every limit."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Stream = Callable[[float], FloatArray]
 def streamed(
     session: Session, stream: Stream, seconds: float, every: int = 2
 ) -> tuple[list[float], list[State]]:
-    """Ticks, with one of the stream in each ``every``-th."""
+    """Return times and states of ticks, with a sample of the stream in each ``every``-th tick."""
     states, times = [session.begin(session.ready, 0.0, 0.0)], [0.0]
     for tick in range(1, int(seconds / DT)):
         t = tick * DT
@@ -36,7 +36,7 @@ def streamed(
 
 
 def wave(session: Session, size: float = 0.2, period: float = 6.0) -> Stream:
-    """To and fro about the ready posture, from rest."""
+    """Return a stream to and fro about the ready posture, from rest."""
 
     def at(t: float) -> FloatArray:
         return session.ready + size * math.sin(math.tau * t / period) ** 2 * np.array(
@@ -47,7 +47,7 @@ def wave(session: Session, size: float = 0.2, period: float = 6.0) -> Stream:
 
 
 def on_axis_1(session: Session, signal: Callable[[float], float]) -> Stream:
-    """Axis 1 follows ``signal``, the others stay."""
+    """Return a stream in which axis 1 follows ``signal``, and the others stay."""
     return lambda t: session.ready + np.array((signal(t), 0.0, 0.0, 0.0, 0.0))
 
 
@@ -59,9 +59,9 @@ def arriving(
     jitter: float = 0.0,
     rates: bool = False,
 ) -> list[State]:
-    """The ticks that take samples of ``signal`` which arrive late by ``jitter`` [s] on average.
+    """Return the states of ticks with samples that arrive late by ``jitter`` [s] on average.
 
-    Each is stamped with its arrival, as on a server; limits are checked in every tick.
+    Each sample is stamped with its arrival, as on a server. Limits are checked in every tick.
     """
     rng, limits = np.random.default_rng(3), session.require_arm().limits
     sent = np.arange(0.0, seconds, 1.0 / hz)
@@ -87,7 +87,7 @@ def arriving(
 def lag_and_error(
     states: list[State], signal: Callable[[float], float], since: float
 ) -> tuple[float, float]:
-    """The lag [s] that explains axis 1 best, and the error [rad] that is left."""
+    """Return the lag [s] that explains axis 1 best, and the remaining error [rad]."""
     late = [state for state in states if state.t > since]
     found = []
     for lag in np.arange(-0.02, 0.12, 0.002).tolist():
@@ -101,16 +101,16 @@ def lag_and_error(
 @pytest.mark.parametrize("hz", [50.0, 100.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.003])
 @pytest.mark.parametrize(("size", "period"), [(0.17, 2.0), (0.4, 3.0), (0.7, 5.0)])
-def test_a_sine_inside_the_limits_keeps_its_amplitude(
+def test_sine_inside_the_limits_keeps_its_amplitude(
     session: Session, size: float, period: float, jitter: float, hz: float, rates: bool
 ) -> None:
-    """They use 0.45 to 0.7 of the acceleration there is."""
+    """The sines use 0.45 to 0.7 of the maximum acceleration."""
 
     def sine(t: float) -> float:
         return size * math.sin(math.tau * t / period)
 
     states = arriving(session, sine, 3.0 * period, hz, jitter, rates)
-    # Over all of it: it does not overshoot while it catches up either.
+    # The whole time is checked, because it must not overshoot while it catches up either.
     assert max(abs(state.setpoint[0]) for state in states) == pytest.approx(size, rel=5e-3)
     lag, error = lag_and_error(states, sine, period)
     assert lag <= (0.03 if rates else 0.06)
@@ -119,7 +119,7 @@ def test_a_sine_inside_the_limits_keeps_its_amplitude(
 
 @pytest.mark.parametrize("rates", [False, True])
 @pytest.mark.parametrize("period", [0.8, 1.0, 1.5, 2.0])
-def test_a_sine_beyond_the_limits_is_clipped_and_never_passed(
+def test_sine_beyond_the_limits_is_clipped_without_overshoot(
     session: Session, period: float, rates: bool
 ) -> None:
     def sine(t: float) -> float:
@@ -129,8 +129,8 @@ def test_a_sine_beyond_the_limits_is_clipped_and_never_passed(
     assert 0.1 < max(abs(state.setpoint[0]) for state in states) <= 0.4 * (1.0 + 1e-3)
 
 
-def test_a_chirp_that_becomes_too_fast_is_hardly_passed(session: Session) -> None:
-    """From 6 s to 1 s a period: when it gets too fast is not known before."""
+def test_chirp_that_becomes_too_fast_is_hardly_overshot(session: Session) -> None:
+    """The period falls from 6 s to 1 s; the session cannot know in advance when it is too fast."""
 
     def chirp(t: float) -> float:
         return 0.3 * math.sin(math.tau * (t / 6.0 + 0.5 * (1.0 - 1.0 / 6.0) * t * t / 18.0))
@@ -139,7 +139,7 @@ def test_a_chirp_that_becomes_too_fast_is_hardly_passed(session: Session) -> Non
     assert max(abs(state.setpoint[0]) for state in states) <= 0.3 * 1.01
 
 
-def test_steps_are_reached_and_not_passed(session: Session) -> None:
+def test_steps_are_reached_without_overshoot(session: Session) -> None:
     def steps(t: float) -> float:
         return 0.5 * (int(t / 2.0) % 2)
 
@@ -150,8 +150,8 @@ def test_steps_are_reached_and_not_passed(session: Session) -> None:
     assert q[int(5.9 / DT)] == pytest.approx(0.0, abs=1e-3)
 
 
-def test_samples_that_arrive_together_are_no_leap(session: Session) -> None:
-    """A line that stalls for 0.1 s and then delivers all at once."""
+def test_samples_that_arrive_together_make_no_leap(session: Session) -> None:
+    """A connection stalls for 0.1 s, and then delivers all samples at once."""
 
     def sine(t: float) -> float:
         return 0.4 * math.sin(math.tau * t / 3.0)
@@ -167,7 +167,7 @@ def test_samples_that_arrive_together_are_no_leap(session: Session) -> None:
         assert abs(state.setpoint[0]) <= 0.4 * 1.05
 
 
-def test_a_time_of_another_clock_is_not_believed(session: Session, state: State) -> None:
+def test_time_of_another_clock_is_ignored(session: Session, state: State) -> None:
     for t in (-5.0, 1e6):
         after = session.step(state, [cmd.Servo(session.ready, None, t)], DT)
         assert after.servo is not None
@@ -177,15 +177,15 @@ def test_a_time_of_another_clock_is_not_believed(session: Session, state: State)
 
 
 @pytest.mark.parametrize("every", [1, 2, 5])
-def test_it_keeps_up_closely_with_what_the_arm_can_do(session: Session, every: int) -> None:
+def test_feasible_stream_is_followed_closely(session: Session, every: int) -> None:
     stream = wave(session)
     times, states = streamed(session, stream, 6.0, every)
     off = [np.abs(s.setpoint - stream(t)).max() for t, s in zip(times, states, strict=True)]
-    # Without the rate it would lag by a third of a second's way, 0.1 rad.
+    # Without the rate it would lag by the path of a third of a second, 0.1 rad.
     assert max(off[100:]) < 0.012
 
 
-def test_streamed_targets_never_pass_a_limit(session: Session, arm: ArmModel) -> None:
+def test_streamed_targets_keep_the_limits(session: Session, arm: ArmModel) -> None:
     rng = np.random.default_rng(7)
     limits = arm.limits
 
@@ -204,28 +204,28 @@ def test_streamed_targets_never_pass_a_limit(session: Session, arm: ArmModel) ->
     assert (np.abs(np.diff(q, axis=0)) / DT <= limits.speed + 1e-9).all()
 
 
-def test_a_stream_that_ends_leads_to_rest_at_its_last(session: Session) -> None:
+def test_ended_stream_rests_at_its_last_sample(session: Session) -> None:
     stream = wave(session)
     _, states = streamed(session, stream, 1.0)
     state = states[-1]
     last = stream(0.98)
     for _ in range(300):
         state = session.step(state, (), state.t + DT)
-    # It goes along for as long as a jog would, and then stays.
+    # It follows the stream for JOG_TIME, and then stays.
     assert np.abs(state.setpoint - last).max() < 0.15 * JOG_TIME + 0.1
     q = state.setpoint
     state = session.step(state, (), state.t + DT)
     assert np.abs(state.setpoint - q).max() < 1e-9
 
 
-def test_any_other_command_ends_it(session: Session) -> None:
+def test_other_command_ends_the_stream(session: Session) -> None:
     _, states = streamed(session, wave(session), 1.0)
     for command in (cmd.Home(), cmd.Hold(), cmd.Stop(), cmd.SetJoint(0, 0.1)):
         state = session.step(states[-1], [command], states[-1].t + DT)
         assert state.servo is None
 
 
-def test_a_stream_of_another_shape_is_refused(session: Session) -> None:
+def test_stream_of_another_shape_is_refused(session: Session) -> None:
     with pytest.raises(InputError, match="5 joints"):
         session.check(cmd.Servo(np.zeros(4)))
     with pytest.raises(InputError, match="finite"):

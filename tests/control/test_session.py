@@ -1,4 +1,4 @@
-"""The session: what is asked, what the arm makes of it, how fast."""
+"""The session: the effect of commands on the arm, and the speed of its motion."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TICK = 0.01
 
 
 def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
-    """``ticks`` turns of the loop with an arm that follows exactly."""
+    """Run ``ticks`` ticks with an arm that follows exactly."""
     commands = list(commands)
     for _ in range(ticks):
         state = session.step(state, commands, state.t + TICK)
@@ -40,7 +40,7 @@ def reasons(state: State) -> set[Reason]:
     return {finding.reason for finding in state.findings}
 
 
-def test_a_far_target_is_approached_as_fast_as_the_arm_may(arm: ArmModel, state: State) -> None:
+def test_far_target_is_approached_at_maximum_speed(arm: ArmModel, state: State) -> None:
     session = Session(arm, state.setpoint, tool_speed=9.0)
     state = session.step(state, [cmd.SetJoint(0, 2.0)], TICK)
     ticks = 1
@@ -49,25 +49,25 @@ def test_a_far_target_is_approached_as_fast_as_the_arm_may(arm: ArmModel, state:
         state = session.step(state, [], state.t + TICK)
         assert (np.abs(state.setpoint - before) <= arm.chain.speed * TICK * (1 + 1e-9)).all()
         ticks += 1
-    # Up to speed with bounded jerk, along, and down again the same way.
+    # The arm accelerates with bounded jerk, cruises, and decelerates in the same manner.
     v, a, j = (limit[0] for limit in (arm.chain.speed, arm.limits.acceleration, arm.limits.jerk))
     assert ticks * TICK == pytest.approx(2.0 / v + v / a + a / j, abs=2 * TICK)
     assert state.setpoint[0] == 2.0
 
 
-def test_a_late_tick_is_no_leap(arm: ArmModel, session: Session, state: State) -> None:
+def test_late_tick_makes_no_leap(arm: ArmModel, session: Session, state: State) -> None:
     after = session.step(state, [cmd.SetJoint(0, 2.0)], 60.0)
     assert after.setpoint[0] <= arm.chain.speed[0] * MAX_STEP_TIME * (1 + 1e-12)
 
 
-def test_time_that_stands_or_runs_back_moves_nothing(session: Session, state: State) -> None:
+def test_nothing_moves_while_time_stands_or_runs_back(session: Session, state: State) -> None:
     for t in (0.0, -5.0):
         after = session.step(state, [cmd.SetJoint(0, 2.0)], t)
         assert (after.setpoint == state.setpoint).all()
         assert after.t == 0.0
 
 
-def test_step_is_a_fold_that_can_be_replayed_to_the_bit(session: Session, state: State) -> None:
+def test_steps_replay_to_the_bit(session: Session, state: State) -> None:
     commands: list[list[cmd.Command]] = [
         [cmd.MoveTool(np.array([0.3, 0.1 + 0.01 * i, 0.0])), cmd.SetGripper(0.01 * i)]
         for i in range(20)
@@ -81,13 +81,13 @@ def test_step_is_a_fold_that_can_be_replayed_to_the_bit(session: Session, state:
     assert first.goal.tobytes() == second.goal.tobytes()
 
 
-def test_moving_the_tool_keeps_pitch_and_roll_and_needs_no_yaw(
+def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     state = run(session, state, [cmd.TurnTool(0.6, 0.4)], ticks=5)
-    wanted = np.array([0.25, 0.25, -0.05])
-    state = run(session, state, [cmd.MoveTool(wanted)], ticks=5)
-    assert np.allclose(tool_point(arm, state), wanted, atol=1e-12)
+    desired = np.array([0.25, 0.25, -0.05])
+    state = run(session, state, [cmd.MoveTool(desired)], ticks=5)
+    assert np.allclose(tool_point(arm, state), desired, atol=1e-12)
     assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
         (0.6, 0.4), abs=1e-12
     )
@@ -103,9 +103,7 @@ def test_turning_the_tool_keeps_its_position(arm: ArmModel, session: Session, st
     )
 
 
-def test_a_pose_with_a_yaw_of_its_own_says_how_much_is_lost(
-    arm: ArmModel, session: Session, state: State
-) -> None:
+def test_lost_yaw_of_a_pose_is_reported(arm: ArmModel, session: Session, state: State) -> None:
     R = so3.rotation_z(math.radians(23.0)) @ so3.rotation_y(0.5)
     T = se3.from_rotation_translation(R, np.array([0.35, 0.0, 0.0]))
     state = run(session, state, [cmd.SetPose(T)])
@@ -127,7 +125,7 @@ def test_goal_out_of_reach_is_the_nearest_point_with_a_finding(
     assert np.allclose(np.cross(reached, far), 0.0, atol=1e-9)
     (gap,) = (f for f in state.findings if f.reason is Reason.OUT_OF_REACH)
     assert gap.amount == pytest.approx(np.linalg.norm(far) - lengths, abs=1e-9)
-    # What binds is the reach of the links; no axis is at a limit.
+    # The reach of the links is the constraint; no axis is at a limit.
     assert [f.reason for f in state.findings] == [Reason.OUT_OF_REACH, Reason.LINKS]
     assert state.status is Status.LIMITED
 
@@ -152,7 +150,7 @@ def test_end_of_a_drag_makes_the_goal_the_target_and_keeps_the_finding(
     assert isinstance(away.target, JointTarget)
     assert away.target.q is away.goal
     assert reasons(away) == {Reason.OUT_OF_REACH, Reason.LINKS}
-    # The next wish starts from what the arm does, and clears the reason.
+    # The next target starts from the posture of the arm, and clears the reason.
     back = run(
         session, away, [cmd.TurnTool(*pitch_and_roll(session.require_arm().chain, away.goal))]
     )
@@ -160,34 +158,34 @@ def test_end_of_a_drag_makes_the_goal_the_target_and_keeps_the_finding(
     assert reasons(back) == set()
 
 
-def test_a_hand_that_lets_go_at_once_is_followed_to_where_it_went(
+def test_drag_that_ends_at_once_still_reaches_its_target(
     arm: ArmModel, session: Session, state: State
 ) -> None:
-    """One tick has no time for all the way; what was wished is not lost with the hand."""
-    wanted = np.array([-0.2, 0.35, 0.1])
-    flung = run(session, state, [cmd.MoveTool(wanted), cmd.EndDrag()])
-    assert flung.since is not None
-    assert flung.findings == ()
-    assert math.dist(tool_point(arm, flung), wanted) > 0.1
-    there = run(session, flung, [], ticks=15)
+    """One tick cannot track all of the path; the target remains after the end of the drag."""
+    desired = np.array([-0.2, 0.35, 0.1])
+    released = run(session, state, [cmd.MoveTool(desired), cmd.EndDrag()])
+    assert released.since is not None
+    assert released.findings == ()
+    assert math.dist(tool_point(arm, released), desired) > 0.1
+    there = run(session, released, [], ticks=15)
     assert there.since is None
-    assert np.allclose(tool_point(arm, there), wanted, atol=1e-12)
+    assert np.allclose(tool_point(arm, there), desired, atol=1e-12)
     assert isinstance(there.target, JointTarget)
     assert there.target.q is there.goal
-    # Taken up again on the way, the hand is the one that counts.
-    again = run(session, flung, [cmd.MoveTool(wanted)], ticks=15)
-    assert np.allclose(tool_point(arm, again), wanted, atol=1e-12)
+    # A new drag on the way replaces the target.
+    again = run(session, released, [cmd.MoveTool(desired)], ticks=15)
+    assert np.allclose(tool_point(arm, again), desired, atol=1e-12)
     assert not isinstance(again.target, JointTarget)
-    # Whatever else is asked of the arm ends it.
+    # Any other command ends the drag.
     for command in (cmd.Hold(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
-        ended = run(session, flung, [command])
+        ended = run(session, released, [command])
         assert ended.since is None
         assert isinstance(ended.target, JointTarget)
         assert (run(session, ended, [], ticks=3).goal == ended.goal).all()
 
 
 @pytest.mark.parametrize("axis", range(5))
-def test_a_slider_at_its_end_is_no_complaint(
+def test_slider_at_its_end_makes_no_finding(
     arm: ArmModel, session: Session, state: State, axis: int
 ) -> None:
     end = math.radians(math.degrees(arm.chain.upper[axis]))
@@ -198,7 +196,7 @@ def test_a_slider_at_its_end_is_no_complaint(
 
 @pytest.mark.parametrize("axis", range(5))
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_joint_stops_at_its_limit_and_says_which(
+def test_joint_stops_at_its_limit_and_reports_it(
     arm: ArmModel, session: Session, state: State, axis: int, side: float
 ) -> None:
     state = run(session, state, [cmd.SetJoint(axis, side * 4.0)])
@@ -224,7 +222,7 @@ def test_dragging_never_changes_the_branch(arm: ArmModel, session: Session, stat
         assert state.branch == branch
         assert arm.chain.within_limits(state.goal)
         on = branch_of(arm.chain_to(state.tool), state.goal)
-        # On the seam between two branches the posture belongs to both.
+        # A posture on the seam between two branches belongs to both.
         r = (
             math.cos(state.goal[0]) * tool_point(arm, state)[0]
             + math.sin(state.goal[0]) * tool_point(arm, state)[1]
@@ -239,7 +237,7 @@ def test_sliders_may_change_the_branch(session: Session, state: State) -> None:
     assert str(state.branch) == "front-down"
 
 
-def test_home_stretch_and_reset(session: Session, state: State) -> None:
+def test_zero_posture_hold_and_home(session: Session, state: State) -> None:
     state = run(session, state, [cmd.GoToZero()])
     assert (state.goal == 0.0).all()
     state = run(session, state, [], ticks=20)
@@ -251,7 +249,7 @@ def test_home_stretch_and_reset(session: Session, state: State) -> None:
     assert (home.goal == session.ready).all()
 
 
-def test_a_tool_change_moves_nothing(arm: ArmModel, session: Session, state: State) -> None:
+def test_tool_change_moves_nothing(arm: ArmModel, session: Session, state: State) -> None:
     changed = run(session, state, [cmd.SetTool("flange")])
     assert (changed.goal == state.goal).all()
     assert not changed.moving
@@ -259,7 +257,7 @@ def test_a_tool_change_moves_nothing(arm: ArmModel, session: Session, state: Sta
     assert np.allclose(forward(arm.chain_to("flange"), moved.goal)[:3, 3], [0.25, 0.0, 0.05])
 
 
-def test_the_gripper_moves_at_its_speed_and_stops_at_its_limit(
+def test_gripper_moves_at_its_speed_and_stops_at_its_limit(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     state = run(session, state, [cmd.SetGripper(1.0)])
@@ -268,14 +266,14 @@ def test_the_gripper_moves_at_its_speed_and_stops_at_its_limit(
     assert 0.0 < state.gripper_setpoint <= arm.gripper.speed * TICK * (1 + 1e-12)
     state = run(session, state, [], ticks=100)
     assert state.gripper_setpoint == arm.gripper.upper
-    # An arm command does not take the gripper's reason away, a good gripper command does.
+    # A command of the arm keeps the gripper's finding; a valid gripper command clears it.
     state = run(session, state, [cmd.Home()])
     assert reasons(state) == {Reason.GRIPPER_LIMIT}
     assert reasons(run(session, state, [cmd.SetGripper(0.0)])) == set()
 
 
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "message"),
     [
         (cmd.SetJoint(5, 0.0), "no axis 6"),
         (cmd.SetJoints(np.zeros(6)), "5 joints"),
@@ -284,16 +282,16 @@ def test_the_gripper_moves_at_its_speed_and_stops_at_its_limit(
     ],
 )
 def test_unsupported_request_changes_nothing(
-    session: Session, state: State, command: cmd.Command, said: str
+    session: Session, state: State, command: cmd.Command, message: str
 ) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         session.check(command)
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         session.step(state, [cmd.SetJoint(0, 1.0), command], TICK)
     assert (state.goal == session.ready).all()
 
 
-def test_a_failure_leaves_an_arm_that_holds(session: Session, state: State) -> None:
+def test_arm_holds_after_a_failure(session: Session, state: State) -> None:
     moving = run(session, state, [cmd.SetJoint(0, 2.0)], ticks=5)
     failed = session.fail(moving)
     assert failed.status is Status.FAULT
@@ -302,13 +300,13 @@ def test_a_failure_leaves_an_arm_that_holds(session: Session, state: State) -> N
     assert run(session, after, [cmd.Home()]).status is Status.OK
 
 
-def test_a_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:
+def test_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:
     with pytest.raises(InputError, match="limits"):
         Session(arm, np.full(5, 2.0))
 
 
 @pytest.mark.parametrize("point", [(0.0, 0.0, 0.3), (1e-12, 0.0, 0.3), (0.0, 0.0, 0.7)])
-def test_over_the_base_the_arm_keeps_its_azimuth(
+def test_arm_keeps_its_azimuth_over_the_base(
     session: Session, state: State, point: tuple[float, float, float]
 ) -> None:
     turned = run(session, state, [cmd.SetJoint(0, 0.7)])

@@ -1,4 +1,4 @@
-"""Random orders of commands to the real session: it keeps its invariants after every tick."""
+"""Random commands to the real session, which keeps its invariants after every tick."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.control.invariants import JointRules, fractions, ticks
 
 
 class ArmRules(JointRules):
-    """The commands of an arm with a gripper, objects and plans besides."""
+    """The commands of an arm with gripper, objects and plans."""
 
     names = ("shipped", "bare")
     plan: Plan | None = None
@@ -44,7 +44,7 @@ class ArmRules(JointRules):
         for _ in range(ticks):
             refused = self.state.stopped is not None or self.state.paused
             self.tick([command])
-            # A jog that is held goes on, whatever was before it.
+            # A jog that is held continues in every mode.
             assert refused or isinstance(self.state.intent, Jogging)
 
     @rule(step=fractions(3), ticks=ticks, let_go=st.booleans())
@@ -59,7 +59,7 @@ class ArmRules(JointRules):
         self.run([cmd.EndDrag()] if let_go else (), 2)
 
     def check_drag(self, position: FloatArray, start: FloatArray | None) -> None:
-        """The hand is followed, in no other mode, and along the line from where it began."""
+        """Check that the drag is tracked along the line from its start, and in no other mode."""
         intent = self.state.intent
         assert isinstance(intent, Tracking | Positioning)
         assert isinstance(intent.target, ToolTarget)
@@ -74,7 +74,7 @@ class ArmRules(JointRules):
         data=st.data(),
     )
     def switch(self, kinds: list[str], data: st.DataObject) -> None:
-        """One mode upon another, or cut short, while the arm is free."""
+        """Replace one mode by another, or interrupt it, while the arm is free."""
         self.run([cmd.ClearStop(), cmd.Resume()], 1)
         for kind in kinds:
             ticks = data.draw(st.integers(2, 12))
@@ -118,7 +118,7 @@ class ArmRules(JointRules):
         self.run([cmd.TakeBranch(branch)], ticks)
 
     @rule(priority=st.sampled_from(Priority), ticks=ticks)
-    def set_reading(self, priority: Priority, ticks: int) -> None:
+    def set_priority(self, priority: Priority, ticks: int) -> None:
         self.run([cmd.SetPriority(priority)], ticks)
 
     @rule(data=st.data(), ticks=ticks)
@@ -142,7 +142,7 @@ class ArmRules(JointRules):
     @precondition(lambda self: self.plan is not None)
     @rule(ticks=ticks)
     def follow_again(self, ticks: int) -> None:
-        """From wherever the arm is."""
+        """Follow the plan again from any place of the arm."""
         assert self.plan is not None
         self.run([cmd.Follow(self.plan)], ticks)
 
@@ -167,19 +167,19 @@ class ArmRules(JointRules):
 
 
 def bounded(quick: int, many: int) -> settings:
-    """So many examples: the same ones each time, or many others."""
+    """Return settings with this number of examples: always the same ones, or many others."""
     return settings(
         max_examples=many if LONG else quick,
         stateful_step_count=60 if LONG else 25,
         deadline=None,
         derandomize=not LONG,
-        # Shrinking an example takes minutes.
+        # The shrinking of an example takes minutes.
         phases=tuple(Phase) if LONG else (Phase.explicit, Phase.generate),
         suppress_health_check=list(HealthCheck),
     )
 
 
-def test_an_arm_keeps_its_invariants() -> None:
+def test_arm_keeps_its_invariants() -> None:
     run_state_machine_as_test(ArmRules, settings=bounded(16, 250))
 
 

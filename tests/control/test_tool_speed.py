@@ -1,4 +1,4 @@
-"""The tool is never faster than it may be, whatever is asked, and could always brake that way."""
+"""The tool keeps its maximum speed under all commands, and can always brake below it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def speed(session: Session, state: State) -> float:
 
 
 def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list[float]:
-    """Of the tool [m/s], in ticks with an order at random times, most of them soon."""
+    """Return the tool speeds [m/s] of ticks with commands at random times, most of them close."""
     rng, found, wait = np.random.default_rng([450, seed]), [], 0
     state = session.begin(session.ready, 0.0, 0.0)
     for _ in range(ticks):
@@ -59,21 +59,21 @@ def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_orders_of_every_kind_keep_below_it(session: Session, seed: int) -> None:
+def test_all_commands_keep_the_tool_speed(session: Session, seed: int) -> None:
     found = speeds(session, [each for group in ORDERS.values() for each in group], 2500, seed)
     assert 0.5 * TOOL_SPEED < max(found) <= TOOL_SPEED
 
 
 @pytest.mark.parametrize("kind", ["joints", "streams"])
-def test_fast_jumps_of_one_kind_keep_below_it(session: Session, kind: str) -> None:
+def test_repeated_jumps_keep_the_tool_speed(session: Session, kind: str) -> None:
     assert 0.8 * TOOL_SPEED < max(speeds(session, ORDERS[kind], 2500, 7)) <= TOOL_SPEED
 
 
 @pytest.mark.parametrize(("size", "longest", "seed"), [(0.4, 30, 2), (0.9, 30, 3), (0.9, 80, 5)])
-def test_fast_jump_drags_keep_below_it(
+def test_fast_drags_keep_the_tool_speed(
     session: Session, size: float, longest: int, seed: int
 ) -> None:
-    """The hand leaps up to ``size`` [m] away every few ticks."""
+    """The target leaps by up to ``size`` [m] every few ticks."""
     rng, wait, fastest = np.random.default_rng([450, seed]), 0, 0.0
     state = session.begin(anywhere(rng, session.require_arm()), 0.0, 0.0)
     for _ in range(2500):
@@ -88,13 +88,13 @@ def test_fast_jump_drags_keep_below_it(
     assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
 
 
-def test_a_lower_limit_is_kept_as_well(arm: ArmModel, session: Session) -> None:
+def test_lower_tool_speed_is_kept(arm: ArmModel, session: Session) -> None:
     slow = Session(arm, session.ready, tool_speed=0.1)
     found = speeds(slow, [each for group in ORDERS.values() for each in group], 2000, 1)
     assert 0.05 < max(found) <= 0.1
 
 
-def test_a_plan_is_left_without_passing_it(arm: ArmModel, session: Session) -> None:
+def test_leaving_a_plan_keeps_the_tool_speed(arm: ArmModel, session: Session) -> None:
     rng, worst = np.random.default_rng(11), 0.0
     orders: list[cmd.Command] = [cmd.Stop(), cmd.Home(), cmd.MoveTool(np.array([-0.3, 0.3, 0.2]))]
     for number in range(12):
@@ -109,7 +109,7 @@ def test_a_plan_is_left_without_passing_it(arm: ArmModel, session: Session) -> N
     assert 0.6 * TOOL_SPEED < worst <= TOOL_SPEED
 
 
-def test_the_bound_of_the_tool_speed_is_one(arm: ArmModel) -> None:
+def test_tool_speed_bound_is_an_upper_bound(arm: ArmModel) -> None:
     rng, chain = np.random.default_rng(3), arm.chain
     for _ in range(500):
         qd = rng.uniform(-1.0, 1.0, 5)

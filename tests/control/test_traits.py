@@ -1,4 +1,4 @@
-"""Traits: every command declares its own, and the rest of the program follows them."""
+"""Every command declares its traits, and the rest of the program follows them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BALL = SceneObject("ball", Shape.SPHERE, (0.02,), np.eye(4))
 
 
 def examples(session: Session, state: State) -> list[cmd.Command]:
-    """One command of each class."""
+    """Return one command of each class."""
     q = np.zeros(session.require_arm().chain.n)
     return [
         *(
@@ -80,7 +80,7 @@ def test_commands_passive_to_planning_supersede_nothing() -> None:
         CommandTraits(passive=True, supersedes=True)
 
 
-def test_only_stop_is_for_everybody() -> None:
+def test_only_stop_is_a_safety_command() -> None:
     assert [kind for kind in KINDS if kind.traits.safety] == [cmd.Stop]
 
 
@@ -97,7 +97,7 @@ def test_stopped_arm_accepts_exactly_the_declared_commands(session: Session, sta
             assert getattr(after, field) is getattr(stopped, field), (each, field)
 
 
-def test_of_a_stream_the_mailbox_keeps_the_newest(session: Session, state: State) -> None:
+def test_mailbox_keeps_only_the_newest_of_a_stream(session: Session, state: State) -> None:
     for each in examples(session, state):
         mailbox = Mailbox(lambda _: None)
         mailbox.put(each)
@@ -106,7 +106,7 @@ def test_of_a_stream_the_mailbox_keeps_the_newest(session: Session, state: State
         assert kept == (1 if each.traits.stream or each.traits.safety else 2), each
 
 
-def test_a_stop_drops_what_waits_before_it(session: Session) -> None:
+def test_stop_drops_waiting_commands(session: Session) -> None:
     mailbox = Mailbox(session.check)
     mailbox.put(cmd.Home())
     mailbox.put(cmd.Stop())

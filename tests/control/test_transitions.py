@@ -1,4 +1,4 @@
-"""The table of command x mode covers everything, and the session does what it says."""
+"""The table of commands and modes is complete, and the session behaves as it states."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ TICK = 0.01
 COMMANDS = typing.get_args(cmd.Command)
 
 FAR = np.array([-0.2, 0.35, 0.1])
-"""[m] Farther than a drag gets in one tick."""
+"""[m] A target farther than a drag moves in one tick."""
 
 
 def run(session: Session, state: State, commands: list[cmd.Command], ticks: int = 1) -> State:
-    """``ticks`` ticks, with ``commands`` in each of them."""
+    """Run ``ticks`` ticks, with ``commands`` in each of them."""
     for _ in range(ticks):
         state = session.step(state, commands, state.t + TICK)
         state = session.observe(state, state.setpoint, state.gripper_setpoint)
@@ -49,7 +49,7 @@ def run(session: Session, state: State, commands: list[cmd.Command], ticks: int 
 
 
 def followed(session: Session, state: State) -> State:
-    """``state`` in the middle of a plan."""
+    """Return ``state`` in the middle of a plan."""
     goal = np.array(state.setpoint)
     goal[0] += 0.8
     plan = plan_to(session.require_arm(), session.world_at(state), state, goal)
@@ -57,7 +57,7 @@ def followed(session: Session, state: State) -> State:
 
 
 def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Command:
-    """A command of each class that ``session`` can be asked for; a KeyError for an unknown one."""
+    """Return a command of class ``kind`` that ``session`` supports; KeyError if unknown."""
     objects = state.objects
     cup = named(objects, "cup")
     assert cup is not None
@@ -102,7 +102,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
 
 
 def streamed(session: Session, state: State) -> State:
-    """``state`` in a stream that turns axis 1."""
+    """Return ``state`` in a stream that turns axis 1."""
     for number in range(10):
         q: FloatArray = session.ready + np.array([0.003 * number, 0.0, 0.0, 0.0, 0.0])
         state = run(session, state, [cmd.Servo(q)])
@@ -110,7 +110,7 @@ def streamed(session: Session, state: State) -> State:
 
 
 def left(session: Session, state: State) -> State:
-    """``state`` that brakes along a plan, and will jog from there."""
+    """Return ``state`` that brakes along a plan, and will jog from there."""
     state = followed(session, state)
     assert isinstance(state.mode, Following)
     jogged = run(session, state, [example(session, state, cmd.Jog)])
@@ -131,7 +131,7 @@ BEGINNINGS: dict[type[Mode], Callable[[Session, State], State]] = {
 }
 
 
-def test_the_table_covers_every_command_and_every_mode() -> None:
+def test_table_covers_every_command_and_mode() -> None:
     for kind in COMMANDS:
         assert row_of(kind) in TABLE.values()
     assert all(any(issubclass(kind, row) for kind in COMMANDS) for row in TABLE)
@@ -143,7 +143,7 @@ def test_the_table_covers_every_command_and_every_mode() -> None:
 
 
 def trace(state: State) -> tuple[object, ...]:
-    """All that shows in ``state``."""
+    """Return all visible parts of ``state``."""
     motion = (state.setpoint, state.motion.qd, state.motion.qdd, state.goal)
     seen = tuple(each.tobytes() for each in motion)
     numbers = (state.gripper_goal, state.gripper_setpoint, state.speed, state.paused)
@@ -185,7 +185,7 @@ def test_each_command_has_its_effect_in_each_mode(
 
 
 @pytest.mark.parametrize("kind", COMMANDS)
-def test_a_stop_refuses_all_but_what_is_listed(
+def test_stop_refuses_all_commands_but_the_listed(
     shipped: Session, begun: dict[type[Mode], State], kind: type[cmd.Command]
 ) -> None:
     stopped = run(shipped, begun[Jogging], [cmd.Stop()])
@@ -193,7 +193,7 @@ def test_a_stop_refuses_all_but_what_is_listed(
     command = example(shipped, begun[Jogging], kind)
     after = run(shipped, stopped, [command, cmd.Batch((cmd.SpeedScale(0.9),))])
     assert isinstance(after.mode, Idle)
-    # One command alone ends a stop.
+    # Only ClearStop ends a stop.
     assert (after.stopped is None) == (kind is cmd.ClearStop)
     if not kind.traits.while_stopped:
         assert effect_of(command, stopped) is Effect.REFUSED
@@ -201,7 +201,7 @@ def test_a_stop_refuses_all_but_what_is_listed(
         assert trace(after) == trace(idle)
 
 
-def test_a_jog_is_refused_during_a_pause(shipped: Session) -> None:
+def test_jog_is_refused_during_a_pause(shipped: Session) -> None:
     state = shipped.begin(shipped.ready, 0.0, 0.0)
     paused = run(shipped, state, [cmd.Pause()])
     command = example(shipped, state, cmd.Jog)
@@ -212,7 +212,7 @@ def test_a_jog_is_refused_during_a_pause(shipped: Session) -> None:
     np.testing.assert_array_equal(after.setpoint, state.setpoint)
 
 
-def test_a_batch_has_the_effects_of_its_commands(
+def test_batch_has_the_effects_of_its_commands(
     shipped: Session, begun: dict[type[Mode], State]
 ) -> None:
     after = run(shipped, begun[Jogging], [cmd.Batch((cmd.SpeedScale(0.3), cmd.Home()))])

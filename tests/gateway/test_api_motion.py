@@ -63,7 +63,7 @@ def test_unreachable_request_gives_the_reason(program: Client) -> None:
     )
     with pytest.raises(RefusedError, match="There is no tool 'spoon'; this arm has"):
         program.ask(requests.Tool(name="spoon"))
-    with pytest.raises(RefusedError, match="5 joints, the command 3"):
+    with pytest.raises(RefusedError, match="5 joints, but the command has 3"):
         program.ask(requests.Joints(q=[0.0, 0.0, 0.0]))
     skewed = ((1.0, 0.0, 0.0, 0.3), (0.0, 1.0, 0.5, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
     with pytest.raises(RefusedError, match=r"[Rr]otation"):

@@ -106,7 +106,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     assert "Only its joints" in json.loads(body)["why"]
     with pytest.raises(RefusedError, match=f"axis {robot.joint_group.n + 1}: this mechanism has"):
         program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
-    with pytest.raises(RefusedError, match="driven joints, the command 2"):
+    with pytest.raises(RefusedError, match="driven joints, but the command has 2"):
         program.ask(requests.Joints(q=[0.0, 0.0]))
     assert "Joints only." in server.output
 

@@ -1,4 +1,4 @@
-"""Two ends of a pipe: the arm's, with a real control loop, and the front's."""
+"""The two ends of the link: the arm's end with a real control loop, and the front end."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SILENCE = 0.3
 
 
 class Ends:
-    """Both, and the loop behind them."""
+    """Both ends of the link, and the control loop."""
 
     def __init__(self, arm: ArmModel, session: Session) -> None:
         self.session = session
@@ -39,7 +39,7 @@ class Ends:
         self.arm_end, self.front = self.connect()
 
     def connect(self) -> tuple[ArmEnd, FrontEnd]:
-        """A pipe between the loop and a new front."""
+        """Return a new arm end and a new front end, connected by a pipe."""
         ours, theirs = multiprocessing.Pipe()
         self.theirs = theirs
         arm_end = ArmEnd(ours, self.loop, self.mailbox, SILENCE)
@@ -64,7 +64,7 @@ def until(true: Callable[[], bool], seconds: float = 5.0) -> None:
         time.sleep(0.005)
 
 
-def test_started_front_has_the_newest_state(ends: Ends) -> None:
+def test_started_front_end_has_the_newest_state(ends: Ends) -> None:
     ours, theirs = multiprocessing.Pipe()
     arm_end = ArmEnd(ours, ends.loop, ends.mailbox, SILENCE)
     arm_end.start()
@@ -80,34 +80,34 @@ def test_started_front_has_the_newest_state(ends: Ends) -> None:
     arm_end.close()
 
 
-def test_a_command_goes_over_and_its_ticket_comes_back(ends: Ends) -> None:
+def test_command_crosses_the_pipe_and_its_ticket_returns(ends: Ends) -> None:
     tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]
     assert ends.front.last_ticket == 3
     until(lambda: ends.front.state_publisher.snapshot.ticket == 3)
-    alive(ends, lambda: not ends.front.state_publisher.snapshot.state.moving)
+    wait_with_heartbeats(ends, lambda: not ends.front.state_publisher.snapshot.state.moving)
     state = ends.front.state_publisher.snapshot.state
     assert (state.q[0], state.q[4]) == (0.1, 0.1)
     np.testing.assert_array_equal(state.q, ends.loop.state_publisher.snapshot.state.q)
 
 
-def alive(ends: Ends, true: Callable[[], bool]) -> None:
-    """Wait, and give heartbeats meanwhile."""
+def wait_with_heartbeats(ends: Ends, true: Callable[[], bool]) -> None:
+    """Wait for ``true``, and send heartbeats meanwhile."""
 
-    def beaten() -> bool:
+    def beat_and_check() -> bool:
         ends.front.heartbeat()
         return true()
 
-    until(beaten)
+    until(beat_and_check)
 
 
-def test_what_cannot_be_asked_does_not_go_over(ends: Ends) -> None:
+def test_unsupported_command_is_refused_before_the_pipe(ends: Ends) -> None:
     with pytest.raises(InputError, match="no axis 9"):
         ends.front.deliver(cmd.SetJoint(8, 0.1))
     assert ends.front.last_ticket == 0
 
 
-def test_more_than_can_be_taken_is_still_answered_for(ends: Ends) -> None:
+def test_ticket_of_a_dropped_command_still_advances(ends: Ends) -> None:
     for _ in range(3000):
         ends.front.deliver(cmd.Home())
     until(lambda: ends.front.state_publisher.snapshot.ticket == 3000)
@@ -124,9 +124,9 @@ def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
             == 2
         )
     )
-    told = [(e.t, e.finding, e.began) for e in ends.front.state_publisher.event_log]
-    assert told == [(e.t, e.finding, e.began) for e in ends.loop.state_publisher.event_log]
-    # A front that comes later knows it too.
+    entries = [(e.t, e.finding, e.began) for e in ends.front.state_publisher.event_log]
+    assert entries == [(e.t, e.finding, e.began) for e in ends.loop.state_publisher.event_log]
+    # A front end that connects later receives the event log too.
     ends.arm_end.close()
     ends.arm_end, late = ends.connect()
     assert [e.t for e in late.state_publisher.event_log] == [
@@ -134,7 +134,7 @@ def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
     ]
 
 
-def test_a_front_that_falls_silent_stops_an_arm_that_moves(ends: Ends) -> None:
+def test_silent_front_end_stops_a_moving_arm(ends: Ends) -> None:
     time.sleep(2 * SILENCE)
     assert ends.loop.state_publisher.snapshot.state.stopped is None
     ends.front.deliver(cmd.SetJoint(0, 2.0))
@@ -144,9 +144,9 @@ def test_a_front_that_falls_silent_stops_an_arm_that_moves(ends: Ends) -> None:
     until(lambda: not ends.loop.state_publisher.snapshot.state.moving)
 
 
-def test_a_pipe_that_breaks_stops_the_arm_and_the_next_front_moves_nothing(ends: Ends) -> None:
+def test_broken_pipe_stops_the_arm_and_a_new_front_end_moves_nothing(ends: Ends) -> None:
     ends.front.deliver(cmd.SetJoint(0, 2.0))
-    alive(ends, lambda: ends.front.state_publisher.snapshot.state.moving)
+    wait_with_heartbeats(ends, lambda: ends.front.state_publisher.snapshot.state.moving)
     with socket.socket(fileno=os.dup(ends.theirs.fileno())) as line:
         line.shutdown(socket.SHUT_RDWR)
     until(ends.arm_end.cut.is_set, 2.0)
@@ -161,7 +161,7 @@ def test_a_pipe_that_breaks_stops_the_arm_and_the_next_front_moves_nothing(ends:
     np.testing.assert_array_equal(again.state_publisher.snapshot.state.q, q)
 
 
-def test_an_arm_that_hangs_up_is_heard_by_its_front(ends: Ends) -> None:
+def test_front_end_notices_a_closed_arm_end(ends: Ends) -> None:
     ends.arm_end.close()
     assert ends.front.cut.wait(2.0)
 
@@ -171,13 +171,13 @@ def test_loop_timing_is_reported_periodically(ends: Ends) -> None:
     assert ends.front.state_publisher.loop_timing.period == 0.01
 
 
-def test_actor_goes_over_and_is_named_in_the_event_log(ends: Ends) -> None:
+def test_actor_crosses_the_pipe_into_the_event_log(ends: Ends) -> None:
     actor = Actor(Person("a key", "Anna", Role.OPERATOR), CommandChannel.API, None, Grounds.LEASE)
     ends.front.deliver(cmd.SetJoint(0, 99.0), actor)
     until(lambda: bool(ends.front.state_publisher.event_log))
     (entry,) = ends.front.state_publisher.event_log
     assert (entry.actor, entry.command) == (actor, "SetJoint")
-    # A stop of the arm's own process is nobody's.
+    # A stop by the arm's own process has no actor.
     ends.mailbox.put(cmd.Stop())
     until(lambda: ends.front.state_publisher.event_log[-1].finding.reason is Reason.STOPPED)
     assert (
@@ -189,7 +189,7 @@ def test_actor_goes_over_and_is_named_in_the_event_log(ends: Ends) -> None:
     )
 
 
-def test_outcomes_come_back_by_the_tickets_of_the_front(ends: Ends) -> None:
+def test_outcomes_return_with_the_tickets_of_the_front_end(ends: Ends) -> None:
     front, wait = ends.front, 5.0
     outcomes = front.state_publisher.outcomes
     fine, far = front.deliver(cmd.SetJoint(0, 0.1)), front.deliver(cmd.SetJoint(1, 99.0))
@@ -197,19 +197,19 @@ def test_outcomes_come_back_by_the_tickets_of_the_front(ends: Ends) -> None:
     limited = outcomes.of(far).result(wait)
     assert limited.verdict is Verdict.LIMITED
     assert [found.axis for found in limited.findings] == [1]
-    # A stop that the front has not seen yet, as of an arm that lost it.
+    # The front end has not seen this stop yet, as when the arm's end lost contact.
     ends.mailbox.put(cmd.Stop())
     late = outcomes.of(front.deliver(cmd.SetJoint(0, 0.2))).result(wait)
     assert late.verdict is Verdict.REFUSED
     assert "clear the stop first" in late.why
-    # A ticket that was recorded before it is asked for.
+    # The outcome of this ticket is recorded before the test reads it.
     assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
     both = front.deliver(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
     assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
     assert outcomes.of(front.deliver(cmd.ClearStop())).result(wait).verdict is Verdict.ACCEPTED
 
 
-def test_a_command_for_a_full_mailbox_is_refused_and_not_only_dropped(ends: Ends) -> None:
+def test_command_for_a_full_mailbox_is_refused(ends: Ends) -> None:
     ends.loop.stop()
     for _ in range(CAPACITY):
         ends.mailbox.put(cmd.Home())

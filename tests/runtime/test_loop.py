@@ -1,4 +1,4 @@
-"""The control loop on a clock of the test's own, and once on the machine's."""
+"""The control loop on a test clock, and once on the clock of the machine."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RATE = 100.0
 
 
 class SteppedClock:
-    """Time goes on when the loop sleeps, and when the test says so."""
+    """A clock that advances when the loop sleeps, and when the test sets it."""
 
     def __init__(self) -> None:
         self.t = 100.0
@@ -36,8 +36,8 @@ class SteppedClock:
         self.t = max(self.t, t)
 
 
-class LoopOnATable:
-    """A loop with its parts at hand."""
+class LoopParts:
+    """A control loop and its parts."""
 
     def __init__(self, arm: ArmModel, session: Session) -> None:
         self.clock = SteppedClock()
@@ -52,41 +52,41 @@ class LoopOnATable:
 
 
 @pytest.fixture
-def table(arm: ArmModel, session: Session) -> LoopOnATable:
-    return LoopOnATable(arm, session)
+def parts(arm: ArmModel, session: Session) -> LoopParts:
+    return LoopParts(arm, session)
 
 
-def test_a_command_moves_the_arm_until_it_is_there(arm: ArmModel, table: LoopOnATable) -> None:
-    ticket = table.mailbox.put(cmd.SetJoint(0, 0.5))
-    table.tick()
-    assert table.loop.state_publisher.snapshot.ticket == ticket
+def test_command_moves_the_arm_to_its_goal(arm: ArmModel, parts: LoopParts) -> None:
+    ticket = parts.mailbox.put(cmd.SetJoint(0, 0.5))
+    parts.tick()
+    assert parts.loop.state_publisher.snapshot.ticket == ticket
     jerk = float(arm.limits.jerk[0])
-    assert table.loop.state_publisher.snapshot.state.q[0] == pytest.approx(jerk / RATE**3 / 6.0)
-    table.tick(150)
-    assert table.loop.state_publisher.snapshot.state.q[0] == 0.5
+    assert parts.loop.state_publisher.snapshot.state.q[0] == pytest.approx(jerk / RATE**3 / 6.0)
+    parts.tick(150)
+    assert parts.loop.state_publisher.snapshot.state.q[0] == 0.5
 
 
-def test_an_arm_at_rest_publishes_nothing(table: LoopOnATable) -> None:
-    table.tick(3)
-    resting = table.loop.state_publisher.snapshot
-    table.tick(50)
-    assert table.loop.state_publisher.snapshot is resting
-    table.mailbox.put(cmd.EndDrag())
-    table.tick()
-    assert table.loop.state_publisher.snapshot is not resting
+def test_arm_at_rest_publishes_nothing(parts: LoopParts) -> None:
+    parts.tick(3)
+    resting = parts.loop.state_publisher.snapshot
+    parts.tick(50)
+    assert parts.loop.state_publisher.snapshot is resting
+    parts.mailbox.put(cmd.EndDrag())
+    parts.tick()
+    assert parts.loop.state_publisher.snapshot is not resting
 
 
-def test_after_a_rest_the_first_step_is_one_period_long(arm: ArmModel, table: LoopOnATable) -> None:
-    table.tick(500)
-    before = table.loop.state_publisher.snapshot.state.q
-    table.mailbox.put(cmd.SetJoint(0, 2.0))
-    table.tick()
-    step = np.abs(table.loop.state_publisher.snapshot.state.q - before)
+def test_first_step_after_rest_is_one_period_long(arm: ArmModel, parts: LoopParts) -> None:
+    parts.tick(500)
+    before = parts.loop.state_publisher.snapshot.state.q
+    parts.mailbox.put(cmd.SetJoint(0, 2.0))
+    parts.tick()
+    step = np.abs(parts.loop.state_publisher.snapshot.state.q - before)
     assert step.max() == pytest.approx(float(arm.limits.jerk[0]) / RATE**3 / 6.0)
 
 
 class BrokenDriver(SimulatedDriver):
-    """Fails while ``broken``."""
+    """A driver that fails while ``broken``."""
 
     broken = False
 
@@ -96,7 +96,7 @@ class BrokenDriver(SimulatedDriver):
         return super().send(q, gripper, t)
 
 
-def test_a_driver_that_fails_makes_the_arm_hold_and_say_so(
+def test_failing_driver_makes_the_arm_hold_and_report_it(
     arm: ArmModel, session: Session, caplog: pytest.LogCaptureFixture
 ) -> None:
     clock, mailbox = SteppedClock(), Mailbox(session.check)
@@ -115,7 +115,7 @@ def test_a_driver_that_fails_makes_the_arm_hold_and_say_so(
     assert held.status is Status.FAULT
     assert (held.goal == moving.setpoint).all()
     assert "the cable came out" in caplog.text
-    # The cable goes back in: the arm still holds, until a person asks anew.
+    # With the cable back in, the arm still holds until a new command comes.
     driver.broken = False
     for _ in range(20):
         clock.t += 0.01
@@ -128,18 +128,18 @@ def test_a_driver_that_fails_makes_the_arm_hold_and_say_so(
     assert loop.state_publisher.snapshot.state.findings == ()
 
 
-def test_waiting_for_a_change_returns_with_it_or_when_time_is_up(table: LoopOnATable) -> None:
-    table.tick()
-    seen = table.loop.state_publisher.snapshot
-    assert table.loop.state_publisher.wait_for_change(seen, 0.01) is seen
-    table.mailbox.put(cmd.Home())
-    teller = threading.Thread(target=table.tick)
-    teller.start()
-    assert table.loop.state_publisher.wait_for_change(seen, 5.0) is not seen
-    teller.join()
+def test_wait_for_change_returns_on_change_or_timeout(parts: LoopParts) -> None:
+    parts.tick()
+    seen = parts.loop.state_publisher.snapshot
+    assert parts.loop.state_publisher.wait_for_change(seen, 0.01) is seen
+    parts.mailbox.put(cmd.Home())
+    thread = threading.Thread(target=parts.tick)
+    thread.start()
+    assert parts.loop.state_publisher.wait_for_change(seen, 5.0) is not seen
+    thread.join()
 
 
-def test_on_the_machines_clock_the_loop_runs_and_stops(arm: ArmModel, session: Session) -> None:
+def test_loop_runs_and_stops_on_the_machine_clock(arm: ArmModel, session: Session) -> None:
     mailbox = Mailbox(session.check)
     driver = SimulatedDriver(arm, session.ready, 0.0)
     loop = ControlLoop(session, driver, mailbox, MonotonicClock(), RATE)
@@ -152,6 +152,6 @@ def test_on_the_machines_clock_the_loop_runs_and_stops(arm: ArmModel, session: S
         snapshot = loop.state_publisher.wait_for_change(snapshot, 0.1)
     took = time.perf_counter() - started
     loop.stop()
-    # Never sooner than the joint can: however the machine stutters.
+    # Even with late ticks the joint must not arrive earlier than its limits allow.
     assert took >= 0.4 / arm.chain.speed[0] - 1.5 / RATE
     assert not [thread for thread in threading.enumerate() if thread.name == "control"]

@@ -1,4 +1,4 @@
-"""The mailbox: order, tickets, the last of a stream, a bound, a check at the door."""
+"""The mailbox: order, tickets, replacement in a stream, capacity and checks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def mailbox(session: Session) -> Mailbox:
     return Mailbox(session.check)
 
 
-def test_commands_come_out_once_in_the_order_they_went_in(mailbox: Mailbox) -> None:
+def test_commands_leave_once_and_in_order(mailbox: Mailbox) -> None:
     sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Hold()]
     tickets = [mailbox.put(command) for command in sent]
     assert tickets == [1, 2, 3]
@@ -27,7 +27,7 @@ def test_commands_come_out_once_in_the_order_they_went_in(mailbox: Mailbox) -> N
     assert mailbox.drain() == Drained([], [], [], 3)
 
 
-def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) -> None:
+def test_last_of_a_stream_is_kept_and_every_ticket_counts(mailbox: Mailbox) -> None:
     for i in range(50):
         mailbox.put(cmd.MoveTool(np.array([0.3, 0.0, 0.001 * i])))
     drained = mailbox.drain()
@@ -38,13 +38,13 @@ def test_of_a_stream_the_last_is_kept_and_every_ticket_counts(mailbox: Mailbox) 
     assert last.position[2] == 0.049
 
 
-def test_sliders_of_two_axes_do_not_swallow_each_other(mailbox: Mailbox) -> None:
+def test_sliders_of_two_axes_do_not_replace_each_other(mailbox: Mailbox) -> None:
     for command in (cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.0), cmd.SetJoint(1, -1.1)):
         mailbox.put(command)
     assert mailbox.drain().commands == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
 
 
-def test_a_stop_reports_what_it_drops(mailbox: Mailbox) -> None:
+def test_stop_reports_the_dropped_tickets(mailbox: Mailbox) -> None:
     for command in (cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetJoint(0, 0.2), cmd.Stop()):
         mailbox.put(command)
     mailbox.put(cmd.Home())
@@ -53,13 +53,13 @@ def test_a_stop_reports_what_it_drops(mailbox: Mailbox) -> None:
     )
 
 
-def test_a_button_pressed_twice_is_two_commands(mailbox: Mailbox) -> None:
+def test_button_pressed_twice_gives_two_commands(mailbox: Mailbox) -> None:
     mailbox.put(cmd.Home())
     mailbox.put(cmd.Home())
     assert len(mailbox.drain().commands) == 2
 
 
-def test_a_flood_is_refused_and_what_waits_is_kept(mailbox: Mailbox) -> None:
+def test_flood_is_refused_and_waiting_commands_are_kept(mailbox: Mailbox) -> None:
     for _ in range(CAPACITY):
         mailbox.put(cmd.Home())
     with pytest.raises(InputError, match="slower"):
@@ -74,7 +74,7 @@ def test_unsupported_command_is_refused_by_the_session(mailbox: Mailbox) -> None
     assert mailbox.drain() == Drained([], [], [], 0)
 
 
-def test_threads_lose_nothing(mailbox: Mailbox) -> None:
+def test_concurrent_threads_lose_no_command(mailbox: Mailbox) -> None:
     taken: list[cmd.Command] = []
     writers = [
         threading.Thread(target=lambda: [mailbox.put(cmd.Home()) for _ in range(60)])

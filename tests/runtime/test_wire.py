@@ -1,4 +1,4 @@
-"""Plans cross the pipe once, and come back as the plan that was sent."""
+"""Plans cross the pipe once, and return as the same plan."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from katana450.arm.control.following import Following
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
-from katana450.arm.runtime.wire import KEPT_HERE, PlanNames, PlanStore
+from katana450.arm.runtime.wire import MAX_NAMED_PLANS, PlanNames, PlanStore
 from katana450.maths.planning.plan import Plan
 
 
@@ -23,7 +23,7 @@ def plan(arm: ArmModel) -> Plan:
     return plan_to(arm, None, state, session.ready + 0.2)
 
 
-def test_a_plan_comes_back_as_itself(plan: Plan) -> None:
+def test_plan_returns_as_the_same_object(plan: Plan) -> None:
     names, plans = PlanNames(), PlanStore()
     plans.note(7, plan)
     over_there: Plan = pickle.loads(pickle.dumps(plan))
@@ -34,14 +34,14 @@ def test_a_plan_comes_back_as_itself(plan: Plan) -> None:
     assert len(data) < 2000 < len(pickle.dumps(Following.begin(over_there)))
 
 
-def test_one_that_is_not_known_is_sent_whole(plan: Plan) -> None:
+def test_unknown_plan_is_sent_completely(plan: Plan) -> None:
     back = PlanStore().loaded(PlanNames().dumped(plan))
     assert np.array_equal(back.end, plan.end)
 
 
-def test_old_ones_are_forgotten(plan: Plan) -> None:
+def test_old_plans_are_forgotten(plan: Plan) -> None:
     names, plans = PlanNames(), PlanStore()
-    each = [pickle.loads(pickle.dumps(plan)) for _ in range(KEPT_HERE + 1)]
+    each = [pickle.loads(pickle.dumps(plan)) for _ in range(MAX_NAMED_PLANS + 1)]
     for number, one in enumerate(each):
         plans.note(number, one)
         names.note(number, one)
@@ -53,7 +53,7 @@ def solid(key: str) -> Solid:
     return Solid(key, (1.0, 1.0, 1.0), np.random.default_rng(1).normal(size=(64, 3)))
 
 
-def test_a_solid_goes_whole_once_and_then_as_its_key() -> None:
+def test_solid_is_sent_completely_once_and_then_as_its_key() -> None:
     names, plans = PlanNames(), PlanStore()
     one, other = solid("one"), solid("other")
     first = plans.loaded(names.dumped([one, other, one]))
@@ -64,7 +64,7 @@ def test_a_solid_goes_whole_once_and_then_as_its_key() -> None:
     assert len(data) < 200 < len(pickle.dumps(one))
     again = plans.loaded(data)
     assert again == [first[1], first[0]]
-    # One that was away comes whole again, so that neither end remembers without end.
+    # A solid that was absent is sent completely again, so that both memories stay bounded.
     plans.loaded(names.dumped([one]))
     (back,) = plans.loaded(names.dumped([other]))
     np.testing.assert_array_equal(back.corners, other.corners)

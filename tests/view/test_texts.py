@@ -97,8 +97,8 @@ def test_gap_is_reported_with_the_axis_and_the_leap(state: State) -> None:
         Finding(Reason.POSITION_CHANGED, 0.0123),
     )
     assert sentence(held) == (
-        "Axis 4 would have to leap 68° to follow: drag another way round, or choose the pose under "
-        "Branches; position gives way by 12 mm."
+        "Axis 4 would have to leap 68° to follow: drag along another path, or choose the pose "
+        "under Branches; position gives way by 12 mm."
     )
     assert headline(held) == STATUS[Status.GAP]
 

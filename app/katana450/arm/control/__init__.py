@@ -1,1 +1,4 @@
-"""What the arm is told, and what it makes of it. Pure: no I/O, no clock, no thread, no log."""
+"""Rules of the arm: commands, states and the step between them.
+
+Pure: no I/O, no clock, no thread, no log.
+"""

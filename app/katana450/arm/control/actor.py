@@ -9,14 +9,14 @@ from katana450.arm.control.lease import Person, Role
 
 
 class CommandChannel(Enum):
-    """Where a command was given."""
+    """Channel by which a command was given."""
 
     PAGE = "page"
     """The control socket of a page: bar, jog keys, instruments."""
     SCENE = "scene"
     """viser: handles, panels and ghosts."""
     API = "api"
-    """A program of somebody, by WebSocket, TCP or HTTP."""
+    """A program that uses the API, by WebSocket, TCP or HTTP."""
     PROGRAM = "program"
     """A script that the server runs."""
     SERVER = "server"
@@ -24,7 +24,7 @@ class CommandChannel(Enum):
 
 
 class Grounds(Enum):
-    """Why a command was accepted."""
+    """Reason for which a command was accepted."""
 
     LEASE = "holds the lease"
     FREE_LEASE = "took the free lease"
@@ -39,9 +39,9 @@ class Actor:
 
     Attributes:
         person: the identity, to which the lease is given.
-        channel: where the command was given.
-        seen: number of revocations (``CommandGate.revocations``) when the gesture was received, or
-            that an API program knows of; None for a command that is handled on receipt.
+        channel: the channel of the command.
+        seen: number of revocations (``CommandGate.revocations``) at the time of the gesture, or the
+            number that an API program knows; None for a command that is handled on receipt.
         grounds: why the command was accepted; None until ``CommandGate`` has accepted it.
     """
 

@@ -1,4 +1,4 @@
-"""How links and objects are shown where that is not as they are made. Nothing moves by it."""
+"""Appearance of links and objects where it differs from how they are made; no joint moves."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import finite_array
 
 MAX_CHANGED_PARTS = 256
-"""Parts at a time that look otherwise than they are made."""
+"""Maximum number of parts whose appearance is changed."""
 
 MAX_NAME_LENGTH = 100
 
 Colour = tuple[float, float, float]
-"""Red, green and blue in sRGB, 0..1."""
+"""Red, green and blue in sRGB, each from 0 to 1."""
 
 
 class DisplayMode(Enum):
-    """What is shown of a part, as the Switch of its VRML file counts it."""
+    """The display of a part, numbered as the Switch of its VRML file."""
 
     HIDDEN = -1
     MADE = 0
-    """What it is made of."""
+    """In the materials that it is made of."""
     PAINTED = 1
-    """All of it in one colour."""
+    """In one colour."""
 
 
 class AppearanceTrait(Enum):
-    """What can be changed."""
+    """A trait of the appearance that can be changed."""
 
     CHOICE = "choice"
     COLOUR = "colour"
@@ -37,12 +37,12 @@ class AppearanceTrait(Enum):
 
 @dataclass(frozen=True)
 class LinkAppearance:
-    """Of one part.
+    """Appearance of one part.
 
     Attributes:
-        choice: what is shown of it.
-        colour: of its paint; None for that of most of what it is made of.
-        transparency: of its paint: 0 lets nothing through, 1 everything.
+        choice: the display of the part.
+        colour: colour of its paint; None for the colour of most of its material.
+        transparency: of its paint, from 0 (opaque) to 1 (invisible).
     """
 
     choice: DisplayMode = DisplayMode.MADE
@@ -52,10 +52,10 @@ class LinkAppearance:
     def having(
         self, trait: AppearanceTrait, value: float | tuple[float, ...] | None
     ) -> LinkAppearance:
-        """With one ``trait`` changed: None for as it is made.
+        """Return the appearance with one ``trait`` changed; the value None restores how it is made.
 
-        Who changes the paint wants to see it, unless the part is hidden; without a paint of its
-        own left it is shown as it is made. Raises InputError.
+        A change of the paint also shows the paint, unless the part is hidden. A part whose paint is
+        restored completely is shown as it is made. Raises InputError for an invalid value.
         """
         match trait:
             case AppearanceTrait.CHOICE:
@@ -77,30 +77,34 @@ AS_MADE = LinkAppearance()
 
 @dataclass(frozen=True)
 class Appearance:
-    """Of all parts: ``changed`` has name and look of those that do not look as they are made."""
+    """Appearance of all parts.
+
+    Attributes:
+        changed: name and appearance of each part that does not look as it is made.
+    """
 
     changed: tuple[tuple[str, LinkAppearance], ...] = ()
 
     def of(self, name: str) -> LinkAppearance:
-        """That of the link or object ``name``."""
-        return next((look for each, look in self.changed if each == name), AS_MADE)
+        """Return the appearance of the link or object ``name``."""
+        return next((appearance for each, appearance in self.changed if each == name), AS_MADE)
 
     def having(
         self, name: str, trait: AppearanceTrait, value: float | tuple[float, ...] | None
     ) -> Appearance:
-        """The same but for one trait of ``name``; see ``LinkAppearance.having``.
+        """Return the appearance with one trait of ``name`` changed; see ``LinkAppearance.having``.
 
-        As they are when MOST look otherwise already.
+        Returns the same if MAX_CHANGED_PARTS other parts are changed already.
         """
         others = self.without(name)
-        look = self.of(name).having(trait, value)
-        if look == AS_MADE:
+        appearance = self.of(name).having(trait, value)
+        if appearance == AS_MADE:
             return others
-        room = len(others.changed) < MAX_CHANGED_PARTS
-        return Appearance((*others.changed, (name, look))) if room else self
+        has_room = len(others.changed) < MAX_CHANGED_PARTS
+        return Appearance((*others.changed, (name, appearance))) if has_room else self
 
     def without(self, name: str) -> Appearance:
-        """With ``name`` as it is made."""
+        """Return the appearance with ``name`` as it is made."""
         return Appearance(tuple(each for each in self.changed if each[0] != name))
 
 
@@ -112,7 +116,7 @@ def _choice(value: object) -> DisplayMode:
         return DisplayMode(value)
     except ValueError:
         raise InputError(
-            f"A choice is -1 for hidden, 0 for as it is made, 1 for painted, not {value!r}."
+            f"A choice must be -1 for hidden, 0 for as made or 1 for painted, not {value!r}."
         ) from None
 
 
@@ -124,5 +128,5 @@ def _colour(value: object) -> Colour:
 def _fractions(what: str, value: object, size: int) -> list[float]:
     fractions: list[float] = finite_array(value, (size,), what).tolist()  # type: ignore[arg-type]
     if not all(0.0 <= fraction <= 1.0 for fraction in fractions):
-        raise InputError(f"{what} has numbers from 0 to 1, not {fractions}.")
+        raise InputError(f"{what} must have numbers from 0 to 1, not {fractions}.")
     return fractions

@@ -1,4 +1,4 @@
-"""The arm as the controller knows it: a kinematic chain, its tools and its gripper."""
+"""Model of the arm for the session: a kinematic chain, its tool frames and its gripper."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from katana450.maths.motion.limiter import Limits
 
 @dataclass(frozen=True)
 class GripperModel:
-    """The driven finger joint: limits [rad], greatest speed [rad/s]; ``lower`` is closed.
+    """The driven finger joint: limits [rad] and maximum speed [rad/s]; ``lower`` is closed.
 
-    Where it slides, its numbers are in m and m/s. That of an arm without fingers has nowhere to go.
+    The numbers of a sliding joint are in m and m/s. An arm without fingers has an empty range.
     """
 
     lower: float
@@ -26,20 +26,20 @@ class GripperModel:
 
     @property
     def moves(self) -> bool:
-        """Whether there is anything to open."""
+        """True if the finger joint has a range."""
         return self.lower < self.upper
 
     def clamp(self, value: float) -> float:
-        """The nearest to ``value`` [rad or m] inside the limits."""
+        """Return the value inside the limits that is nearest to ``value`` [rad or m]."""
         return min(max(value, self.lower), self.upper)
 
 
 SPEED_RISE_TIME = 0.9
-"""[s] Until a joint runs at its greatest speed, as the Katana's own controllers have it at the
-quicker of their two settings."""
+"""[s] Time until a joint reaches its maximum speed, as in the faster of the two settings of the
+Katana's own controllers."""
 
 ACCELERATION_RISE_TIME = 0.1
-"""[s] Until it accelerates as it may."""
+"""[s] Time until a joint reaches its maximum acceleration."""
 
 NO_GRIPPER = GripperModel(0.0, 0.0, 0.0)
 
@@ -53,7 +53,7 @@ class ArmModel:
         tools: home configuration M, (4, 4) in {S}, of each named tool frame.
         default_tool: a key of ``tools``.
         gripper: the finger joint, or ``NO_GRIPPER``.
-        acceleration, jerk: (n,) the most of each joint [rad/s^2, rad/s^3]; None where nobody says.
+        acceleration, jerk: (n,) maximum of each joint [rad/s^2, rad/s^3]; None if unknown.
     """
 
     chain: Chain
@@ -65,23 +65,23 @@ class ArmModel:
 
     @property
     def slides(self) -> tuple[bool, ...]:
-        """(n,) whether each joint is prismatic: none is."""
+        """Flags (n,) of the prismatic joints: all False."""
         return (False,) * self.chain.n
 
     @cached_property
     def limits(self) -> Limits:
-        """Of the joints' motion, gentle where nobody says."""
+        """Limits of the joints' motion; gentle defaults where the model gives no value."""
         chain = self.chain
         gentle = limits_of(chain.lower, chain.upper, chain.speed, self.acceleration)
         return gentle if self.jerk is None else replace(gentle, jerk=self.jerk)
 
     @cached_property
     def chains(self) -> Mapping[str, Chain]:
-        """The same joints once for each tool."""
+        """The chain to each tool, by the name of the tool."""
         return {name: self.chain.with_tool(M) for name, M in self.tools.items()}
 
     def chain_to(self, tool: str) -> Chain:
-        """The chain that ends in ``tool``; InputError names the tools there are."""
+        """Return the chain that ends in ``tool``. Raises InputError with the names of all tools."""
         try:
             return self.chains[tool]
         except (KeyError, TypeError):
@@ -92,6 +92,9 @@ class ArmModel:
 def limits_of(
     lower: FloatArray, upper: FloatArray, speed: FloatArray, acceleration: FloatArray | None = None
 ) -> Limits:
-    """Gentle ones of joints whose own, (n,) each, say no more."""
+    """Return the limits of joints; gentle defaults where no acceleration is given.
+
+    lower, upper: (n,) [rad or m]. speed, acceleration: (n,) in the units of these per s and s^2.
+    """
     acceleration = speed / SPEED_RISE_TIME if acceleration is None else acceleration
     return Limits(lower, upper, speed, acceleration, acceleration / ACCELERATION_RISE_TIME)

@@ -1,4 +1,4 @@
-"""The branches a person can choose from: where each would take the arm, and what it gives up."""
+"""The branches that a person can choose from: where each takes the arm, and at what loss."""
 
 from __future__ import annotations
 
@@ -21,27 +21,35 @@ from katana450.maths.kinematics.tracker import leap
 
 @dataclass(frozen=True, eq=False)
 class BranchOption:
-    """A branch to take. contact: what the arm would meet at its end; None when nothing."""
+    """A branch that the arm can change to.
+
+    Attributes:
+        metrics: its posture, cost and distance from a singularity.
+        contact: the contact that the arm would have at its end; None if there is none.
+    """
 
     metrics: BranchMetrics
     contact: Contact | None
 
 
 def current_target(arm: ArmModel, state: State) -> ToolTarget:
-    """The five numbers that a drag starts from: those last wished, else those of the goal."""
+    """Return the target that a drag starts from: the present tool target, or that of the goal."""
     if isinstance(state.target, ToolTarget):
         return state.target
     return ToolTarget.at(arm.chain_to(state.tool), state.goal)
 
 
 def target_on_branch(arm: ArmModel, state: State, branch: Branch) -> ToolTarget:
-    """The same wish in the numbers of ``branch``, whose plane may face the other way."""
+    """Return the present target in the numbers of ``branch``.
+
+    The plane of another branch may face the other way.
+    """
     same = branch.shoulder == state.branch.shoulder
     return current_target(arm, state) if same else current_target(arm, state).turned_round()
 
 
 def branch_option(arm: ArmModel, state: State, branch: Branch) -> Projection:
-    """Where ``branch`` has the tool as it is wished, as near as the limits allow there."""
+    """Return the posture on ``branch`` whose tool is nearest to the target inside the limits."""
     chain = arm.chain_to(state.tool)
     if isinstance(state.target, PoseTarget):
         T = state.target.T
@@ -52,9 +60,9 @@ def branch_option(arm: ArmModel, state: State, branch: Branch) -> Projection:
 def branch_options(
     arm: ArmModel, state: State, world: CollisionWorld | None = None
 ) -> tuple[BranchOption, ...]:
-    """The choice on each of BRANCHES, seen from where the arm is.
+    """Return one option for each of BRANCHES, measured from where the arm is.
 
-    world: what must not be touched; without one nothing is said of contacts.
+    world: the collision world; without one no contacts are reported.
     """
     chain = arm.chain_to(state.tool)
     found = [
@@ -66,6 +74,9 @@ def branch_options(
 
 
 def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> Contact | None:
-    """The two parts that are too near to each other with the joints at ``q`` (n,) [rad]."""
+    """Return the two parts that are too near to each other with the joints at ``q`` (n,) [rad].
+
+    gripper: the finger joint [rad or m].
+    """
     nearest = None if world is None else world.nearest(np.append(q, gripper))
     return nearest if nearest is not None and nearest.distance < STOP else None

@@ -1,4 +1,4 @@
-"""What a command is made of, checked: numbers and vectors of numbers."""
+"""Checks of the numbers and vectors in commands."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
 def check_finite(what: str, value: object) -> None:
-    """InputError for what is no finite number; ``what`` says what it should have been."""
+    """Raise InputError unless ``value`` is a finite number; ``what`` names it in the message."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{what} has to be a finite number, not {value!r}.")
+        raise InputError(f"{what} must be a finite number, not {value!r}.")
 
 
 def vector(what: str, value: object, size: int | None) -> FloatArray:
-    """A copy of ``value`` (size,) that cannot be written to; any size above 0 where that is None.
+    """Return a read-only copy of ``value`` (size,); any size above 0 if ``size`` is None.
 
-    Raises InputError for another shape and for what is not finite; ``what`` says what it is.
+    Raises InputError for another shape and for numbers that are not finite; ``what`` names the
+    vector in the message.
     """
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"{what} has to be a list of numbers, not {value!r}.") from None
+        raise InputError(f"{what} must be a list of numbers, not {value!r}.") from None
     if array.ndim != 1 or array.size == 0 or (size is not None and array.size != size):
-        wanted = "a flat list" if size is None else f"{size} numbers"
-        raise InputError(f"{what} has to be {wanted}, not an array of shape {array.shape}.")
+        expected = "a flat list" if size is None else f"{size} numbers"
+        raise InputError(f"{what} must be {expected}, not an array of shape {array.shape}.")
     if not np.isfinite(array).all():
-        raise InputError(f"{what} has to be finite: {array.tolist()}.")
+        raise InputError(f"{what} must be finite, not {array.tolist()}.")
     return frozen(array)

@@ -1,4 +1,4 @@
-"""Checks of commands against the robot, before they are taken: what it cannot even be asked."""
+"""Checks of commands against the robot, before they are executed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from katana450.arm.control.scene_objects import Attachment, Environment, SceneOb
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.errors import InputError
 
-NO_HAND = "This arm's contacts are not looked at, so nothing can be fixed to its hand."
+NO_HAND = "This arm has no collision checking, so nothing can be fixed to its hand."
 
 
 def check_joints(joints: JointSet, command: cmd.Command) -> None:
-    """Raise InputError if a robot with ``joints`` and no arm cannot be asked for ``command``."""
+    """Raise InputError if a robot with ``joints`` and no arm does not support ``command``."""
     match command:
         case cmd.Batch(commands=commands):
             for each in commands:
@@ -32,7 +32,7 @@ def check_joints(joints: JointSet, command: cmd.Command) -> None:
 def check(
     arm: ArmModel, pouring: Pouring | None, environment: Environment, command: cmd.Command
 ) -> None:
-    """Refuse, with an InputError for the sender, what this arm cannot even be asked."""
+    """Raise InputError if ``arm`` and its environment do not support ``command``."""
     n = arm.chain.n
     match command:
         case cmd.AxisCommand():
@@ -41,13 +41,13 @@ def check(
             for each in commands:
                 check(arm, pouring, environment, each)
         case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
-            raise InputError(f"This arm has {n} joints, the command {q.size}.")
+            raise InputError(f"This arm has {n} joints, but the command has {q.size}.")
         case cmd.SetTool(name=name):
             arm.chain_to(name)
         case cmd.Follow(plan=plan):
             chains = [segment.path.chain for segment in plan.segments]
             if any(not np.array_equal(chain.S, arm.chain.S) for chain in chains):
-                raise InputError("The plan was made for another arm.")
+                raise InputError("The plan was made for another arm: plan it for this one.")
         case _:
             _check_objects(pouring, environment, command)
 

@@ -1,7 +1,7 @@
-"""Everything a person, a script or a program can ask of the arm.
+"""All commands that a person, a script or a program can give to the arm.
 
-A command is a value. It is checked when it is made, so whatever reaches the session is finite and
-of the right shape; whether the arm can do it is the session's to judge.
+A command is a value. It is checked when it is made, so every number in it is finite and every
+array has the right shape. The session judges whether the arm can execute it.
 """
 
 from __future__ import annotations
@@ -83,12 +83,12 @@ __all__ = [
 ]
 
 MIN_SPEED = 0.01
-"""A fraction below this is a hold, for which there are Pause and Stop."""
+"""Minimum fraction of speed. For a slower motion there are Pause and Stop."""
 
 
 @dataclass(frozen=True, eq=False)
 class MoveTool(BaseCommand):
-    """Bring the tool point to ``position``, (3,) [m] in {S}; pitch and roll stay as wished."""
+    """Bring the tool point to ``position``, (3,) [m] in {S}; its target pitch and roll stay."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True)
 
@@ -100,7 +100,7 @@ class MoveTool(BaseCommand):
 
 @dataclass(frozen=True)
 class TurnTool(BaseCommand):
-    """Give the tool a pitch and a roll [rad]; its position stays as wished.
+    """Give the tool a pitch and a roll [rad]; its target position stays.
 
     ``pitch`` is the angle of the tool below the horizontal, theta2 + theta3 + theta4, and ``roll``
     the turn about the tool's own axis, theta5: the two rotations a 5-axis arm is free to choose.
@@ -130,7 +130,7 @@ class SetPose(BaseCommand):
 
 @dataclass(frozen=True)
 class Nudge(AxisCommand):
-    """Drive one joint on by the relative angle ``by`` [rad]; ``axis`` counts from 0.
+    """Move one joint by the relative angle ``by`` [rad]; ``axis`` counts from 0.
 
     The angle counts from the joint's goal, so that several in a row add up. The limits of the joint
     limit it.
@@ -145,6 +145,7 @@ class Nudge(AxisCommand):
         SetJoint(self.axis, self.by)
 
     def targets(self, goal: FloatArray) -> FloatArray:
+        """Return ``goal`` (n,) [rad] with the angle of one joint changed by ``by``."""
         return frozen(goal + with_axes(np.zeros(goal.size), ((self.axis, self.by),)))
 
 
@@ -162,7 +163,7 @@ class SetGripper(BaseCommand):
 
 @dataclass(frozen=True)
 class SetTool(BaseCommand):
-    """From now on targets and read-outs are of the tool frame ``name``; nothing moves."""
+    """Select the tool frame ``name`` for targets and read-outs; nothing moves."""
 
     traits: ClassVar[CommandTraits] = CommandTraits()
 
@@ -171,8 +172,9 @@ class SetTool(BaseCommand):
 
 @dataclass(frozen=True)
 class SetPriority(BaseCommand):
-    """From now on ``priority`` says which numbers of a target count; the one there is, is
-    reread.
+    """Select the part of a target that is kept when five axes cannot satisfy all of it.
+
+    A present target of the tool is projected again.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits()
@@ -182,12 +184,12 @@ class SetPriority(BaseCommand):
     def __post_init__(self) -> None:
         if self.priority not in tuple(Priority):
             known = ", ".join(f"Priority.{priority.name}" for priority in Priority)
-            raise InputError(f"A reading is one of {known}, not {self.priority!r}.")
+            raise InputError(f"A priority must be one of {known}, not {self.priority!r}.")
 
 
 @dataclass(frozen=True)
 class TakeBranch(BaseCommand):
-    """Go for the wished pose on ``branch``, however far that is: the same tool, another arm."""
+    """Change to ``branch`` at the present target of the tool, however far that is."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(planned=True)
 
@@ -196,7 +198,7 @@ class TakeBranch(BaseCommand):
     def __post_init__(self) -> None:
         if self.branch not in BRANCHES:
             known = ", ".join(str(branch) for branch in BRANCHES)
-            raise InputError(f"A branch is one of {known}, not {self.branch!r}.")
+            raise InputError(f"A branch must be one of {known}, not {self.branch!r}.")
 
 
 @dataclass(frozen=True)
@@ -222,7 +224,7 @@ class GoToZero(BaseCommand):
 
 @dataclass(frozen=True)
 class Hold(BaseCommand):
-    """Come to rest and forget the targets of arm and gripper."""
+    """Come to rest and drop the targets of arm and gripper."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
 
@@ -238,28 +240,28 @@ class Stop(BaseCommand):
 
 @dataclass(frozen=True)
 class ClearStop(BaseCommand):
-    """Accept motion again after a stop. Nothing moves by this."""
+    """Accept motion again after a stop; nothing moves."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
 
 @dataclass(frozen=True)
 class Pause(BaseCommand):
-    """Come to rest on the way, and keep the goal."""
+    """Come to rest on the path, and keep the goal."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True)
 class Resume(BaseCommand):
-    """Go on to the goal there is."""
+    """Continue to the present goal."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(pacing=True, supersedes=False, joints_only=True)
 
 
 @dataclass(frozen=True, eq=False)
 class Follow(BaseCommand):
-    """Follow ``plan`` from its start, where the arm has to stand, to its end."""
+    """Follow ``plan`` to its end; the arm has to stand at its start."""
 
     traits: ClassVar[CommandTraits] = CommandTraits()
 
@@ -267,14 +269,12 @@ class Follow(BaseCommand):
 
     def __post_init__(self) -> None:
         if not isinstance(self.plan, Plan):
-            raise InputError(f"What is to be followed is a plan, not {self.plan!r}.")
+            raise InputError(f"`plan` must be a Plan, not {self.plan!r}.")
 
 
 @dataclass(frozen=True)
 class GoAlong(BaseCommand):
-    """Go on or back along the plan that is followed, to ``fraction`` of it: 0 its start, 1 its
-    end.
-    """
+    """Continue or go back on the plan to ``fraction`` of it: 0 is its start, 1 its end."""
 
     traits: ClassVar[CommandTraits] = CommandTraits()
 
@@ -283,12 +283,15 @@ class GoAlong(BaseCommand):
     def __post_init__(self) -> None:
         check_finite("The fraction of the plan", self.fraction)
         if not 0.0 <= self.fraction <= 1.0:
-            raise InputError(f"The fraction of the plan is from 0 to 1, not {self.fraction}.")
+            raise InputError(f"The fraction of the plan must be from 0 to 1, not {self.fraction}.")
 
 
 @dataclass(frozen=True)
 class SpeedScale(BaseCommand):
-    """From now on no joint and no tool is faster than ``value`` of its most, above 0 up to 1."""
+    """Limit the speed of every joint and of the tool to the fraction ``value`` of its maximum.
+
+    value: from MIN_SPEED to 1.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits(
         pacing=True, while_stopped=True, supersedes=False, passive=True, joints_only=True
@@ -299,14 +302,15 @@ class SpeedScale(BaseCommand):
     def __post_init__(self) -> None:
         check_finite("The speed", self.value)
         if not MIN_SPEED <= self.value <= 1.0:
-            raise InputError(f"The speed is a fraction from {MIN_SPEED} to 1, not {self.value}.")
+            raise InputError(f"The speed must be from {MIN_SPEED} to 1, not {self.value}.")
 
 
 @dataclass(frozen=True, eq=False)
 class Jog(BaseCommand):
     """Move at ``rates`` (5,) for JOG_TIME: vx, vy, vz [m/s] along ``frame``, pitch, roll [rad/s].
 
-    Sent again and again while a hand holds on; when it does not come the arm comes to rest.
+    A client sends it repeatedly while a key, pad or stick is held. Without another one the arm
+    comes to rest.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(while_paused=False)
@@ -317,12 +321,14 @@ class Jog(BaseCommand):
     def __post_init__(self) -> None:
         object.__setattr__(self, "rates", vector("The jog", self.rates, 5))
         if not isinstance(self.frame, JogFrame):
-            raise InputError(f"A jog is along JogFrame.BASE or JogFrame.TOOL, not {self.frame!r}.")
+            raise InputError(
+                f"The frame of a jog must be JogFrame.BASE or JogFrame.TOOL, not {self.frame!r}."
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class Batch(BaseCommand):
-    """Several commands in one tick: all of them, or none if one is invalid."""
+    """Execute several commands in one tick: all of them, or none if one is invalid."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
 
@@ -334,6 +340,7 @@ class Batch(BaseCommand):
 
     @property
     def parts(self) -> tuple[BaseCommand, ...]:
+        """The commands of the batch."""
         return self.commands
 
 

@@ -1,4 +1,4 @@
-"""Why the arm does not do what was wished: an entry for every change, to be read afterwards."""
+"""Entries of the event log: each finding that begins or ends, as a difference of two states."""
 
 from __future__ import annotations
 
@@ -10,11 +10,15 @@ from katana450.arm.control.state import Finding, Reason, State
 
 @dataclass(frozen=True)
 class LogEntry:
-    """One reason, when it began to hold the arm back or slow it, and what the numbers were.
+    """The begin or the end of one finding, with the numbers it had then.
 
-    t: [s] on the clock of the states. began: whether it came; otherwise it is over. actor: the
-    giver of the newest command then; None before the first one, and where the control loop acted
-    by itself. command: the class of that command.
+    Attributes:
+        t: time [s] on the clock of the states.
+        finding: the finding.
+        began: True if the finding began; False if it ended.
+        actor: the giver of the newest command at that time; None before the first command, and
+            where the control loop acted by itself.
+        command: name of the class of that command.
     """
 
     t: float
@@ -27,19 +31,19 @@ class LogEntry:
 def entries_between(
     before: State, after: State, actor: Actor | None = None, command: str = ""
 ) -> tuple[LogEntry, ...]:
-    """What ``after`` is held back by that ``before`` was not, and what of that is over.
+    """Return the entries for findings of ``before`` that ended and of ``after`` that began.
 
-    A reason that stays is no news, whatever its number does meanwhile. ``actor``, ``command``:
-    see ``LogEntry``.
+    A finding that stays makes no entry, even if its amount changes. ``actor`` and ``command``
+    go into the entries; see ``LogEntry``.
     """
     old, new = ({_key(finding) for finding in state.findings} for state in (before, after))
-    came = tuple(
+    began = tuple(
         LogEntry(after.t, f, True, actor, command) for f in after.findings if _key(f) not in old
     )
-    went = tuple(
+    ended = tuple(
         LogEntry(after.t, f, False, actor, command) for f in before.findings if _key(f) not in new
     )
-    return (*went, *came)
+    return (*ended, *began)
 
 
 def _key(finding: Finding) -> tuple[Reason, int | None, tuple[str, str] | None]:

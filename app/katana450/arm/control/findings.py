@@ -1,4 +1,4 @@
-"""Why the goal is not what was wished: reasons with numbers, in the order a person needs them."""
+"""Findings: the reasons with numbers why the goal is not the target, most useful first."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from katana450.maths.kinematics.velocity import limit_distances, limited_jog
 from katana450.maths.motion.limiter import Limits
 
 MIN_JOG_FRACTION = 0.05
-"""Fraction of a jog that does not move the tool to speak of."""
+"""Fraction of a jog below which the tool does not move noticeably."""
 
 FULL_JOG_FRACTION = 0.9
-"""Fraction of a jog from which on nothing is missed."""
+"""Fraction of a jog above which no loss is reported."""
 
-AT_LIMIT = math.radians(0.5)
-"""A joint so near to its limit holds a jog up."""
+LIMIT_DISTANCE = math.radians(0.5)
+"""[rad] Distance to a limit within which a joint holds up a jog."""
 
 
 def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[Finding, ...]:
-    """What clamping ``q`` (n,) [rad or m] to the limits takes away.
+    """Return a finding for each joint of ``q`` (n,) [rad or m] that is beyond a limit.
 
     slides: (n,) whether each joint is prismatic.
     """
@@ -40,7 +40,7 @@ def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[
         q < limits.lower - tolerances.LIMIT_SLACK,
         q > limits.upper + tolerances.LIMIT_SLACK,
     )
-    # A slider at its end is there through degrees and back, and asks for nothing beyond.
+    # A slider at its end is converted to degrees and back: the slack covers the rounding.
     return tuple(
         Finding(
             Reason.SLIDE_LIMIT if slides[axis] else Reason.AXIS_LIMIT,
@@ -54,7 +54,10 @@ def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[
 def of_projection(
     chain: Chain, best: Projection, priority: Priority, *, yaw_was_given: bool
 ) -> tuple[Finding, ...]:
-    """What the nearest feasible pose ``best`` gives up of the wished one."""
+    """Return the findings on what the nearest feasible pose ``best`` loses of the target.
+
+    yaw_was_given: whether the target has a yaw, whose loss is reported.
+    """
     findings = []
     in_place = best.position_error <= POSITION_WORTH_TELLING
     pitch_gave_way, roll_error = best.pitch_error > ANGLE_WORTH_TELLING, best.roll_error
@@ -84,12 +87,15 @@ def of_projection(
 
 
 def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
-    """What keeps a jog with the twist ``V`` (6,) in {S} from going on at ``q`` (n,) [rad]."""
+    """Return the findings on what stops a jog at ``q`` (n,) [rad].
+
+    V: twist (6,) of the jog in {S} [rad/s, m/s].
+    """
     if limited_jog(chain, q, V) < MIN_JOG_FRACTION:
         return (Finding(Reason.SINGULAR),)
-    near = limit_distances(chain, q) <= AT_LIMIT
-    # Looked at only where it matters: a tick has other things to do.
-    if not near.any() or limited_jog(chain, q, V, AT_LIMIT) > FULL_JOG_FRACTION:
+    near = limit_distances(chain, q) <= LIMIT_DISTANCE
+    # Computed only near a limit, to keep the tick short.
+    if not near.any() or limited_jog(chain, q, V, LIMIT_DISTANCE) > FULL_JOG_FRACTION:
         return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(
@@ -99,16 +105,19 @@ def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
 
 
 def of_tracked(chain: Chain, tracked: Tracked, priority: Priority) -> tuple[Finding, ...]:
-    """What following a drag gives up; first of all the leap that it does not make."""
-    given_up = of_projection(chain, tracked.best, priority, yaw_was_given=False)
+    """Return the findings on what following a drag loses.
+
+    The leap across a gap, which a drag never makes, comes first.
+    """
+    losses = of_projection(chain, tracked.best, priority, yaw_was_given=False)
     if tracked.beyond_gap is None:
-        return given_up
+        return losses
     axis, leap = tracked.leap_ahead()
     held = Finding(Reason.ACROSS_GAP, leap, axis)
     if tracked.beyond_gap.position_error <= POSITION_WORTH_TELLING:
-        # Out of reach is what the arm cannot do at all.
-        given_up = tuple(
+        # The target beyond the gap can be reached, so it is not out of reach.
+        losses = tuple(
             replace(f, reason=Reason.POSITION_CHANGED) if f.reason is Reason.OUT_OF_REACH else f
-            for f in given_up
+            for f in losses
         )
-    return (held, *given_up)
+    return (held, *losses)

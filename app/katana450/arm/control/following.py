@@ -1,4 +1,4 @@
-"""A plan under way: the setpoint is on it, and one number says where."""
+"""A plan under way: the setpoint is on the plan, at a place given by one number."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from katana450.maths.planning.plan import Plan, Segment
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """Where on a plan the arm is, and where along it it goes.
+    """Place of the arm on a plan, and the place that it moves to.
 
-    It is a mode of the session: the goal is where the plan ends, or another place on it.
+    It is a mode of the session: the goal is the end of the plan, or another place on it.
 
     Attributes:
-        plan: what is followed.
-        number: of the segment the arm is on, from 0.
+        plan: the plan.
+        number: index of the segment that the arm is on, from 0.
         pace: tau in that segment [s], and its first two derivatives by time, (1,) each.
-        towards: tau of the plan to come to rest at [s]: its end, its start for the way back, or any
-            in between.
+        towards: tau of the plan at which the arm comes to rest [s]: its end, its start when the arm
+            goes back, or any value between.
     """
 
     plan: Plan
@@ -32,22 +32,25 @@ class Following:
 
     @staticmethod
     def begin(plan: Plan) -> Following:
-        """At the start of ``plan``, about to follow it to its end."""
+        """Return the place at the start of ``plan``, with its end as the next place of rest."""
         return Following(plan, 0, JointMotion.rest(np.zeros(1)), plan.span)
 
     @property
     def segment(self) -> Segment:
-        """The one the arm is on."""
+        """The segment that the arm is on."""
         return self.plan.segments[self.number]
 
     @property
     def local(self) -> float:
-        """Tau in that segment [s]."""
+        """Tau in the present segment [s]."""
         return float(self.pace.q[0])
 
     @property
     def aim(self) -> float:
-        """Tau in that segment to come to rest at next: its end where the way leads beyond it."""
+        """Tau at which the arm next comes to rest in the present segment [s].
+
+        It is the end or the start of the segment if the path leads beyond it.
+        """
         begin, end = self.plan.begins[self.number : self.number + 2]
         span = self.segment.scaling.span
         if self.towards >= end:
@@ -56,45 +59,45 @@ class Following:
 
     @property
     def tau(self) -> float:
-        """Where the arm is on the plan [s]."""
+        """Tau of the arm on the whole plan [s]."""
         return self.plan.begins[self.number] + self.local
 
     @property
     def fraction(self) -> float:
-        """How much of the plan lies behind the arm, from 0 to 1."""
+        """Fraction of the plan that the arm has completed, from 0 to 1."""
         return min(self.tau / self.plan.span, 1.0)
 
     @property
     def goal(self) -> FloatArray:
-        """(5,) the joints where it comes to rest [rad]."""
+        """Joint angles (5,) at which the arm comes to rest [rad]."""
         if self.towards <= 0.0:
             return self.plan.start
         return self.plan.end if self.towards >= self.plan.span else self.plan.q(self.towards)
 
     @property
     def there(self) -> bool:
-        """Whether it is at rest where it was to go."""
+        """True if the arm is at rest at its place of rest."""
         return self.pace.at_rest and self.local == self.aim and self._beyond == 0
 
     @property
     def _beyond(self) -> int:
-        """Whether the aim lies in a later segment (1), an earlier one (-1) or this (0)."""
+        """Return 1 if the aim is in a later segment, -1 if in an earlier one, else 0."""
         begin, end = self.plan.begins[self.number : self.number + 2]
         return int(self.towards > end) - int(self.towards < begin)
 
     def at(self, tau: float) -> Following:
-        """At rest at ``tau`` of the same segment [s]."""
+        """Return the place of rest at ``tau`` of the same segment [s]."""
         return replace(self, pace=JointMotion.rest(np.array([tau])))
 
     def turned_over(self) -> Following:
-        """On the next segment where the way leads beyond this one and it is done."""
+        """Return the place on the next segment if the present one is done and the path leads on."""
         if not self.pace.at_rest or self.local != self.aim or self._beyond == 0:
             return self
         after = replace(self, number=self.number + self._beyond)
         return after.at(0.0 if self._beyond > 0 else after.segment.scaling.span)
 
     def motion(self) -> JointMotion:
-        """The joints on the plan, and how they move."""
+        """Return the motion of the joints at this place."""
         if self.there:
             return JointMotion.rest(self.goal)
         moving = self.segment.at(self.local)

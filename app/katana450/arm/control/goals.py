@@ -24,14 +24,15 @@ from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
 
 START_TOLERANCE = 1e-6
-"""[rad] An arm that is no farther from the start of a plan stands there: no encoder tells it."""
+"""[rad] Distance from the start of a plan up to which the arm counts as standing there. It is below
+the resolution of any encoder."""
 
 MAX_SAMPLE_AGE = 0.1
-"""[s] A sample that says it came earlier than this before its tick was stamped by another clock."""
+"""[s] Age of a sample above which its time is ignored: it comes from another clock."""
 
 
 def with_mode(state: State, mode: Intent | Following) -> State:
-    """``state`` in ``mode``; an arm on a plan leaves the plan first."""
+    """Return ``state`` in ``mode``; an arm on a plan leaves the plan first."""
     along = state.following
     if along is None or isinstance(mode, Following):
         return replace(state, mode=mode)
@@ -44,28 +45,28 @@ def with_goal(
     findings: tuple[Finding, ...] = (),
     mode: Intent | Following | None = None,
 ) -> State:
-    """``state`` with ``goal`` (n,) for the reasons ``findings``, in ``mode``.
+    """Return ``state`` with ``goal`` (n,), the reasons ``findings`` for it, and ``mode``.
 
-    Without a mode it is positioning at the goal.
+    Without a mode the state is positioning at the goal.
     """
     kept = tuple(f for f in state.findings if f.reason in GRIPPER_LIMITS)
     pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
-    # A contact that the arm brakes for stays the reason, however often a goal is given meanwhile.
+    # The contact that the arm brakes for stays a finding when a new goal comes.
     met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
     aimed = replace(state, goal=goal, findings=pause + met + findings + kept)
     return with_mode(aimed, Positioning(JointTarget(goal)) if mode is None else mode)
 
 
 def without_finding(state: State, reason: Reason) -> State:
-    """``state`` with no finding of that ``reason``."""
+    """Return ``state`` without the findings of that ``reason``."""
     return replace(state, findings=tuple(f for f in state.findings if f.reason is not reason))
 
 
 def end_drag(state: State) -> State:
-    """``state`` after the end of a drag: the goal becomes the target.
+    """Return ``state`` after the end of a drag: the goal becomes the target.
 
-    An arm that waits before a contact stays where it is. The findings stay: they say why the handle
-    springs back.
+    An arm that waits before a contact stays where it is. The findings stay, because they explain
+    why the handle springs back.
     """
     match state.intent:
         case Tracking() as tracking:
@@ -78,22 +79,23 @@ def end_drag(state: State) -> State:
 
 
 def paused(state: State) -> State:
-    """``state`` that comes to rest on its way and keeps its goal."""
+    """Return ``state`` that comes to rest on its path and keeps its goal."""
     others = without_finding(state, Reason.PAUSED).findings
     return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *others))
 
 
 def resumed(state: State) -> State:
-    """``state`` that continues after a pause."""
+    """Return ``state`` that continues after a pause."""
     return without_finding(replace(state, paused=False), Reason.PAUSED)
 
 
 def with_stream_sample(
     state: State, aimed: State, command: Servo, acceleration: FloatArray
 ) -> State:
-    """``aimed``, which is ``state`` with the newest sample of a stream as its goal, in that stream.
+    """Return ``aimed`` in the mode of a stream that continues with the sample ``command``.
 
-    acceleration: (n,) the maximum of each joint.
+    state: the state before. aimed: ``state`` with the sample as its goal. acceleration: (n,) the
+    maximum of each joint.
     """
     t = state.t if command.t is None else command.t
     if state.servo is None:
@@ -103,7 +105,10 @@ def with_stream_sample(
 
 
 def with_time(command: Command, t: float) -> Command:
-    """``command`` in the tick at ``t`` [s]: a sample of a stream came then, unless it says when."""
+    """Return ``command`` for the tick at ``t`` [s].
+
+    A sample of a stream without a valid time of its own gets the time of the tick.
+    """
     if not isinstance(command, Servo) or (
         command.t is not None and 0.0 <= t - command.t < MAX_SAMPLE_AGE
     ):
@@ -112,29 +117,28 @@ def with_time(command: Command, t: float) -> Command:
 
 
 def follow_plan(chain: Chain, state: State, plan: Plan) -> State:
-    """``state`` that follows ``plan`` from here.
+    """Return ``state`` that follows ``plan`` from here.
 
-    Where the arm does not stand at the start nothing changes but the finding that says so.
+    If the arm does not stand at the start, the only change is a finding that reports it.
     """
-    off = np.abs(state.setpoint - plan.start)
-    if off.max() > START_TOLERANCE or not state.motion.at_rest:
-        axis = int(off.argmax())
+    distances = np.abs(state.setpoint - plan.start)
+    if distances.max() > START_TOLERANCE or not state.motion.at_rest:
+        axis = int(distances.argmax())
         others = without_finding(state, Reason.NOT_AT_START).findings
-        return replace(
-            state, findings=(*others, Finding(Reason.NOT_AT_START, float(off[axis]), axis))
-        )
+        finding = Finding(Reason.NOT_AT_START, float(distances[axis]), axis)
+        return replace(state, findings=(*others, finding))
     return _along(chain, state, Following.begin(plan))
 
 
 def move_along_plan(chain: Chain, state: State, fraction: float) -> State:
-    """``state`` that continues or goes back on its plan to ``fraction`` of it, from 0 to 1."""
+    """Return ``state`` that moves on its plan, forward or back, to ``fraction`` of it (0 to 1)."""
     assert isinstance(state.mode, Following)
     towards = fraction * state.mode.plan.span
     return _along(chain, state, replace(state.mode, towards=towards))
 
 
 def with_place(state: State, along: Following | None) -> State:
-    """``state`` at the place ``along`` on the plan it follows or is leaving."""
+    """Return ``state`` at the place ``along`` on the plan that it follows or is leaving."""
     if along is None or along is state.following:
         return state
     if isinstance(state.mode, Leaving):
@@ -143,6 +147,6 @@ def with_place(state: State, along: Following | None) -> State:
 
 
 def _along(chain: Chain, state: State, following: Following) -> State:
-    """``state`` with its goal where ``following`` ends."""
+    """Return ``state`` with its goal where ``following`` ends."""
     goal = following.goal
     return with_goal(replace(state, branch=branch_of(chain, goal)), goal, (), following)

@@ -1,4 +1,4 @@
-"""What the fingers feel: an object between both is held, and let go when they open."""
+"""Contact of the fingers: an object between both is held, and is let go when they open."""
 
 from __future__ import annotations
 
@@ -10,24 +10,25 @@ from katana450.arm.control.state import Finding, Reason, State
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
-TOUCHING = 3e-4
-"""[m] A finger that is no farther touches: as far as the sensors in the pads are soft."""
+TOUCH_DISTANCE = 3e-4
+"""[m] Distance up to which a finger touches: the sensors in the pads yield by as much."""
 
-CENTRED = 3e-3
-"""[m] When one finger touches and the other is no farther, the object slides between them."""
+CENTRING_DISTANCE = 3e-3
+"""[m] Distance of the second finger up to which the object slides to the middle when the first
+finger touches it."""
 
-OPENED_TURN, OPENED_SLIDE = 0.02, 1e-3
-"""[rad, m] By as much the fingers open before what they held is free: 1 mm at the pads."""
+RELEASE_TURN, RELEASE_SLIDE = 0.02, 1e-3
+"""[rad, m] Opening of the fingers from which on an object is free: 1 mm at the pads."""
 
 
 def gripped(environment: Environment, world: CollisionWorld | None, state: State) -> State:
-    """``state`` after what the fingers did in this tick."""
+    """Return ``state`` after the motion of the fingers in this tick."""
     hand = environment.hand
     if world is None or hand is None or not (hand.fingers and state.objects):
         return state
     x = state.x_setpoint
     if state.grip is not None:
-        opened = OPENED_SLIDE if hand.slides else OPENED_TURN
+        opened = RELEASE_SLIDE if hand.slides else RELEASE_TURN
         if state.gripper_setpoint <= state.grip + opened:
             return state
         objects = tuple(environment.left(t, x) if t.held else t for t in state.objects)
@@ -39,13 +40,13 @@ def gripped(environment: Environment, world: CollisionWorld | None, state: State
     for scene_object in state.objects:
         if scene_object.can_be_held and not scene_object.fixed:
             felt = _felt(hand.fingers, world, scene_object, x)
-            if min(felt.values()) <= TOUCHING:
+            if min(felt.values()) <= TOUCH_DISTANCE:
                 return _closed(environment, state, scene_object, felt, x)
     return state
 
 
 def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
-    """The fingers that feel an object, by what became of it when they closed."""
+    """Return the fingers that touch an object, judged by the result of their closing."""
     if hand is None:
         return ()
     if any(scene_object.held for scene_object in state.objects):
@@ -57,7 +58,7 @@ def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
 def _felt(
     fingers: tuple[str, ...], world: CollisionWorld, scene_object: SceneObject, x: FloatArray
 ) -> dict[str, float]:
-    """How far each finger is from ``scene_object`` [m]."""
+    """Return the distance of each finger from ``scene_object`` [m]."""
     return {finger: world.gap(x, finger, scene_object.name) for finger in fingers}
 
 
@@ -68,11 +69,14 @@ def _closed(
     felt: dict[str, float],
     x: FloatArray,
 ) -> State:
-    """The fingers have closed on ``scene_object``: they stop there, and hold it if both have."""
+    """Return ``state`` with the fingers closed on ``scene_object``.
+
+    The fingers stop, and they hold the object if both touch it.
+    """
     state = without_finding(without_finding(state, Reason.CONTACT), Reason.LOPSIDED)
     stopped = replace(state, gripper_goal=state.gripper_setpoint, blocked=False)
     far = max(felt, key=lambda finger: felt[finger])
-    if felt[far] > CENTRED:
+    if felt[far] > CENTRING_DISTANCE:
         lopsided = Finding(Reason.LOPSIDED, felt[far], parts=(far, scene_object.name))
         return replace(stopped, findings=(*stopped.findings, lopsided))
     taken = environment.taken(scene_object, x)

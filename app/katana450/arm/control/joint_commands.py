@@ -13,29 +13,29 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 JOG_TIME = 0.2
-"""[s] Time that a jog, or a sample of a joint stream, is followed without another."""
+"""[s] Time that a jog, or a sample of a joint stream, is followed without another one."""
 
 
 class AxisCommand(BaseCommand):
     """Base of the commands that give single joints another target."""
 
     def targets(self, goal: FloatArray) -> FloatArray:
-        """Return the joint targets (n,) [rad], from the goal (n,) [rad] that the joints have now.
+        """Return the joint targets (n,) [rad], given the present goal (n,) [rad] of the joints.
 
-        Raises InputError for an axis that there is not.
+        Raises InputError for an unknown axis.
         """
         raise NotImplementedError
 
 
 def with_axes(goal: FloatArray, values: tuple[tuple[int, float], ...]) -> FloatArray:
-    """Return ``goal`` (n,) with some axes at other values, each (axis from 0, value [rad]).
+    """Return ``goal`` (n,) with new values for some axes, each (axis from 0, value [rad]).
 
-    Raises InputError for an axis that there is not.
+    Raises InputError for an unknown axis.
     """
     q = np.array(goal)
     for axis, value in values:
         if axis >= q.size:
-            raise InputError(f"There is no axis {axis + 1}, only {q.size}.")
+            raise InputError(f"There is no axis {axis + 1}: the robot has {q.size} axes.")
         q[axis] = value
     return frozen(q)
 
@@ -43,12 +43,12 @@ def with_axes(goal: FloatArray, values: tuple[tuple[int, float], ...]) -> FloatA
 def check_axis(axis: object) -> None:
     """Raise InputError unless ``axis`` is a whole number from 0."""
     if isinstance(axis, bool) or not isinstance(axis, int) or axis < 0:
-        raise InputError(f"An axis is a whole number from 0, not {axis!r}.")
+        raise InputError(f"An axis must be a whole number from 0, not {axis!r}.")
 
 
 @dataclass(frozen=True)
 class SetJoint(AxisCommand):
-    """Drive one joint to ``value`` [rad]; ``axis`` counts from 0."""
+    """Move one joint to ``value`` [rad]; ``axis`` counts from 0."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)
 
@@ -60,17 +60,19 @@ class SetJoint(AxisCommand):
         check_finite(f"The angle of axis {self.axis + 1}", self.value)
 
     def targets(self, goal: FloatArray) -> FloatArray:
+        """Return ``goal`` (n,) [rad] with the value of the joint."""
         return with_axes(goal, ((self.axis, self.value),))
 
     def replaces(self, waiting: BaseCommand) -> bool:
+        """Return whether ``waiting`` sets the same joint."""
         return isinstance(waiting, SetJoint) and waiting.axis == self.axis
 
 
 @dataclass(frozen=True)
 class SetAxes(AxisCommand):
-    """Drive some joints, each (axis, value): the value in [rad], the axis counted from 0.
+    """Move some joints, each (axis, value): the value in [rad], the axis counted from 0.
 
-    The others go on to where they were going.
+    The other joints keep their goals.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
@@ -82,12 +84,13 @@ class SetAxes(AxisCommand):
             SetJoint(axis, value)
 
     def targets(self, goal: FloatArray) -> FloatArray:
+        """Return ``goal`` (n,) [rad] with the values of the joints."""
         return with_axes(goal, self.values)
 
 
 @dataclass(frozen=True, eq=False)
 class SetJoints(BaseCommand):
-    """Drive all joints to ``q``, (n,) [rad]."""
+    """Move all joints to ``q``, (n,) [rad]."""
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)
 
@@ -99,10 +102,14 @@ class SetJoints(BaseCommand):
 
 @dataclass(frozen=True, eq=False)
 class Servo(BaseCommand):
-    """Keep up with ``q``, (n,) [rad], which is one of a stream; for JOG_TIME after the last.
+    """Follow a stream of joint angles, of which ``q`` (n,) [rad] is one sample.
 
-    qd: (n,) how fast it changes [rad/s]; without it that is seen from the stream. t: when it came
-    [s], on the clock of ``State.t``; None for the tick that takes it.
+    The arm follows the stream for JOG_TIME after its last sample.
+
+    Attributes:
+        q: the sample.
+        qd: (n,) its rate of change [rad/s]; None to estimate it from the stream.
+        t: time of the sample [s], on the clock of ``State.t``; None for the time of the tick.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)

@@ -1,4 +1,4 @@
-"""The step of one tick for joints that are driven one by one, without a tool or a world."""
+"""One tick of motion for joints that are driven one by one, without a tool or a collision world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Travel = Callable[[FloatArray, FloatArray], float]
 
 
 def no_travel(_q: FloatArray, _to: FloatArray) -> float:
-    """The travel of links whose lengths are unknown: 0 m."""
+    """Return 0 m, the travel of links whose lengths are unknown."""
     return 0.0
 
 
@@ -29,19 +29,19 @@ class JointStepper:
         self._limiter = Limiter(joints.limits)
 
     def step(self, state: State, dt: float) -> State:
-        """``state`` with its setpoints moved on by ``dt`` [s]."""
+        """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
         if dt <= 0.0 or not state.under_way:
             return state
         return replace(state, motion=self._ahead(state, dt))
 
     def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
-        """The end (n,) [rad or m] of a brake begun now, the travel until then [m], and its time."""
+        """Return the end of a brake begun now, (n,) [rad or m], the travel [m] and the time [s]."""
         motion = state.motion
         end = self._joints.clamp(self._limiter.stopping_point(motion))
         return end, self._travel(motion.q, end), self._limiter.stopping_time(motion)
 
     def may_leave(self, state: State) -> bool:  # noqa: ARG002
-        """Whether the joints may brake beside their plan: they never follow one."""
+        """Return True: the joints follow no plan, so they may always brake."""
         return True
 
     def _ahead(self, state: State, dt: float) -> JointMotion:

@@ -14,13 +14,13 @@ from katana450.maths.motion.limiter import Limits
 
 @dataclass(frozen=True, eq=False)
 class JointSet:
-    """Those that follow no other, in the order of every joint vector.
+    """The driven joints of a mechanism, which follow no other joint.
 
     Attributes:
-        names: of each.
-        slides: whether it is prismatic; its numbers are in m then, else in rad.
+        names: name of each joint, in the order of every joint vector.
+        slides: whether each joint is prismatic; its numbers are in m then, else in rad.
         lower, upper, speed: (n,) limits.
-        why: why no tool of it can be brought to a pose, in a sentence.
+        why: a sentence on why no tool of the mechanism can be brought to a pose.
     """
 
     names: tuple[str, ...]
@@ -32,34 +32,36 @@ class JointSet:
 
     @property
     def n(self) -> int:
-        """How many."""
+        """Number of driven joints."""
         return len(self.names)
 
     @property
     def limits(self) -> Limits:
-        """Of their motion."""
+        """Limits of position, speed, acceleration and jerk of the joints."""
         return limits_of(self.lower, self.upper, self.speed)
 
     @property
     def refusal(self) -> str:
-        """Why a command about a tool is refused, in sentences."""
+        """The refusal of a command about a tool, in sentences."""
         return f"Only its joints can be driven. {self.why}"
 
     @property
     def gripper(self) -> GripperModel:
-        """Fingers are joints like any other."""
+        """No gripper: the fingers are joints like any other."""
         return NO_GRIPPER
 
     @property
     def ready(self) -> FloatArray:
-        """(n,) all at zero, or at the limit next to it."""
+        """The posture (n,) with all joints at zero, or at the limit nearest to zero."""
         return self.clamp(np.zeros(self.n))
 
     def clamp(self, q: FloatArray) -> FloatArray:
-        """The nearest to `q` (n,) inside the limits."""
+        """Return the posture inside the limits that is nearest to ``q`` (n,)."""
         return frozen(np.clip(q, self.lower, self.upper))
 
     def check(self, q: FloatArray) -> None:
-        """InputError unless there are n numbers."""
+        """Raise InputError unless ``q`` has n numbers."""
         if q.shape != (self.n,):
-            raise InputError(f"This mechanism has {self.n} driven joints, the command {q.size}.")
+            raise InputError(
+                f"This mechanism has {self.n} driven joints, but the command has {q.size}."
+            )

@@ -1,7 +1,7 @@
-"""Who drives the arm: one person at a time, by a lease that silence ends.
+"""The lease of the arm: one person drives at a time, and silence ends the lease.
 
-A lease is a value; every event makes another one. What may not happen raises a LeaseError and so
-changes nothing. Time comes in as an argument, in seconds on any clock that only goes forwards.
+A lease is a value; every event makes another one. An event that is not allowed raises a LeaseError
+and changes nothing. Time is an argument, in seconds on any monotonic clock.
 """
 
 from __future__ import annotations
@@ -14,34 +14,43 @@ from typing import Self
 from katana450.errors import LeaseError
 
 HEARTBEAT_INTERVAL = 0.1
-"""[s] Between two heartbeats that whoever drives is asked for."""
+"""[s] Time between two heartbeats that a client has to send while it drives."""
 
 LEASE_TIMEOUT = 3.0
-"""[s] Of silence: a page that reloads is back sooner, one that is gone must not keep the arm."""
+"""[s] Silence after which the lease ends. A page that reloads is back sooner; a lost one must not
+keep the arm."""
 
 
 class Role(Enum):
-    """What a person may do; each may do what those before it may."""
+    """The rights of a person; each role includes those of the roles before it."""
 
     VIEWER = "viewer"
     """Watch, and stop the arm."""
     OPERATOR = "operator"
-    """Drive the arm when nobody else does."""
+    """Drive the arm if nobody else does."""
     ADMIN = "admin"
-    """Take the arm from whoever drives it."""
+    """Take the arm from the person who drives it."""
 
     @property
     def may_drive(self) -> bool:
+        """True if the role may drive the arm."""
         return self is not Role.VIEWER
 
     @property
     def may_take(self) -> bool:
+        """True if the role may take the arm from its holder."""
         return self is Role.ADMIN
 
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody at a page. ``key`` tells pages apart; nobody reads it."""
+    """A person at a page, or a program.
+
+    Attributes:
+        key: identity, unique for each page; not shown to people.
+        name: display name.
+        role: the rights.
+    """
 
     key: str
     name: str
@@ -50,12 +59,13 @@ class Person:
 
 @dataclass(frozen=True)
 class Lease:
-    """Who holds the arm.
+    """The right to drive the arm.
 
     Attributes:
-        holder: the one person who may move the arm, if there is one.
-        heard: when the holder last gave a heartbeat [s].
-        waiting: who has asked for the arm, the first to ask first; never the holder.
+        holder: the one person who may move the arm; None if the arm is free.
+        heard: time of the holder's last heartbeat [s].
+        waiting: the persons who have asked for the arm, in the order of their requests; never the
+            holder.
     """
 
     holder: Person | None = None
@@ -63,7 +73,7 @@ class Lease:
     waiting: tuple[Person, ...] = ()
 
     def acquire(self, person: Person, t: float) -> Self:
-        """A free arm is given to ``person``; one that is held is not."""
+        """Return the lease with ``person`` as its holder, if the arm is free."""
         _check_may_drive(person)
         if self.holder == person:
             raise LeaseError("You hold the arm already.")
@@ -72,7 +82,10 @@ class Lease:
         return self._given(person, t)
 
     def take(self, person: Person, t: float) -> Self:
-        """The arm is taken from whoever holds it."""
+        """Return the lease with ``person`` as its holder.
+
+        Only an admin may take it from another holder.
+        """
         _check_may_drive(person)
         if self.holder == person:
             raise LeaseError("You hold the arm already.")
@@ -81,7 +94,7 @@ class Lease:
         return self._given(person, t)
 
     def request(self, person: Person) -> Self:
-        """``person`` asks whoever holds the arm for it."""
+        """Return the lease with the request of ``person`` to the holder."""
         _check_may_drive(person)
         if self.holder is None:
             raise LeaseError("Nobody holds the arm: you can have it at once.")
@@ -92,7 +105,7 @@ class Lease:
         return replace(self, waiting=(*self.waiting, person))
 
     def withdraw(self, person: Person) -> Self:
-        """``person`` does not want the arm any more."""
+        """Return the lease without the request of ``person``."""
         if person not in self.waiting:
             raise LeaseError("You have not asked for the arm.")
         return self._without(person)
@@ -105,7 +118,7 @@ class Lease:
         return self._without(person)
 
     def hand_over(self, giver: Person, taker: Person, t: float) -> Self:
-        """The holder gives the arm to ``taker``, who need not have asked."""
+        """Return the lease with ``taker`` as its holder. The taker need not have asked."""
         self._check_holds(giver)
         _check_may_drive(taker)
         if taker == giver:
@@ -113,30 +126,31 @@ class Lease:
         return self._given(taker, t)
 
     def release(self, person: Person) -> Self:
-        """The holder lets go; the arm is free, and those who wait may have it."""
+        """Return the free lease, released by its holder; the requests stay."""
         self._check_holds(person)
         return replace(self, holder=None, heard=-math.inf)
 
     def hear(self, person: Person, t: float) -> Self:
-        """A heartbeat of the holder."""
+        """Return the lease with a heartbeat of the holder at ``t`` [s]."""
         self._check_holds(person)
         return replace(self, heard=max(t, self.heard))
 
     def leave(self, person: Person) -> Self:
-        """``person`` is gone: asks for nothing any more, and keeps the arm only until LOST_AFTER.
+        """Return the lease after ``person`` has disconnected.
 
-        A line that breaks is no wish to give up the arm, and a reloaded page is soon back.
+        The request of the person ends. A holder keeps the arm until LEASE_TIMEOUT: a connection can
+        break by accident, and a reloaded page is soon back.
         """
         return self._without(person)
 
     def expire(self, t: float) -> Self:
-        """Free, once the holder has been silent for LOST_AFTER; else as it was."""
+        """Return the lease, freed if its holder has been silent for LEASE_TIMEOUT at ``t`` [s]."""
         if self.holder is None or self.silence(t) < LEASE_TIMEOUT:
             return self
         return replace(self, holder=None, heard=-math.inf)
 
     def silence(self, t: float) -> float:
-        """How long the holder has given no heartbeat [s]; 0 when nobody holds the arm."""
+        """Return the time since the last heartbeat of the holder [s]; 0 if the arm is free."""
         return 0.0 if self.holder is None else max(t - self.heard, 0.0)
 
     def _given(self, person: Person, t: float) -> Self:

@@ -1,4 +1,4 @@
-"""How near the arm is to what it cannot pass: its limits, a singularity, other parts."""
+"""Distances of the arm from its boundaries: joint limits, singularities and contacts."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from katana450.maths.kinematics.velocity import limit_distances, singular_values
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """Of one posture.
+    """Distances of one posture from its boundaries.
 
     Attributes:
-        axis: the one that is nearest to one of its limits, counted from 0.
-        limit: how far that is [rad]; negative beyond it.
+        axis: the axis nearest to one of its limits, counted from 0.
+        limit: the distance of that axis to the limit [rad]; negative beyond it.
         smallest_singular_value: of the Jacobian over the characteristic length [1].
-        nearest: of all the parts that may meet; None where nothing is looked at.
+        nearest: the nearest pair of parts; None if contacts are not checked.
     """
 
     axis: int
@@ -29,7 +29,13 @@ class Margins:
 
 
 def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margins:
-    """``x``: (n + 1,) the joints and the finger joint [rad]. ``chain`` ends in the tool."""
+    """Return the margins of one posture.
+
+    Args:
+        chain: the chain, which ends in the tool.
+        world: the collision world; None to check no contacts.
+        x: (n + 1,) the joints and the finger joint [rad].
+    """
     q = x[: chain.n]
     distances = limit_distances(chain, q)
     axis = int(distances.argmin())

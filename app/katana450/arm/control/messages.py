@@ -1,4 +1,4 @@
-"""Every word a person reads about the state of the arm, keyed by the enums of the core."""
+"""Texts about the state of the arm for people, keyed by the enums of the core."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ AXIS_NAMES = ("base turn", "shoulder", "elbow", "wrist bend", "wrist roll")
 
 
 def degrees(angle: float, digits: int = 1) -> str:
-    """An angle [rad] as people read it; a true minus sign, never "−0"."""
+    """Return an angle [rad] as text in degrees, with a true minus sign and never "−0"."""
     return signed(math.degrees(angle), digits) + "°"
 
 
 def millimetres(length: float, digits: int = 1) -> str:
-    """A length [m] as people read it."""
+    """Return a length [m] as text in millimetres."""
     return signed(1e3 * length, digits) + " mm"
 
 
 def signed(value: float, digits: int) -> str:
-    """A number with ``digits`` decimals, a true minus sign and no negative zero."""
+    """Return a number with ``digits`` decimals, a true minus sign and no negative zero."""
     text = f"{abs(value):.{digits}f}"
     return "−" + text if value < 0 and float(text) != 0.0 else text
 
 
 def axis(number: int | None) -> str:
-    """An axis counted from 0, as people count it."""
+    """Return the name of an axis; ``number`` counts from 0, the name from 1."""
     return "an axis" if number is None else f"axis {number + 1}"
 
 
@@ -43,13 +43,13 @@ PARTS = {
     "finger_left_link": "left finger",
     "finger_right_link": "right finger",
 }
-"""Links whose names in the robot description are not what people call them."""
+"""Names for people of links whose names in the robot description are different."""
 
 UNCHECKED = "No collision checking: the robot description gives the links no collision shapes."
 
 
 def part(name: str) -> str:
-    """A link or an object, as people call it."""
+    """Return the name for people of a link or an object."""
     return PARTS.get(name, name.removesuffix("_link").replace("_", " "))
 
 
@@ -65,7 +65,7 @@ def _lopsided(finding: Finding) -> str:
     finger, item = finding.parts or ("a finger", "something")
     return (
         f"{part(finger)} is {_short(1e3 * finding.amount)} mm from {part(item)}, which the other "
-        "touches: open, put the gripper about its middle, close again"
+        "touches: open the gripper, centre it on the object, close it again"
     )
 
 
@@ -74,19 +74,21 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
         f"stopped within {_short(1e3 * f.amount)} mm and {f.time:.2f} s: "
         "press Clear stop, then give a new target"
     ),
-    Reason.PAUSED: lambda _: "paused on the way: Resume goes on",
+    Reason.PAUSED: lambda _: "paused: press Resume to continue",
     Reason.CONTACT: _contact,
     Reason.ACROSS_GAP: lambda f: (
         f"{axis(f.axis)} would have to leap {_short(math.degrees(f.amount))}° to follow: "
-        "drag another way round, or choose the pose under Branches"
+        "drag along another path, or choose the pose under Branches"
     ),
     Reason.OUT_OF_REACH: lambda f: f"{_short(1e3 * f.amount)} mm out of reach",
     Reason.POSITION_CHANGED: lambda f: f"position gives way by {_short(1e3 * f.amount)} mm",
     Reason.AXIS_1: lambda _: (
-        "axis 1 is in the way: drag round it, or choose another pose under Branches"
+        "axis 1 is in the way: drag around it, or choose another pose under Branches"
     ),
     Reason.LINKS: lambda _: "its links reach no farther that way",
-    Reason.SINGULAR: lambda _: "no joint moves the tool that way from here: go another way first",
+    Reason.SINGULAR: lambda _: (
+        "no joint moves the tool in that direction from here: move in another direction first"
+    ),
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",
@@ -98,10 +100,10 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.ROLL_CHANGED: lambda f: f"roll stops {_short(math.degrees(f.amount))}° short",
     Reason.LOPSIDED: _lopsided,
     Reason.NOT_AT_START: lambda f: (
-        f"the plan begins elsewhere: {axis(f.axis)} is {_short(math.degrees(f.amount))}° off, "
-        "or the arm still moves; go to its start first"
+        f"the plan begins at another posture: {axis(f.axis)} is "
+        f"{_short(math.degrees(f.amount))}° off, or the arm still moves; go to its start first"
     ),
-    Reason.INTERNAL: lambda _: "something went wrong inside: the arm holds; see the server's log",
+    Reason.INTERNAL: lambda _: "internal error: the arm holds; see the server's log",
 }
 
 STATUS: dict[Status, str] = {
@@ -121,12 +123,12 @@ PRIORITIES: dict[Priority, str] = {
 }
 
 PRIORITY_HINTS: dict[Priority, str] = {
-    Priority.POSE: "The tool point goes where it is wished, and the tool turns as near as it can.",
-    Priority.PITCH: "The tool keeps the wished pitch, and stops where it cannot.",
+    Priority.POSE: "The tool point goes to the target, with the nearest orientation it can have.",
+    Priority.PITCH: "The tool keeps the pitch of the target, and stops where it cannot.",
     Priority.POSITION: "The tool point goes to the target, with the nearest pitch it can have.",
 }
 
-BRANCH_HEADINGS = ("branch", "off by", "way there", "singular")
+BRANCH_HEADINGS = ("branch", "off by", "path", "singular")
 
 NOTHING_LOST = "nothing"
 
@@ -134,57 +136,58 @@ MOVING = "Moving"
 
 
 def mood(state: State) -> str:
-    """The word for it that the style sheets know."""
+    """Return the class name for ``state`` in the style sheets."""
     moves = state.moving and state.status is Status.OK
     return "moving" if moves else state.status.value
 
 
 def title(robot: str) -> str:
-    """Of a page that shows the robot of this name."""
+    """Return the title of the page for the robot of this name."""
     words = robot.replace("_", " ").strip()
     return words[:1].upper() + words[1:]
 
 
 def headline(state: State) -> str:
-    """Two or three words for the state of the arm."""
+    """Return the state of the arm in two to four words."""
     if state.moving and state.status is Status.OK:
         return MOVING
     return STATUS[state.status]
 
 
 def sentence(state: State) -> str:
-    """Why the arm does not do what was wished, in one sentence; empty when it does."""
+    """Return one sentence on why the arm does not reach its target; empty if it does."""
     if not state.findings:
         return ""
     return _capital("; ".join(REASONS[each.reason](each) for each in state.findings)) + "."
 
 
 def finding_text(finding: Finding) -> str:
-    """One reason by itself."""
+    """Return the text of one finding."""
     return _capital(REASONS[finding.reason](finding))
 
 
 def limit_text(number: int, angle: float) -> str:
-    """How far an axis counted from 0 is from its nearer limit [rad]."""
+    """Return the distance ``angle`` [rad] of an axis, counted from 0, to its nearer limit."""
     return f"{axis(number)}: {degrees(angle)} left"
 
 
 ROOM = "to each limit"
-"""Before how far each axis is from its nearer one."""
+"""Label of the distances of all axes to their nearer limits."""
 
-FLAT = 1e6
-"""Condition from which on rounding says how far from a singularity the arm is."""
+MAX_CONDITION = 1e6
+"""Condition number above which only rounding separates the arm from a singularity."""
 
 
 def condition(values: FloatArray) -> str:
-    """Largest over smallest of singular values ``values`` (n,), falling; without end in a
-    singularity.
+    """Return the largest over the smallest of ``values`` (n,), which decrease; ∞ at a singularity.
+
+    values: the singular values of the Jacobian.
     """
-    return "∞" if values[0] >= FLAT * values[-1] else _short(float(values[0] / values[-1]))
+    return "∞" if values[0] >= MAX_CONDITION * values[-1] else _short(float(values[0] / values[-1]))
 
 
 def branch_cells(choice: BranchOption) -> tuple[str, str, str]:
-    """What a branch gives up, how long the way to it is, and how far it is from a singularity."""
+    """Return the loss, the path length and time, and the smallest singular value of a branch."""
     metrics = choice.metrics
     lost = []
     if metrics.position_error > POSITION_WORTH_TELLING:
@@ -194,14 +197,14 @@ def branch_cells(choice: BranchOption) -> tuple[str, str, str]:
     if choice.contact is not None:
         one, other = choice.contact.parts
         lost.append(f"{part(one)} meets {part(other)}")
-    way = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
-    return ", ".join(lost) or NOTHING_LOST, way, f"{metrics.smallest_singular_value:.3f}"
+    path = f"{degrees(metrics.distance, 0)}, {metrics.time:.1f} s"
+    return ", ".join(lost) or NOTHING_LOST, path, f"{metrics.smallest_singular_value:.3f}"
 
 
-def _capital(said: str) -> str:
-    return said[0].upper() + said[1:]
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
 
 
 def _short(value: float) -> str:
-    """Enough digits to act on: none from 10 up, one below."""
+    """Return ``value`` with enough digits to act on: no decimal from 10 up, one below."""
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -1,7 +1,7 @@
-"""The mode of a session: the one cause that decides where the goal of the arm is.
+"""The modes of a session: each is one cause that decides where the goal of the arm is.
 
-A session is in exactly one mode. Each mode holds only the fields that it needs, so nothing of a
-mode can outlast it. The effect of each command in each mode is in ``transitions``.
+A session is in exactly one mode. Each mode holds only the fields that it needs, so no data of a
+mode outlasts it. The effect of each command in each mode is in ``transitions``.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class JointTarget:
 
 @dataclass(frozen=True, eq=False)
 class PoseTarget:
-    """A full pose ``T`` (4, 4) in {S}: one number more than five axes can follow."""
+    """A full pose ``T`` (4, 4) in {S}: six numbers, of which five axes can follow five."""
 
     T: FloatArray
 
@@ -60,17 +60,20 @@ IDLE = Idle()
 
 @dataclass(frozen=True, eq=False)
 class Positioning:
-    """Travel to a fixed goal, and rest there: the nearest that the arm can do to ``target``."""
+    """Travel to a fixed goal, and rest there. The goal is the nearest posture to ``target``."""
 
     target: Target
 
 
 @dataclass(frozen=True, eq=False)
 class Tracking:
-    """A drag: the goal is taken along the path of the hand to ``target``, as far as a tick allows.
+    """A drag: the goal moves along the path of the drag to ``target``, as far as a tick allows.
 
-    since: how far along that path the goal has been taken. let_go: whether the hand has let go
-    meanwhile, so that the goal becomes the target at the end of the path.
+    Attributes:
+        target: the newest target.
+        since: the target up to which the goal has followed that path.
+        let_go: whether the drag has ended, so that the goal becomes the target at the end of the
+            path.
     """
 
     target: ToolTarget
@@ -80,9 +83,12 @@ class Tracking:
 
 @dataclass(frozen=True, eq=False)
 class Jogging:
-    """Motion at rates (5,) for a while: v of the tool point [m/s], pitch and roll [rad/s].
+    """Motion at given rates for a limited time.
 
-    frame: the axes that v is along. until: when it ends unless it is renewed [s].
+    Attributes:
+        rates: (5,) velocity of the tool point [m/s], pitch and roll [rad/s].
+        frame: the frame of the velocity.
+        until: time [s] at which the jog ends unless it is renewed.
     """
 
     rates: FloatArray
@@ -105,7 +111,9 @@ Intent = Idle | Positioning | Tracking | Jogging | Servoing
 class Leaving:
     """The arm brakes along its plan until it can leave it without touching anything.
 
-    along: the place on the plan. then: the mode that has superseded the plan.
+    Attributes:
+        along: the place on the plan.
+        then: the mode that has superseded the plan.
     """
 
     along: Following
@@ -115,4 +123,4 @@ class Leaving:
 Mode = Idle | Positioning | Tracking | Jogging | Servoing | Following | Leaving
 
 MODES = (Idle, Positioning, Tracking, Jogging, Servoing, Following)
-"""The columns of the table of transitions; a plan being left counts as the mode that follows it."""
+"""Columns of the table of transitions. A plan that is being left counts as the mode after it."""

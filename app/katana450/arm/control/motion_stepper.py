@@ -1,7 +1,7 @@
-"""The step of one tick: on towards the goal under every limit, and clear of every contact.
+"""One tick of motion towards the goal, under every limit and clear of every contact.
 
-No step is taken from which the arm could not stop in time: its whole way to rest has to be clear.
-So what stands in the way is met at rest, and the brake is the same that a stop uses.
+A step is taken only if the arm can still stop in time: its whole path to rest must be clear. So
+the arm comes to rest before an obstacle, with the same brake that a stop uses.
 """
 
 from __future__ import annotations
@@ -30,25 +30,27 @@ from katana450.maths.kinematics.velocity import JogFrame, jog, tool_speed, tool_
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
 from katana450.maths.motion.pursuit import stream_step
 
-PROBE = 0.02
-"""[rad] An arm that waits goes on once the way is clear so far; from less it would only come back
-to where it was."""
+PROBE_LENGTH = 0.02
+"""[rad] Length of path that must be clear before a waiting arm continues. After a shorter probe the
+arm would only come back to where it was."""
 
 PLANNED_SPEED_FRACTION = 0.9
-"""Of the tool's most, what is planned for: what is planned at one place is faster at the next."""
+"""[1] Fraction of the maximum tool speed that a step is planned with: the same joint speeds may
+move the tool faster at the next posture."""
 
 SLOWDOWN_TIME = 0.3
-"""[s] About what it takes to slow down by as much as the tool gains on a bend."""
+"""[s] Approximate time to slow down by as much as the tool speeds up on a bend."""
 
-SLOWINGS = 4
-"""How often a step is planned slower when the tool would be too fast."""
+MAX_SLOWDOWNS = 4
+"""Maximum number of slower attempts at a step in which the tool would be too fast."""
 
 BRAKE_SPEED_FRACTION = 0.97
-"""[1] Of the tool's most, what it keeps below in the samples of a brake: between them it may be
-faster."""
+"""[1] Fraction of the maximum tool speed that is allowed in the samples of a brake. Between the
+samples the tool may be faster."""
 
-COARSE, FINE = 0.02, 0.005
-"""[s] Between them at least: for a step of many, and for leaving a plan, which is done once."""
+COARSE_SAMPLING, FINE_SAMPLING = 0.02, 0.005
+"""[s] Minimum time between samples of a brake. The coarse value is for steps, of which there are
+many; the fine one is for the one decision to leave a plan."""
 
 
 class MotionStepper:
@@ -61,14 +63,18 @@ class MotionStepper:
         tool_speed: float,
         touch: FloatArray | None = None,
     ) -> None:
-        """``world``: what must not be touched. ``tool_speed``: the most of the tool point [m/s].
+        """Create the stepper.
 
-        ``touch``: (p,) how far apart the pairs of bodies stay while the fingers move [m].
+        Args:
+            arm: the arm.
+            world: the collision world; None to check no contacts.
+            tool_speed: maximum speed of the tool point [m/s].
+            touch: (p,) minimum distance of each pair of bodies while the fingers move [m].
         """
         self._arm = arm
         self._world = world
         self._touch = touch
-        # What the fingers are to touch holds them back, which is nothing to be told.
+        # Pairs that the fingers may touch: such a contact makes no finding.
         self._touching: frozenset[frozenset[str]] = frozenset()
         if world is not None and touch is not None:
             names = [world.parts[number].name for number in world.part_of.tolist()]
@@ -83,7 +89,7 @@ class MotionStepper:
         self._elbow = {elbow: Limiter(_bent(arm, elbow)) for elbow in ("up", "down")}
 
     def step(self, state: State, dt: float) -> State:
-        """``state`` with its setpoints moved on by ``dt`` [s]."""
+        """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
         if dt <= 0.0:
             return state
         if not state.under_way:
@@ -93,7 +99,7 @@ class MotionStepper:
         fingers = self._fingers(state, dt)
         if state.blocked and state.motion.at_rest and self._may_go_on(state):
             state = replace(state, blocked=False)
-        # Once it brakes it comes to rest: at the edge of what is clear it would only quiver.
+        # A brake continues to rest: at the edge of the clear path the arm would only quiver.
         braking = state.blocked and state.jogging is None
         ahead, along = self._brake(state, dt) if braking else self._ahead(state, dt)
         if self._world is None:
@@ -108,11 +114,11 @@ class MotionStepper:
             fingers = float(hand.x[-1])
             if self._met(state, ahead, along, fingers) is not None and not ahead.at_rest:
                 fingers = state.gripper_setpoint
-        stands = state.motion.at_rest and ahead.at_rest and (ahead.q == state.setpoint).all()
-        pinched = bool(stands) and fingers == state.gripper_setpoint and hand is not None
+        at_rest = state.motion.at_rest and ahead.at_rest and (ahead.q == state.setpoint).all()
+        pinched = bool(at_rest) and fingers == state.gripper_setpoint and hand is not None
         after = replace(
             state,
-            motion=state.motion if stands else ahead,
+            motion=state.motion if at_rest else ahead,
             mode=with_place(state, along).mode,
             gripper_setpoint=fingers,
             blocked=braking or contact is not None or pinched,
@@ -122,10 +128,13 @@ class MotionStepper:
         held_back = None if hand is None else hand.contact
         if held_back is not None and frozenset(held_back.parts) in self._touching:
             held_back = None
-        return _told(after, contact or held_back)
+        return _with_contact(after, contact or held_back)
 
     def limiter(self, state: State) -> Limiter:
-        """That which keeps the elbow on its branch, unless the motion is from or to another one."""
+        """Return the limiter that keeps the elbow on its branch.
+
+        Returns the limiter without that bound if the motion starts or ends on another branch.
+        """
         limiter = self._elbow[state.branch.elbow]
         limits = limiter.limits
         for q in (state.setpoint, state.goal):
@@ -134,26 +143,26 @@ class MotionStepper:
         return limiter
 
     def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
-        """Where a brake begun now ends (n,) [rad], how far off the tool is then [m], and when."""
+        """Return the end of a brake begun now (n,) [rad], the tool's travel [m], the time [s]."""
         motion, chain = state.motion, self._arm.chain_to(state.tool)
         if state.following is not None:
             end = self._follower.stopping_point(state.following).motion().q
             time = self._follower.stopping_time(state.following)
         else:
-            # A plan that ends at a limit may miss it by rounding, and nobody could go there.
+            # A plan that ends at a limit may exceed it by rounding; such a goal is unreachable.
             end, time = (
                 chain.clamp(self._any.stopping_point(motion)),
                 self._any.stopping_time(motion),
             )
-        way = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
-        return frozen(end), way, time
+        travel = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
+        return frozen(end), travel, time
 
     def may_leave(self, state: State) -> bool:
-        """Whether the arm may brake beside the plan it follows, as hard as it can."""
+        """Return whether the arm may leave its plan and brake as hard as it can."""
         if state.motion.at_rest:
             return True
         chain = self._arm.chain_to(state.tool)
-        if not self._below(self._maximum, chain, state.motion, FINE):
+        if not self._below(self._maximum, chain, state.motion, FINE_SAMPLING):
             return False
         return (
             self._world is None
@@ -161,11 +170,11 @@ class MotionStepper:
         )
 
     def _free_to_leave(self, state: State) -> bool:
-        # How far a stop takes has been said, so it goes on as it began.
+        # The distance of a stop has been reported, so the stop ends as it began.
         return state.motion.at_rest or (state.stopped is None and self.may_leave(state))
 
     def _ahead(self, state: State, dt: float) -> tuple[JointMotion, Following | None]:
-        """The next motion, and the place on the plan if one is followed."""
+        """Return the next motion, and the place on the plan if one is followed."""
         following = state.following
         if following is None:
             return self._beside(state, dt), None
@@ -175,10 +184,10 @@ class MotionStepper:
         return ahead.motion(), ahead
 
     def _beside(self, state: State, dt: float) -> JointMotion:
-        """The next motion of an arm that follows no plan.
+        """Return the next motion of an arm that follows no plan.
 
-        From every step the arm could brake with the tool below its most speed all the way: where no
-        step towards the goal is such a one, this brake is what the arm does.
+        After every step the arm can brake with the tool below its maximum speed all the time. If no
+        step towards the goal allows this, the arm brakes.
         """
         limiter, motion = self.limiter(state), state.motion
         if state.stopped is not None:
@@ -193,7 +202,7 @@ class MotionStepper:
             V = wished_twist(chain, motion.q, state.jogging)
             bounds = self._any.stoppable(motion.q)
             rates = jog(chain, motion.q, V, JogFrame.BASE, dt, bounds=bounds)
-        for _ in range(SLOWINGS):
+        for _ in range(MAX_SLOWDOWNS):
             if rates is not None:
                 ahead = self._any.at_rate(motion, fraction * rates, dt)
             elif state.servo is not None:
@@ -213,19 +222,20 @@ class MotionStepper:
         return ahead if self._slow_to_rest(chain, ahead) else self._any.stop(now, dt)
 
     def _slow_to_rest(self, chain: Chain, motion: JointMotion) -> bool:
-        """Whether the tool keeps below its most speed if every joint brakes now."""
-        return self._below(BRAKE_SPEED_FRACTION * self._maximum, chain, motion, COARSE)
+        """Return whether the tool stays below its maximum speed if every joint brakes now."""
+        return self._below(BRAKE_SPEED_FRACTION * self._maximum, chain, motion, COARSE_SAMPLING)
 
     def _below(self, maximum: float, chain: Chain, motion: JointMotion, spacing: float) -> bool:
-        """Whether the tool keeps below ``most`` [m/s] in samples of a brake begun now.
+        """Return whether the tool stays below ``maximum`` [m/s] in samples of a brake begun now.
 
-        They are ``spacing`` [s] apart, or as long as the tool needs in any case to get as fast.
+        The samples are at least ``spacing`` [s] apart, and farther where the tool needs longer to
+        become so fast.
         """
         fastest = self._any.fastest(motion)
         if tool_speed_bound(chain, fastest) <= maximum:
             return True
         limits = self._any.limits
-        # Braking, the joints turn the tool about each other's axes and slow it down or speed it up.
+        # Joints that brake also turn the tool about each other's axes, which can speed it up.
         pull = tool_speed_bound(chain, limits.acceleration + fastest * float(fastest.sum()))
         rising = float((np.abs(motion.qdd) / limits.jerk).max())
         at, duration = self._any.braking(motion)
@@ -235,25 +245,25 @@ class MotionStepper:
             if t >= duration:
                 return True
             braking = at(t)
-            # Soon they are so slow that no posture can make the tool too fast.
+            # Slow joints cannot make the tool too fast in any posture.
             if t > rising and tool_speed_bound(chain, braking.qd) <= maximum:
                 return True
         return False
 
     def _brake(self, state: State, dt: float) -> tuple[JointMotion, Following | None]:
-        """The very way to rest that the tick before found clear."""
+        """Return the same step to rest that the tick before found clear."""
         if state.following is None:
             return self.limiter(state).stop(state.motion, dt), None
         along = self._follower.braking(state.following, dt)
         return along.motion(), along
 
     def _fraction(self, chain: Chain, state: State) -> float:
-        """Of the joints' speeds, how much the tool may have on its way to the goal."""
-        way = state.goal - state.setpoint
-        if state.jogging is not None or state.servo is not None or not way.any():
+        """Return the fraction of the joint speeds at which the tool keeps its limit to the goal."""
+        change = state.goal - state.setpoint
+        if state.jogging is not None or state.servo is not None or not change.any():
             return 1.0
-        fastest = way / float(np.max(np.abs(way) / chain.speed))
-        # Where the arm is by the time it could have slowed down the tool may be farther out.
+        fastest = change / float(np.max(np.abs(change) / chain.speed))
+        # The tool may be farther out at the place where the arm can have slowed down.
         soon = np.clip(state.setpoint + SLOWDOWN_TIME * state.motion.qd, chain.lower, chain.upper)
         speed = max(tool_speed(chain, q, fastest) for q in (state.setpoint, soon))
         return min(1.0, self._tool_speed / speed) if speed > 0.0 else 1.0
@@ -269,30 +279,30 @@ class MotionStepper:
     def _met(
         self, state: State, ahead: JointMotion, along: Following | None, fingers: float
     ) -> Contact | None:
-        """What is met on the way to ``ahead`` and on to rest; None when nothing is."""
+        """Return the contact on the path to ``ahead`` and from there to rest; None if clear."""
         assert self._world is not None
         if state.following is not None and along is not None:
             met = self._follower.met(state.following, along, fingers)
-            return None if met is None else self._as_it_is(met, np.append(state.setpoint, fingers))
+            return None if met is None else self._measured(met, np.append(state.setpoint, fingers))
         limiter, x = self.limiter(state), np.append(state.setpoint, fingers)
         if is_surely_clear(self._world, x, np.append(limiter.stopping_point(ahead), fingers)):
             return None
-        way = limiter.stopping_path(ahead, MAX_PATH_LENGTH)
-        for a, b in pairwise([state.setpoint, *way]):
+        path = limiter.stopping_path(ahead, MAX_PATH_LENGTH)
+        for a, b in pairwise([state.setpoint, *path]):
             step = advance(self._world, np.append(a, fingers), np.append(b, fingers), MIN_STOP_TIME)
             if step.contact is not None or step.stopped:
                 if step.contact is None:
                     return self._world.nearest(x)
-                return self._as_it_is(step.contact, x)
+                return self._measured(step.contact, x)
         return None
 
-    def _as_it_is(self, met: Contact, x: FloatArray) -> Contact:
-        """The parts that are about to meet, and how far they are apart at ``x`` (k,) [rad]."""
+    def _measured(self, met: Contact, x: FloatArray) -> Contact:
+        """Return ``met`` with the distance of its parts at ``x`` (k,) [rad]."""
         assert self._world is not None
         return replace(met, distance=self._world.gap(x, *met.parts))
 
     def _updated(self, state: State) -> State:
-        """``state`` with the distance of the contact it brakes for as it is now."""
+        """Return ``state`` with the present distance in the contact that the arm brakes for."""
         assert self._world is not None
         x = state.x_setpoint
         findings = tuple(
@@ -304,22 +314,22 @@ class MotionStepper:
         return replace(state, findings=findings)
 
     def _may_go_on(self, state: State) -> bool:
-        """Whether the way of an arm that waits is clear again, at its beginning."""
+        """Return whether the first part of the path of a waiting arm is clear again."""
         assert self._world is not None
         if state.following is not None:
             return self._follower.may_go_on(state.following, state.gripper_setpoint)
-        way = state.goal - state.setpoint
-        if not way.any():
+        change = state.goal - state.setpoint
+        if not change.any():
             return True
-        fraction = min(1.0, PROBE / float(np.abs(way).sum()))
+        fraction = min(1.0, PROBE_LENGTH / float(np.abs(change).sum()))
         x = state.x_setpoint
-        towards = np.append(state.setpoint + fraction * way, state.gripper_setpoint)
+        towards = np.append(state.setpoint + fraction * change, state.gripper_setpoint)
         step = advance(self._world, x, towards, MIN_STOP_TIME)
         return bool((step.x == towards).all())
 
 
 def _bent(arm: ArmModel, elbow: str) -> Limits:
-    """The limits of ``arm`` with its elbow kept on one side of the stretched arm."""
+    """Return the limits of ``arm`` with its elbow kept on one side of the stretched arm."""
     canonical = arm_of(arm.chain)
     limits = arm.limits
     sign, shift = canonical.signs[2], canonical.shifts[2]
@@ -334,7 +344,7 @@ def _bent(arm: ArmModel, elbow: str) -> Limits:
 
 
 def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
-    """What a jog wishes of the tool, (6,) in {S} [rad/s, m/s]."""
+    """Return the twist (6,) of the tool in {S} [rad/s, m/s] that a jog commands."""
     R = forward(chain, q)[:3, :3]
     pitched = pitched_frame(chain, q)
     v = jogging.rates[:3] if jogging.frame is JogFrame.BASE else R @ jogging.rates[:3]
@@ -342,8 +352,8 @@ def wished_twist(chain: Chain, q: FloatArray, jogging: Jogging) -> FloatArray:
     return np.concatenate((omega, v))
 
 
-def _told(state: State, contact: Contact | None) -> State:
-    """``state`` with ``contact`` as its first finding, in place of any before it."""
+def _with_contact(state: State, contact: Contact | None) -> State:
+    """Return ``state`` with ``contact`` as its first finding, in place of any earlier contact."""
     others = tuple(finding for finding in state.findings if finding.reason is not Reason.CONTACT)
     if contact is None:
         return state if others == state.findings else replace(state, findings=others)

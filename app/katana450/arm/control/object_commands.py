@@ -1,4 +1,4 @@
-"""The commands about what stands around, the water in it, and how it is shown: no joint moves."""
+"""The commands about scene objects, their water and their appearance; no joint moves."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SCENE_TRAITS = CommandTraits(while_stopped=True, supersedes=False, passive=True)
 
 @dataclass(frozen=True)
 class PlaceObject(BaseCommand):
-    """Put an object where it says, in place of one of its name; what is held stays in the hand."""
+    """Put an object at its pose, in place of the one of its name; a held object stays."""
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
@@ -30,13 +30,13 @@ class PlaceObject(BaseCommand):
     def __post_init__(self) -> None:
         if not isinstance(self.scene_object, SceneObject) or self.scene_object.held:
             raise InputError(
-                f"What is put somewhere is an object out of the hand, not {self.scene_object}."
+                f"Only a SceneObject that is not held can be placed, not {self.scene_object}."
             )
 
 
 @dataclass(frozen=True)
 class Fill(BaseCommand):
-    """Fill the cup with ``volume`` [m^3] of water, and wipe up what is elsewhere."""
+    """Fill the cup with ``volume`` [m^3] of water, and remove all other water."""
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
@@ -48,7 +48,7 @@ class Fill(BaseCommand):
 
 @dataclass(frozen=True)
 class Remove(BaseCommand):
-    """Take the object of that name away; what is held stays."""
+    """Remove the object of that name; a held object stays."""
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
@@ -57,9 +57,12 @@ class Remove(BaseCommand):
 
 @dataclass(frozen=True, eq=False)
 class MoveObject(BaseCommand):
-    """Put the object of that name elsewhere, or turn it; what is held stays.
+    """Move or turn the object of that name; a held object stays.
 
-    position: (3,) [m], R: (3, 3), of its frame in the base; None to keep what it has.
+    Attributes:
+        name: name of the object.
+        position: (3,) [m] of its frame in the base frame; None to keep its position.
+        R: (3, 3) rotation of its frame in the base frame; None to keep its rotation.
     """
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
@@ -81,7 +84,10 @@ class MoveObject(BaseCommand):
 
 @dataclass(frozen=True)
 class SetAppearance(BaseCommand):
-    """Change one trait of how the link or object ``name`` is shown; see ``Look.having``."""
+    """Change one trait of the appearance of the link or object ``name``.
+
+    See ``LinkAppearance.having``.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits(
         while_stopped=True, supersedes=False, passive=True, joints_only=True
@@ -94,14 +100,14 @@ class SetAppearance(BaseCommand):
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and 0 < len(self.name) <= MAX_NAME_LENGTH):
             raise InputError(
-                f"A part's name has 1 to {MAX_NAME_LENGTH} characters, not {self.name!r}."
+                f"A part's name must have 1 to {MAX_NAME_LENGTH} characters, not {self.name!r}."
             )
         AS_MADE.having(self.trait, self.value)
 
 
 @dataclass(frozen=True)
 class Attach(BaseCommand):
-    """Fix the object of that name to the hand, or to the world again; what is held stays."""
+    """Fix the object of that name to the hand, or to the world again; a held object stays."""
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
@@ -110,13 +116,16 @@ class Attach(BaseCommand):
 
     def __post_init__(self) -> None:
         if not isinstance(self.to, Attachment):
-            raise InputError(f"An object is fixed to one of {list(Attachment)}, not {self.to!r}.")
+            raise InputError(f"`to` must be one of {list(Attachment)}, not {self.to!r}.")
 
 
 @dataclass(frozen=True, eq=False)
 class ReplaceScene(BaseCommand):
-    """Have these objects about and no others, at one go; what is held stays, as the only one of its
-    name. ``volume``: of water in the cup [m^3]; None for no water anywhere.
+    """Replace all objects and the water in one step; a held object stays, and keeps its name.
+
+    Attributes:
+        objects: the new objects.
+        volume: water in the cup [m^3]; None for no water anywhere.
     """
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
@@ -128,9 +137,9 @@ class ReplaceScene(BaseCommand):
         names = {scene_object.name for scene_object in self.objects}
         if len(names) < len(self.objects) or len(names) > MAX_OBJECTS:
             raise InputError(
-                f"A scene has up to {MAX_OBJECTS} objects, each with a name of its own."
+                f"A scene must have at most {MAX_OBJECTS} objects, each with a different name."
             )
         if any(scene_object.held for scene_object in self.objects):
-            raise InputError("What is put somewhere is an object out of the hand.")
+            raise InputError("The objects of a new scene must not be held.")
         if self.volume is not None:
             check_finite("The volume", self.volume)

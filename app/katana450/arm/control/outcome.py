@@ -11,7 +11,7 @@ from katana450.arm.control.state import ACCEPTED, Outcome, PartRefusal, Reason, 
 from katana450.arm.control.transitions import Effect, effect_of
 
 INTENDED_REASONS = (Reason.STOPPED, Reason.PAUSED)
-"""Reasons that are what a command asks for, and limit nothing."""
+"""Reasons that are the purpose of a command, and limit nothing."""
 
 
 def refused(why: str) -> Outcome:
@@ -70,9 +70,9 @@ def _why_refused(state: State, command: cmd.Command) -> str:
         return "The arm is paused: resume first."
     match command:
         case cmd.GoAlong():
-            return "The arm follows no plan that it could go along."
+            return "The arm follows no plan: send a plan first."
         case cmd.EndDrag():
-            return "There is no drag to end: the arm does something else by now."
+            return "There is no drag to end: another command has ended it."
     return f"{type(command).__name__} is not possible in this mode."
 
 
@@ -97,7 +97,7 @@ def _held(state: State, name: str) -> str:
 
 
 def reason(refusal: Outcome) -> str:
-    """Return in words why a command is refused."""
+    """Return the reason of a refusal in words."""
     return refusal.why or "; ".join(finding_text(each) for each in refusal.findings) + "."
 
 

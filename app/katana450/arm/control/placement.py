@@ -1,4 +1,4 @@
-"""Where a new object stands: on the table in front of the arm, beside what is there."""
+"""Place of a new object: on the table in front of the arm, beside the objects there."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
 MIN_DISTANCE, MAX_DISTANCE = 0.36, 0.60
-"""[m] From axis 1, of its middle: in reach, and clear of the arm at rest in its ready posture."""
+"""[m] Distance of its middle from axis 1: in reach, and clear of the arm in its ready posture."""
 
 OBJECT_GAP = 0.02
-"""[m] Between two objects."""
+"""[m] Minimum gap between two objects."""
 
 AZIMUTHS = tuple(math.radians(sign * angle) for angle in range(0, 110, 12) for sign in (1, -1))
+"""[rad] Directions to try, from straight ahead outwards to both sides."""
 
 
 def free_place(scene_object: SceneObject, objects: Sequence[SceneObject]) -> FloatArray:
-    """(4, 4) in the base frame: straight ahead if there is room, else aside, else farther out.
+    """Return the pose (4, 4) in the base frame of a free place for ``scene_object``.
 
-    Straight ahead too where there is room nowhere.
+    The place is straight ahead if there is room, else aside, else farther out. If there is room
+    nowhere, it is straight ahead too.
     """
     others = [each for each in objects if each.name != scene_object.name and not each.carried]
     for distance in np.arange(MIN_DISTANCE, MAX_DISTANCE, 0.06).tolist():
@@ -39,7 +41,7 @@ def free_place(scene_object: SceneObject, objects: Sequence[SceneObject]) -> Flo
 
 
 def girth(scene_object: SceneObject) -> float:
-    """[m] How far it reaches from its middle, seen from above and upright."""
+    """Return the radius [m] of an upright object about its middle, seen from above."""
     if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
         return scene_object.extent[0]
     return 0.5 * math.hypot(*scene_object.extent[:2])

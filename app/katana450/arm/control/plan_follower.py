@@ -1,4 +1,4 @@
-"""The step of one tick along a plan: tau moves, and the joints are where the plan has them."""
+"""One tick of motion along a plan: tau advances, and the joints take their places on the plan."""
 
 from __future__ import annotations
 
@@ -16,61 +16,72 @@ from katana450.maths.planning.plan import Segment
 from katana450.maths.planning.scaling import Scaling
 
 MAX_UNCHECKED_PATH = 1e-3
-"""[m] Ways shorter than this are not looked at in between: no part is as thin."""
+"""[m] Length of path below which no intermediate posture is checked: every part is thicker."""
 
-SAME_PLACE = 1e-4
-"""[m or 1] A body that is no farther from where a plan has it may be taken to be there: plans keep
-MARGIN, 1 mm more than has to be."""
+MAX_DISPLACEMENT = 1e-4
+"""[m or 1] Displacement of a body up to which it counts as unmoved since the planning. Plans keep
+MARGIN, which is 1 mm more than necessary."""
 
-SAME_FINGERS_TURN, SAME_FINGERS_SLIDE = 5e-3, 5e-4
-"""[rad, m] Of the fingers: half a millimetre at the pads."""
+MAX_FINGER_TURN, MAX_FINGER_SLIDE = 5e-3, 5e-4
+"""[rad, m] Change of the fingers up to which a plan stays valid: half a millimetre at the pads."""
 
-PROBE = 0.02
-"""[1] Of a segment: an arm that waits goes on once the way is clear so far."""
+PROBE_FRACTION = 0.02
+"""[1] Fraction of a segment that must be clear before a waiting arm continues."""
 
 
 class PlanFollower:
-    """Moves one arm along plans. Its methods are pure; it is for one thread."""
+    """Moves one arm along plans. Its methods are pure. For use in one thread."""
 
     def __init__(self, world: CollisionWorld | None, *, slides: bool = False) -> None:
-        """``world``: what must not be touched. ``slides``: whether the fingers slide, not turn."""
+        """Create the follower.
+
+        Args:
+            world: the collision world; None to check no contacts.
+            slides: whether the fingers slide instead of turning.
+        """
         self._world = world
-        self._same_fingers = SAME_FINGERS_SLIDE if slides else SAME_FINGERS_TURN
+        self._max_finger_change = MAX_FINGER_SLIDE if slides else MAX_FINGER_TURN
         self._limiters: dict[Scaling, Limiter] = {}
-        # What of a segment is known to be clear with the fingers as they are: no state, but facts.
+        # Cache: the part of a segment that is clear with the present finger angle.
         self._known: tuple[Segment, float, float, float] | None = None
 
     def ahead(self, now: Following, dt: float, fraction: float) -> Following:
-        """``dt`` [s] on, no faster than ``fraction`` of what the plan allows."""
+        """Return the place after ``dt`` [s], at most at ``fraction`` of the speed of the plan."""
         here = now.turned_over()
         pace = self._limiter(here).towards(here.pace, np.array([here.aim]), dt, fraction)
         return replace(here, pace=pace)
 
     def braking(self, now: Following, dt: float) -> Following:
-        """``dt`` [s] on when it brakes along the plan; ``now`` itself at rest."""
+        """Return the place after ``dt`` [s] of braking along the plan; ``now`` itself at rest."""
         if now.pace.at_rest:
             return now
         return replace(now, pace=self._limiter(now).stop(now.pace, dt))
 
     def stopping_point(self, now: Following) -> Following:
-        """At rest where it would be if it braked now."""
+        """Return the place at which a brake that begins now comes to rest."""
         (end,) = self._limiter(now).stopping_point(now.pace).tolist()
         return now.at(min(max(end, 0.0), now.segment.scaling.span))
 
     def stopping_time(self, now: Following) -> float:
-        """[s] until then."""
+        """Return the time [s] that a brake which begins now takes to come to rest."""
         return self._limiter(now).stopping_time(now.pace)
 
     def met(self, now: Following, ahead: Following, fingers: float) -> Contact | None:
-        """What is too near on the way to ``ahead`` and on to rest; None when nothing is."""
-        # Segments meet at rest, so on a new one the arm has not left its end yet.
+        """Return the contact on the path to ``ahead`` and from there to rest; None if it is clear.
+
+        fingers: the finger joint [rad or m].
+        """
+        # Segments meet at rest, so an arm on a new segment is still at its end.
         here = now if now.number == ahead.number else ahead
         return self._met(here, self.stopping_point(ahead), fingers)
 
     def may_go_on(self, now: Following, fingers: float) -> bool:
-        """Whether the way of an arm that waits is clear again, at its beginning."""
+        """Return whether the first part of the path of a waiting arm is clear again.
+
+        fingers: the finger joint [rad or m].
+        """
         here = now.turned_over()
-        reach = PROBE * here.segment.scaling.span
+        reach = PROBE_FRACTION * here.segment.scaling.span
         probe = min(max(here.aim, here.local - reach), here.local + reach)
         return self._met(here, here.at(probe), fingers) is None
 
@@ -79,8 +90,8 @@ class PlanFollower:
         world = self._world
         if world is None or (
             plan.clear_of is not None
-            and abs(plan.fingers - fingers) <= self._same_fingers
-            and plan.clear_of.differs_by(world.fingerprint) <= SAME_PLACE
+            and abs(plan.fingers - fingers) <= self._max_finger_change
+            and plan.clear_of.differs_by(world.fingerprint) <= MAX_DISPLACEMENT
         ):
             return None
         start, end = (segment.scaling.pace(each.local).sigma for each in (here, stopping_point))
@@ -90,24 +101,24 @@ class PlanFollower:
             known = (segment, fingers, start, start)
         if known[2] <= low and high <= known[3]:
             return None
-        room = SweptClearance.about(world, STOP, segment.sweep.at(start, fingers))
+        swept = SweptClearance.about(world, STOP, segment.sweep.at(start, fingers))
         for a, b in ((low, known[2]), (known[3], high)):
             found = (
-                segment.sweep.blocked(room, fingers, a, b, MAX_UNCHECKED_PATH) if a < b else None
+                segment.sweep.blocked(swept, fingers, a, b, MAX_UNCHECKED_PATH) if a < b else None
             )
             if found is not None:
                 return found.contact
-        # What leads out of a contact is clear from here alone.
-        if float(room.minimum.min()) >= STOP:
+        # A path that leads out of a contact is clear only from here.
+        if float(swept.minimum.min()) >= STOP:
             self._known = (segment, fingers, min(low, known[2]), max(high, known[3]))
         return None
 
     def _limiter(self, now: Following) -> Limiter:
-        """Of tau along the segment."""
+        """Return the limiter of tau along the segment."""
         scaling = now.segment.scaling
         if scaling not in self._limiters:
             a, j = np.array([scaling.acceleration]), np.array([scaling.jerk])
             limits = Limits(np.zeros(1), np.array([scaling.span]), np.ones(1), a, j)
-            # One plan at a time: what was followed before is not needed again.
+            # An arm follows one plan at a time, so earlier limiters are not needed again.
             self._limiters = {scaling: Limiter(limits)}
         return self._limiters[scaling]

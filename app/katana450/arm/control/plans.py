@@ -1,4 +1,4 @@
-"""Plans for the arm as it stands, made before it moves and off the control thread."""
+"""Plans from the present posture of the arm, made before it moves, outside the control thread."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from katana450.maths.planning.scaling import Bounds
 def path_to(
     arm: ArmModel, world: CollisionWorld | None, state: State, q_goal: FloatArray, seed: int = 0
 ) -> JointPath:
-    """The way of the joints from where ``state`` has them to ``q_goal`` (n,) [rad].
+    """Return the joint path from the setpoint of ``state`` to ``q_goal`` (n,) [rad].
 
-    Straight where that is clear of ``world``, else a way round found by chance from ``seed``.
-    Raises InputError for a goal beyond the limits or where the arm is already, and BlockedError
-    when no clear way was found.
+    The path is straight if that is clear of ``world``, else sampled at random with ``seed``. Raises
+    InputError if the goal is beyond the limits or is the present posture, and BlockedError if no
+    clear path was found.
     """
     chain = arm.chain_to(state.tool)
     straight = JointPath(chain, np.array((state.setpoint, chain.check_q(q_goal))))
@@ -46,7 +46,10 @@ def plan_to(
     seed: int = 0,
     tool_speed: float = TOOL_SPEED,
 ) -> Plan:
-    """The plan of `path_to`, timed: to be sent as `Follow`."""
+    """Return the plan along ``path_to``, to be sent as ``Follow``.
+
+    tool_speed: maximum speed of the tool point [m/s].
+    """
     return plan_along(arm, world, state, [path_to(arm, world, state, q_goal, seed)], tool_speed)
 
 
@@ -58,6 +61,9 @@ def plan_along(
     tool_speed: float = TOOL_SPEED,
     tool_acceleration: float | None = None,
 ) -> Plan:
-    """The plan for ``paths`` one after another, as `katana450.maths.planning.plan.plan` has it."""
+    """Return the plan for ``paths`` one after another; see ``katana450.maths.planning.plan.plan``.
+
+    tool_speed, tool_acceleration: maximum of the tool point [m/s, m/s^2].
+    """
     bounds = Bounds(arm.limits, tool_speed, tool_acceleration)
     return plan(paths, bounds, world, state.gripper_setpoint, MARGIN)

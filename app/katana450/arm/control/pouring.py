@@ -1,4 +1,4 @@
-"""The water in the cup, as the arm carries it."""
+"""Motion of the water in the cup while the arm carries it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from katana450.maths.water.score import Course
 CUP, BASIN = "cup", "basin"
 
 ABSENT_BASIN_AT = (100.0, 0.0, 0.0)
-"""[m] Where a basin stands that is not there: it catches nothing."""
+"""[m] Place of the basin if the scene has none: so far away that it catches no water."""
 
 NO_VELOCITY: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class MotionWithWater:
-    """The water, what the cup went through, and where its middle was and how fast, [m], [m/s]."""
+    """The water, the motion history of the cup, and position [m], velocity [m/s] of its middle."""
 
     water: Water
     course: Course
@@ -33,29 +33,32 @@ class MotionWithWater:
 
     @property
     def still(self) -> bool:
-        """Whether nothing of it moves while the cup does not."""
+        """True if the water is at rest as long as the cup does not move."""
         slosh = self.water.slosh
         return not self.water.parcels and slosh.lean == slosh.rate == (0.0, 0.0)
 
 
 class Pouring:
-    """The rules of it, in one surrounding; its methods are pure."""
+    """Rules of the water in one environment. Its methods are pure."""
 
     def __init__(self, water_environment: WaterEnvironment, environment: Environment) -> None:
-        """``around``: cup, basin and table; where the basin stands the objects say."""
+        """Create the rules for the cup, the basin and the table of ``water_environment``.
+
+        The objects of a scene give the place of the basin.
+        """
         self._water_environment = water_environment
         self._environment = environment
-        # Of the basin as it stands at present: no state, but what follows from it.
-        self._made: tuple[SceneObject | None, WaterFlow] | None = None
+        # Cache for the present place of the basin.
+        self._cache: tuple[SceneObject | None, WaterFlow] | None = None
 
     def check(self, volume: float) -> None:
-        """Raises InputError for more than the cup holds, or less than nothing."""
+        """Raise InputError if ``volume`` [m^3] is negative or more than the cup holds."""
         self._flow(()).begin(volume, np.eye(4))
 
     def fill(
         self, volume: float, objects: Sequence[SceneObject], x: FloatArray
     ) -> MotionWithWater | None:
-        """``volume`` [m^3] in the cup and none elsewhere; None when there is no cup.
+        """Return water of ``volume`` [m^3] in the cup and none elsewhere; None if there is no cup.
 
         x: (k,) joints and finger joint [rad]. Raises InputError for more than the cup holds.
         """
@@ -67,16 +70,19 @@ class Pouring:
     def step(
         self, poured: MotionWithWater, objects: Sequence[SceneObject], x: FloatArray, dt: float
     ) -> MotionWithWater | None:
-        """``dt`` [s] on, with the arm at ``x`` (k,) now; the same while nothing of it moves."""
+        """Return the water after ``dt`` [s], with the arm now at ``x`` (k,) [rad].
+
+        Returns ``poured`` itself while cup and water are at rest; None if there is no cup.
+        """
         T = self._pose(objects, x)
         if T is None:
             return None
-        stands = bool((poured.water.T_base_cup == T).all())
-        if dt <= 0.0 or (stands and poured.still and poured.velocity == NO_VELOCITY):
+        at_rest = bool((poured.water.T_base_cup == T).all())
+        if dt <= 0.0 or (at_rest and poured.still and poured.velocity == NO_VELOCITY):
             return poured
         flow, middle = self._flow(objects), self._middle(T)
-        if not stands and not _object(objects, CUP).carried:
-            # Somebody put it elsewhere, which is no motion.
+        if not at_rest and not _object(objects, CUP).carried:
+            # The cup was moved by a command, which does not accelerate the water.
             moved = flow.step(poured.water, T, NO_VELOCITY, 0.0)
             return replace(poured, water=moved, middle=middle, velocity=NO_VELOCITY)
         velocity = scale(1.0 / dt, sub(middle, poured.middle))
@@ -89,22 +95,22 @@ class Pouring:
         )
 
     def margin_to_rim(self, poured: MotionWithWater, objects: Sequence[SceneObject]) -> float:
-        """How far [m] the lip is above the surface; negative while water flows over it."""
+        """Return the height [m] of the lip over the surface; negative while water flows over it."""
         return self._flow(objects).margin_to_rim(poured.water)
 
     def water_environment(self, objects: Sequence[SceneObject]) -> WaterEnvironment:
-        """With the basin where it stands."""
+        """Return the environment of the water with the basin where it stands."""
         return self._flow(objects).water_environment
 
     def _flow(self, objects: Sequence[SceneObject]) -> WaterFlow:
         basin = named(objects, BASIN)
-        if self._made is None or self._made[0] is not basin:
+        if self._cache is None or self._cache[0] is not basin:
             at = ABSENT_BASIN_AT if basin is None else vector(basin.T[:3, 3])
             water_environment = replace(
                 self._water_environment, basin=replace(self._water_environment.basin, at=at)
             )
-            self._made = (basin, WaterFlow(water_environment))
-        return self._made[1]
+            self._cache = (basin, WaterFlow(water_environment))
+        return self._cache[1]
 
     def _pose(self, objects: Sequence[SceneObject], x: FloatArray) -> FloatArray | None:
         cup = named(objects, CUP)

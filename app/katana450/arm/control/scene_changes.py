@@ -1,4 +1,4 @@
-"""Transforms of a state by the commands about objects: where they are, and how they look."""
+"""Transforms of a state by the commands about objects: their places, water and appearance."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from katana450.arm.control.state import State
 def with_scene_change(
     environment: Environment, pouring: Pouring | None, state: State, command: cmd.Command
 ) -> State:
-    """``state`` after a command about objects, the water, or how they are shown."""
+    """Return ``state`` after a command about objects, the water, or the appearance."""
     x = state.x_setpoint
     match command:
         case cmd.PlaceObject(scene_object=scene_object):
@@ -42,15 +42,15 @@ def with_scene_change(
             )
             return replace(state, objects=mounted)
         case cmd.ReplaceScene(objects=objects, volume=volume):
-            furnished = replace(state, objects=with_replaced(state.objects, objects))
-            return with_water(pouring, furnished, volume)
+            replaced = replace(state, objects=with_replaced(state.objects, objects))
+            return with_water(pouring, replaced, volume)
         case cmd.Fill(volume=volume):
             return with_water(pouring, state, volume)
     raise AssertionError(f"The table of transitions has no rule for {command!r}.")
 
 
 def with_water(pouring: Pouring | None, state: State, volume: float | None) -> State:
-    """``state`` with ``volume`` [m^3] of water in the cup; None for no water."""
+    """Return ``state`` with ``volume`` [m^3] of water in the cup; None for no water."""
     if volume is None:
         return replace(state, poured=None)
     assert pouring is not None
@@ -58,70 +58,77 @@ def with_water(pouring: Pouring | None, state: State, volume: float | None) -> S
 
 
 def removed(state: State, name: str) -> State:
-    """Without the object of that name; what is held stays."""
+    """Return ``state`` without the object of that name; a held object stays."""
     objects = tuple(each for each in state.objects if each.held or each.name != name)
     return replace(state, objects=objects)
 
 
-def with_moved_object(state: State, shift: MoveObject) -> State:
-    """With the object elsewhere, unless the hand has it."""
+def with_moved_object(state: State, command: MoveObject) -> State:
+    """Return ``state`` with the object moved, unless the hand carries it."""
 
-    def there(scene_object: SceneObject) -> SceneObject:
-        if scene_object.name != shift.name or scene_object.carried:
+    def moved(scene_object: SceneObject) -> SceneObject:
+        if scene_object.name != command.name or scene_object.carried:
             return scene_object
         T = np.array(scene_object.T)
-        if shift.position is not None:
-            T[:3, 3] = shift.position
-        if shift.R is not None:
-            T[:3, :3] = shift.R
+        if command.position is not None:
+            T[:3, 3] = command.position
+        if command.R is not None:
+            T[:3, :3] = command.R
         return replace(scene_object, T=T)
 
-    return replace(state, objects=tuple(map(there, state.objects)))
+    return replace(state, objects=tuple(map(moved, state.objects)))
 
 
 def appearance_of(state: State, name: str) -> LinkAppearance:
-    """How the link or object of that name is shown."""
+    """Return the appearance of the link or object of that name."""
     scene_object = named(state.objects, name)
     return state.appearance.of(name) if scene_object is None else _as_link(scene_object.appearance)
 
 
-def with_appearance(state: State, dress: SetAppearance) -> State:
-    """With one trait of a look changed. Objects bear theirs themselves."""
+def with_appearance(state: State, command: SetAppearance) -> State:
+    """Return ``state`` with one trait of an appearance changed.
+
+    The appearance of an object is part of the object; that of a link is part of the state.
+    """
 
     def changed(scene_object: SceneObject) -> SceneObject:
-        if scene_object.name != dress.name:
+        if scene_object.name != command.name:
             return scene_object
-        look = _as_link(scene_object.appearance).having(dress.trait, dress.value)
-        return replace(scene_object, appearance=_as_object(look))
+        appearance = _as_link(scene_object.appearance).having(command.trait, command.value)
+        return replace(scene_object, appearance=_as_object(appearance))
 
-    if any(each.name == dress.name for each in state.objects):
+    if any(each.name == command.name for each in state.objects):
         return replace(state, objects=tuple(map(changed, state.objects)))
-    return replace(state, appearance=state.appearance.having(dress.name, dress.trait, dress.value))
+    appearance = state.appearance.having(command.name, command.trait, command.value)
+    return replace(state, appearance=appearance)
 
 
 PAINT = (204, 204, 204)
-"""Of an object that is to be painted when nobody has mixed a colour."""
+"""Default colour of a painted object, red, green, blue of 255."""
 
 
-def _as_link(look: solid.ObjectAppearance) -> LinkAppearance:
-    """An object's look in the words for a link's."""
-    painted = look.colour is not None or look.opacity < 1.0
-    choice = (
-        DisplayMode.HIDDEN if look.hidden else DisplayMode.PAINTED if painted else DisplayMode.MADE
-    )
-    if look.colour is None:
-        return LinkAppearance(choice, None, 1.0 - look.opacity)
-    red, green, blue = (part / 255.0 for part in look.colour)
-    return LinkAppearance(choice, (red, green, blue), 1.0 - look.opacity)
+def _as_link(appearance: solid.ObjectAppearance) -> LinkAppearance:
+    """Return the appearance of an object in the form of a link's."""
+    painted = appearance.colour is not None or appearance.opacity < 1.0
+    choice = DisplayMode.PAINTED if painted else DisplayMode.MADE
+    if appearance.hidden:
+        choice = DisplayMode.HIDDEN
+    if appearance.colour is None:
+        return LinkAppearance(choice, None, 1.0 - appearance.opacity)
+    red, green, blue = (part / 255.0 for part in appearance.colour)
+    return LinkAppearance(choice, (red, green, blue), 1.0 - appearance.opacity)
 
 
-def _as_object(look: LinkAppearance) -> solid.ObjectAppearance:
-    """The other way; an object as it is made has no paint to come back to."""
-    if look.choice is DisplayMode.MADE:
+def _as_object(appearance: LinkAppearance) -> solid.ObjectAppearance:
+    """Return the appearance of a link in the form of an object's.
+
+    An object that is shown as it is made keeps no paint.
+    """
+    if appearance.choice is DisplayMode.MADE:
         return solid.PLAIN
-    colour = None if look.choice is DisplayMode.HIDDEN else PAINT
-    if look.colour is not None:
-        red, green, blue = (round(255.0 * part) for part in look.colour)
+    colour = None if appearance.choice is DisplayMode.HIDDEN else PAINT
+    if appearance.colour is not None:
+        red, green, blue = (round(255.0 * part) for part in appearance.colour)
         colour = red, green, blue
-    opacity = max(1.0 - look.transparency, solid.MIN_OPACITY)
-    return solid.ObjectAppearance(colour, opacity, look.choice is DisplayMode.HIDDEN)
+    opacity = max(1.0 - appearance.transparency, solid.MIN_OPACITY)
+    return solid.ObjectAppearance(colour, opacity, appearance.choice is DisplayMode.HIDDEN)

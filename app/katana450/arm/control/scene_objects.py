@@ -1,4 +1,4 @@
-"""What stands around the arm and can be put elsewhere, and what its gripper holds of it."""
+"""Objects around the arm that can be moved, and the objects that its gripper holds."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.water.environment import TableTop
 
 MAX_OBJECTS = 24
-"""Objects at a time."""
+"""Maximum number of objects at a time."""
 
 MAX_COORDINATE = 2.0
-"""[m] Along any axis, from the base."""
+"""[m] Maximum distance of an object from the base along any axis."""
 
 MAX_SIZE, MIN_SIZE = 2.0, 1e-3
-"""[m] Of an object, along any of its sides."""
+"""[m] Bounds of the size of an object along any of its sides."""
 
 ROUNDING = 1e-6
-"""[1] Of a bound: what single precision makes of the length of a mesh that is on it."""
+"""[1] Tolerance of a bound, for the size of a mesh in single precision."""
 
 MIN_SCALE, MAX_SCALE = 1e-3, 1e3
 
@@ -36,7 +36,7 @@ MAX_NAME_LENGTH = 40
 
 
 class Shape(Enum):
-    """What an object counts as where contacts are looked for; ``size`` [m] is of a form its own."""
+    """Shape of an object in collision checks, with the meaning of its ``size`` [m]."""
 
     BOX = "box"
     """size: along x, y, z."""
@@ -49,34 +49,34 @@ class Shape(Enum):
 
     @property
     def numbers(self) -> int:
-        """How many a size has."""
+        """Number of values in a size."""
         return {Shape.BOX: 3, Shape.CYLINDER: 2, Shape.SPHERE: 1, Shape.MESH: 3}[self]
 
 
 class Attachment(Enum):
-    """What an object is fixed to."""
+    """Body to which an object is fixed."""
 
     HAND = "hand"
-    """It goes with the hand, whatever the fingers do, and counts as a part of it."""
+    """The object moves with the hand, whatever the fingers do, and counts as a part of it."""
     WORLD = "world"
-    """It stays where it is."""
+    """The object stays where it is."""
     TABLE = "table"
-    """Likewise, once it is put down upright on the table below."""
+    """The object is put down upright on the table below, and stays there."""
 
 
 @dataclass(frozen=True, eq=False)
 class SceneObject:
-    """Something that stands on z = 0 of a frame of its own.
+    """An object that stands on z = 0 of its own frame.
 
     Attributes:
-        name: no other thing or link has it.
+        name: unique among objects and links.
         shape, size: see ``Shape``.
-        T: (4, 4) where it stands, in the base frame; while it is carried, in that of the hand.
+        T: (4, 4) its pose in the base frame; in the frame of the hand while it is carried.
         can_be_held: whether the fingers may touch it, and take it when both do.
-        held: whether they have.
-        solid: of a mesh; None of any other form.
-        scale: how many times as large it is as its size says.
-        look: how it is drawn.
+        held: whether the fingers hold it.
+        solid: the solid of a mesh; None for other shapes.
+        scale: factor on ``size``.
+        appearance: how it is drawn.
         fixed: whether it is fixed to the hand.
     """
 
@@ -94,17 +94,17 @@ class SceneObject:
     def __post_init__(self) -> None:
         if not (self.name.isprintable() and 0 < len(self.name) <= MAX_NAME_LENGTH):
             raise InputError(
-                f"An object's name has 1 to {MAX_NAME_LENGTH} characters to be printed."
+                f"An object's name must have 1 to {MAX_NAME_LENGTH} printable characters."
             )
         what = f"The size of {self.name!r}"
         if (self.solid is not None) is not (self.shape is Shape.MESH):
-            raise InputError(f"{self.name!r}: a mesh, and nothing else, has a solid.")
+            raise InputError(f"{self.name!r}: a mesh must have a solid, other shapes none.")
         if self.solid is not None:
             object.__setattr__(self, "size", self.solid.size)
         size = finite_array(self.size, (self.shape.numbers,), what)
         if not MIN_SCALE <= self.scale <= MAX_SCALE:
             raise InputError(
-                f"The scale of {self.name!r} is from {MIN_SCALE:g} to {MAX_SCALE:g}, "
+                f"The scale of {self.name!r} must be from {MIN_SCALE:g} to {MAX_SCALE:g}, "
                 f"not {self.scale:g}."
             )
         # A mesh may be flat.
@@ -113,16 +113,16 @@ class SceneObject:
         longest = self.scale * float(size.max())
         smallest = self.scale * float(minimum)
         if smallest < MIN_SIZE * (1.0 - slack) or longest > MAX_SIZE * (1.0 + slack):
-            said = " by ".join(
+            actual = " by ".join(
                 digits_beyond(self.scale * each, MIN_SIZE, MAX_SIZE)
                 if not MIN_SIZE <= self.scale * each <= MAX_SIZE
                 else f"{self.scale * each:.4g}"
                 for each in size.tolist()
             )
-            raise InputError(f"{what} has to be from {MIN_SIZE} to {MAX_SIZE:g} m, not {said}.")
+            raise InputError(f"{what} must be from {MIN_SIZE} to {MAX_SIZE:g} m, not {actual}.")
         object.__setattr__(self, "size", tuple(size.tolist()))
         if self.fixed and self.held:
-            raise InputError(f"{self.name!r} is either fixed to the hand or held by it.")
+            raise InputError(f"{self.name!r} must be either fixed to the hand or held by it.")
         T = frozen(se3.validated(self.T, f"The pose of {self.name!r}"))
         if np.abs(T[:3, 3]).max() > MAX_COORDINATE:
             raise InputError(f"{self.name!r} would be more than {MAX_COORDINATE:g} m away.")
@@ -130,22 +130,22 @@ class SceneObject:
 
     @property
     def carried(self) -> bool:
-        """Whether it goes where the hand goes."""
+        """True if the object moves with the hand."""
         return self.held or self.fixed
 
     @property
     def extent(self) -> tuple[float, ...]:
-        """Its size as large as it is [m]."""
+        """The size with the scale applied [m]."""
         return tuple(self.scale * each for each in self.size)
 
     @property
     def height(self) -> float:
-        """[m]"""
+        """Height [m]."""
         return 2.0 * self.extent[0] if self.shape is Shape.SPHERE else self.extent[-1]
 
     @property
     def collision_shape(self) -> CollisionShape:
-        """About its middle."""
+        """Shape for collision checks, about the middle of the object."""
         match self.shape:
             case Shape.BOX:
                 return box(self.extent)
@@ -158,27 +158,31 @@ class SceneObject:
 
     @property
     def T_collision_shape(self) -> FloatArray:
-        """(4, 4) its middle, in the frame of ``T``."""
+        """Pose (4, 4) of the middle of the object, in the frame of ``T``."""
         up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, 0.5 * self.height))
         return self.T @ up
 
 
 @lru_cache(maxsize=2 * MAX_OBJECTS)
 def _hull(corners: bytes, scale: float, middle: float) -> CollisionShape:
-    """Of a solid. Kept, for an object that is dragged is made anew at every step."""
+    """Return the hull of a solid about its middle.
+
+    Cached because an object that is dragged is created again at every step.
+    """
     points = scale * np.frombuffer(corners).reshape(-1, 3)
     return hull(points - (0.0, 0.0, middle))
 
 
 def same(some: tuple[SceneObject, ...], others: tuple[SceneObject, ...]) -> bool:
-    """Whether they are the same things in the same places."""
+    """Return whether both tuples have the same objects in the same places."""
     return len(some) == len(others) and all(
-        _told(a) == _told(b) and np.array_equal(a.T, b.T) for a, b in zip(some, others, strict=True)
+        _properties(a) == _properties(b) and np.array_equal(a.T, b.T)
+        for a, b in zip(some, others, strict=True)
     )
 
 
-def _told(scene_object: SceneObject) -> tuple[object, ...]:
-    """All of it but where it is."""
+def _properties(scene_object: SceneObject) -> tuple[object, ...]:
+    """Return all properties of the object except its pose."""
     key = None if scene_object.solid is None else scene_object.solid.key
     kind = (scene_object.name, scene_object.shape, scene_object.size, scene_object.scale, key)
     return (
@@ -191,10 +195,9 @@ def _told(scene_object: SceneObject) -> tuple[object, ...]:
 
 
 def placed(objects: tuple[SceneObject, ...], scene_object: SceneObject) -> tuple[SceneObject, ...]:
-    """``objects`` with ``scene_object`` in place of the one of its name, or as one more if there is
-    room.
+    """Return ``objects`` with ``scene_object`` in place of the one of its name.
 
-    What is held stays.
+    An object with a new name is added if there is room. A held object stays.
     """
     known = [each.name for each in objects]
     if scene_object.name not in known:
@@ -206,14 +209,14 @@ def placed(objects: tuple[SceneObject, ...], scene_object: SceneObject) -> tuple
 
 
 def named(objects: Sequence[SceneObject], name: str) -> SceneObject | None:
-    """The one of that name."""
+    """Return the object of that name; None if there is none."""
     return next((each for each in objects if each.name == name), None)
 
 
 def with_replaced(
     objects: tuple[SceneObject, ...], wanted: tuple[SceneObject, ...]
 ) -> tuple[SceneObject, ...]:
-    """``wanted`` in place of ``objects``, of which what is held stays."""
+    """Return ``wanted`` in place of ``objects``; held objects stay."""
     held = tuple(each for each in objects if each.held)
     names = {each.name for each in held}
     left = tuple(each for each in wanted if each.name not in names)
@@ -222,11 +225,14 @@ def with_replaced(
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """What the arm takes objects with.
+    """The part of the arm that takes objects.
 
-    palm: the piece of the linkage that fingers hang on, the last of the arm where it has none.
-    fingers: their names among the parts. T_palm_tool: (4, 4) the frame of the default tool in that
-    of the palm. slides: whether the fingers slide instead of turning.
+    Attributes:
+        palm: index of the body in the linkage that carries the fingers; the last body of an arm
+            without fingers.
+        fingers: names of the fingers among the parts.
+        T_palm_tool: (4, 4) the frame of the default tool in the frame of the palm.
+        slides: whether the fingers slide instead of turning.
     """
 
     palm: int
@@ -236,21 +242,24 @@ class Hand:
 
 
 class Environment:
-    """The world for any objects that stand around, and where these are."""
+    """Collision world of the arm with any objects, and the poses of these objects."""
 
     def __init__(
         self, world: CollisionWorld | None, hand: Hand | None, table: TableTop | None = None
     ) -> None:
-        """``world``: the arm, and what cannot be moved. ``hand``: None where nothing is held.
+        """Create the environment.
 
-        ``table``: what objects stand on; None where that is not judged.
+        Args:
+            world: the arm and all fixed bodies; None to check no contacts.
+            hand: the hand; None if nothing can be held.
+            table: the support of the objects; None if their support is not checked.
         """
         self._world = world
         self.hand = hand
         self.table = table
 
     def world(self, objects: Sequence[SceneObject]) -> CollisionWorld | None:
-        """With ``objects``; None where nothing is looked at."""
+        """Return the collision world with ``objects``; None if contacts are not checked."""
         if self._world is None:
             return None
         standing = [
@@ -273,7 +282,7 @@ class Environment:
         return world
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
-        """(p,) how far apart each pair of ``world`` stays while the fingers move [m]."""
+        """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m]."""
         holdable = {
             scene_object.name
             for scene_object in objects
@@ -288,22 +297,27 @@ class Environment:
         return np.where(touching, 0.0, STOP)
 
     def pose(self, scene_object: SceneObject, x: FloatArray) -> FloatArray:
-        """(4, 4) of ``scene_object`` in the base frame, at ``x`` (k,): joints and finger joint
-        [rad].
+        """Return the pose (4, 4) of ``scene_object`` in the base frame.
+
+        x: (k,) joints and finger joint [rad].
         """
         return scene_object.T if not scene_object.carried else self._palm(x) @ scene_object.T
 
     def taken(self, scene_object: SceneObject, x: FloatArray) -> SceneObject:
-        """``scene_object`` in the hand, where it is."""
+        """Return ``scene_object`` as held by the hand, at the place where it is."""
         return replace(scene_object, T=self.into_hand(scene_object.T, x), held=True)
 
     def into_hand(self, T: FloatArray, x: FloatArray) -> FloatArray:
-        """``T`` (4, 4) in the base frame, in that of the hand at ``x`` (k,)."""
+        """Return the pose ``T`` (4, 4), given in the base frame, in the frame of the hand.
+
+        x: (k,) joints and finger joint [rad].
+        """
         return se3.inverse(self._palm(x)) @ T
 
     def mounted(self, scene_object: SceneObject, to: Attachment, x: FloatArray) -> SceneObject:
-        """``scene_object`` fixed to the hand, or to it no more. What the fingers hold stays with
-        them.
+        """Return ``scene_object`` fixed to ``to``. An object that the fingers hold is unchanged.
+
+        x: (k,) joints and finger joint [rad].
         """
         if scene_object.held or (
             to is Attachment.HAND and (scene_object.fixed or self.hand is None)
@@ -316,7 +330,10 @@ class Environment:
         return replace(scene_object, T=self.pose(scene_object, x), fixed=False)
 
     def left(self, scene_object: SceneObject, x: FloatArray) -> SceneObject:
-        """``scene_object`` out of the hand: it comes down upright on the table below."""
+        """Return ``scene_object`` released from the hand, upright on the table below.
+
+        x: (k,) joints and finger joint [rad].
+        """
         T = self.pose(scene_object, x)
         yaw = float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
         at = (T[0, 3], T[1, 3], 0.0)

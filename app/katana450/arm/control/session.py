@@ -1,4 +1,4 @@
-"""The session decides: commands and time in, the next state out. Nothing else happens here."""
+"""The session: a pure function from state, commands and time to the next state."""
 
 from __future__ import annotations
 
@@ -60,11 +60,10 @@ from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.water.environment import WaterEnvironment
 
 TOOL_SPEED = 0.5
-"""[m/s] Default maximum of the tool point: a person can follow it."""
+"""[m/s] Default maximum speed of the tool point: a person can follow it."""
 
 MAX_STEP_TIME = 0.05
-"""[s] However late a tick comes, the arm moves no further than in this time: a stalled machine
-must not turn into a leap."""
+"""[s] Maximum time that one tick moves the arm by. It prevents a leap after a stalled machine."""
 
 NO_BRANCH = BRANCHES[0]
 """The branch in the state of a robot that has none; nothing reads it."""
@@ -74,24 +73,24 @@ class Stepper(Protocol):
     """Moves the setpoints of a state towards its goal, under every limit."""
 
     def step(self, state: State, dt: float) -> State:
-        """``state`` with its setpoints moved on by ``dt`` [s]."""
+        """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
         ...
 
     def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
-        """The end (n,) [rad or m] of a brake begun now, the travel until then [m], and its time."""
+        """Return the end of a brake begun now (n,) [rad or m], the travel [m] and the time [s]."""
         ...
 
     def may_leave(self, state: State) -> bool:
-        """Whether the joints may brake beside the plan they follow, as hard as they can."""
+        """Return whether the joints may leave their plan and brake as hard as they can."""
         ...
 
 
 class Session:
-    """The rules of one robot. Holds no state of its own: ``step`` is a pure function.
+    """The rules of one robot. It holds no state of its own: ``step`` is a pure function.
 
     Attributes:
-        arm: the arm, or None for a robot of which only the joints can be driven.
-        world: what the arm must not touch, without the objects of a state; None without checks.
+        arm: the arm; None for a robot of which only the joints can be driven.
+        world: the collision world without the objects of a state; None to check no contacts.
         ready: (n,) the posture that Home drives to [rad or m].
     """
 
@@ -111,11 +110,11 @@ class Session:
         Args:
             robot: the arm, or the joints of a robot that is none.
             ready: (n,) the posture that Home drives to [rad or m].
-            world: what the arm must not touch; None to check no contacts.
+            world: the collision world; None to check no contacts.
             tool_speed: maximum speed of the tool point [m/s].
-            hand: what takes objects.
+            hand: the part of the arm that takes objects.
             objects: objects in the first state.
-            around: what water is in and falls on; None for no water.
+            water_environment: cup, basin and table of the water; None for no water.
             travel: for joints, the distance [m] that the links travel between two joint vectors.
         """
         self.arm = robot if isinstance(robot, ArmModel) else None
@@ -131,15 +130,18 @@ class Session:
         self._objects = objects
         self._tool_speed = tool_speed
         self._joint_stepper = JointStepper(robot, travel) if isinstance(robot, JointSet) else None
-        # For the objects of the newest state: no state, but what follows from them.
-        self._made: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
+        # Cache for the objects of the newest state.
+        self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
         self.check(cmd.SetJoints(ready))
         self.ready = frozen(ready)
         if of_joints(self._limits, robot.slides, self.ready):
             raise InputError("The ready posture lies outside the joint limits.")
 
     def begin(self, q: FloatArray, gripper: float, t: float) -> State:
-        """The state of a robot that stands at ``q`` (n,) [rad or m] and holds."""
+        """Return the state of a robot that stands at ``q`` (n,) [rad or m] and holds.
+
+        gripper: the finger joint [rad or m]. t: now [s].
+        """
         q = frozen(q)
         if self.arm is None:
             return State.standing(q, gripper, t, "", NO_BRANCH)
@@ -147,45 +149,45 @@ class Session:
         return State.standing(q, gripper, t, self.arm.default_tool, branch, self._objects)
 
     def require_arm(self) -> ArmModel:
-        """The arm. Raises InputError, with the reason, where only joints can be driven."""
+        """Return the arm. Raises InputError, with the reason, if only joints can be driven."""
         if isinstance(self._robot, JointSet):
             raise InputError(self._robot.refusal)
         return self._robot
 
     def world_at(self, state: State) -> CollisionWorld | None:
-        """What the arm must not touch, with the objects of ``state``."""
+        """Return the collision world with the objects of ``state``; None without checks."""
         return self._for(state)[1]
 
     def _for(self, state: State) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper]:
-        if self._made is None or self._made[0] is not state.objects:
+        if self._cache is None or self._cache[0] is not state.objects:
             world = self.environment.world(state.objects)
             stepper: Stepper | None = self._joint_stepper
             if stepper is None:
                 touch = None if world is None else self.environment.touch(world, state.objects)
                 stepper = MotionStepper(self.require_arm(), world, self._tool_speed, touch)
-            self._made = (state.objects, world, stepper)
-        return self._made
+            self._cache = (state.objects, world, stepper)
+        return self._cache
 
     def _stepper(self, state: State) -> Stepper:
         return self._for(state)[2]
 
     def check(self, command: cmd.Command) -> None:
-        """Raise InputError, for the sender, if this robot cannot even be asked for ``command``."""
+        """Raise InputError if this robot does not support ``command``."""
         if isinstance(self._robot, JointSet):
             check_joints(self._robot, command)
         else:
             check(self._robot, self.pouring, self.environment, command)
 
     def choices(self, state: State) -> tuple[BranchOption, ...]:
-        """The choice on each branch. Raises InputError where there is no arm."""
+        """Return the option on each branch. Raises InputError if there is no arm."""
         return branch_options(self.require_arm(), state, self.world_at(state))
 
     def step(self, state: State, commands: Iterable[cmd.Command], t: float) -> State:
-        """Take the commands in order, then move the setpoints on by the time that has passed.
+        """Execute the commands in order, then advance the setpoints by the time that has passed.
 
         Args:
             state: the state after the last tick.
-            commands: each one passed by ``check``; an InputError leaves ``state`` as it was.
+            commands: each command passes ``check``; an InputError leaves ``state`` as it was.
             t: now [s], on the clock of ``state.t``.
         """
         outcomes: list[Outcome] = []
@@ -215,12 +217,15 @@ class Session:
 
     @staticmethod
     def observe(state: State, q: FloatArray, gripper: float) -> State:
-        """``state`` with the place where the driver says that the robot really is."""
+        """Return ``state`` with the place of the robot that the driver reports.
+
+        q: (n,) [rad or m]. gripper: the finger joint [rad or m].
+        """
         return replace(state, q=q, gripper=gripper)
 
     @staticmethod
     def fail(state: State) -> State:
-        """Hold after an error of our own: no target survives it."""
+        """Return ``state`` that holds after an internal error; all targets are dropped."""
         held = replace(
             state,
             motion=JointMotion.rest(state.setpoint),
@@ -231,7 +236,7 @@ class Session:
         return replace(held, findings=(Finding(Reason.INTERNAL),))
 
     def _take(self, state: State, command: cmd.Command) -> State:
-        """``state`` after ``command``, as the table of transitions has it."""
+        """Return ``state`` after ``command``, as defined by the table of transitions."""
         match effect_of(command, state):
             case Effect.ACCEPTED:
                 return self._accepted(state, command)
@@ -243,7 +248,7 @@ class Session:
                 return state
 
     def _accepted(self, state: State, command: cmd.Command) -> State:
-        """``state`` after a command that leaves the mode as it is."""
+        """Return ``state`` after a command that leaves the mode as it is."""
         match command:
             case cmd.Pause():
                 return paused(state)
@@ -262,7 +267,7 @@ class Session:
         return with_scene_change(self.environment, self.pouring, state, command)
 
     def _continued(self, state: State, command: cmd.Command) -> State:
-        """``state`` after a command that the present mode takes in."""
+        """Return ``state`` after a command that the present mode continues with."""
         match command:
             case cmd.GoAlong(fraction=fraction):
                 return move_along_plan(self.require_arm().chain, state, fraction)
@@ -272,11 +277,11 @@ class Session:
                 return tool_targets.with_reapplied_priority(
                     self.require_arm(), replace(state, priority=priority)
                 )
-        # The others begin their mode just as they renew it.
+        # All other commands renew their mode in the same manner as they begin it.
         return self._superseded(state, command)
 
     def _superseded(self, state: State, command: cmd.Command) -> State:
-        """``state`` in the mode that ``command`` begins."""
+        """Return ``state`` in the mode that ``command`` begins."""
         match command:
             case cmd.Stop():
                 return self._stop_motion(state)
@@ -309,7 +314,7 @@ class Session:
                 return self._to_tool_target(self.require_arm(), state, command)
 
     def _to_tool_target(self, arm: ArmModel, state: State, command: cmd.Command) -> State:
-        """``state`` in the mode that a command about the tool begins."""
+        """Return ``state`` in the mode that a command about the tool begins."""
         match command:
             case cmd.MoveTool(position=position):
                 target = replace(current_target(arm, state), position=position)
@@ -328,15 +333,15 @@ class Session:
         raise AssertionError(f"The table of transitions has no rule for {command!r}.")
 
     def _retooled(self, state: State, name: str) -> State:
-        """``state`` with another tool frame: its goal stays, its target becomes the goal."""
+        """Return ``state`` with another tool frame: its goal stays, its target becomes the goal."""
         return self._aim(replace(state, tool=name), state.goal)
 
     def _clamped(self, q: FloatArray) -> FloatArray:
-        """The nearest to ``q`` (n,) inside the limits."""
+        """Return the posture inside the limits that is nearest to ``q`` (n,)."""
         return frozen(np.clip(q, self._limits.lower, self._limits.upper))
 
     def _aim(self, state: State, q: FloatArray) -> State:
-        """``state`` that is positioning at ``q`` (n,), or the nearest to it inside the limits."""
+        """Return ``state`` that is positioning at ``q`` (n,), or as near as the limits allow."""
         goal = self._clamped(q)
         if self.arm is not None:
             state = replace(state, branch=branch_of(self.arm.chain_to(state.tool), goal))
@@ -344,24 +349,27 @@ class Session:
         return with_goal(state, goal, findings, Positioning(JointTarget(q)))
 
     def _at_rest_soon(self, state: State) -> State:
-        """``state`` that brakes and holds, without a target."""
+        """Return ``state`` that brakes and holds, without a target."""
         return with_mode(self._aim(state, self._stepper(state).stopping_point(state)[0]), IDLE)
 
     def _stop_motion(self, state: State) -> State:
-        """Brake, and forget every target. The grip stays: what is held must not be dropped."""
+        """Return ``state`` that brakes and drops every target.
+
+        The grip stays, so that a held object does not fall.
+        """
         if state.stopped is not None:
             return state
         free = state.following is None or self._stepper(state).may_leave(state)
         state = replace(state, mode=IDLE) if free else with_mode(state, IDLE)
-        goal, way, time = self._stepper(state).stopping_point(state)
+        goal, travel, time = self._stepper(state).stopping_point(state)
         stopped = replace(
             state,
-            stopped=StoppingDistance(way, time),
+            stopped=StoppingDistance(travel, time),
             paused=False,
             goal=goal,
             gripper_goal=state.gripper_setpoint,
         )
-        return replace(stopped, findings=(Finding(Reason.STOPPED, way, time=time),))
+        return replace(stopped, findings=(Finding(Reason.STOPPED, travel, time=time),))
 
     def _grip(self, state: State, angle: float) -> State:
         limits = self.require_arm().gripper

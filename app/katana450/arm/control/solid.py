@@ -1,4 +1,4 @@
-"""What a mesh counts as where contacts are looked for, and how an object looks."""
+"""The solid of a mesh for collision checks, and the appearance of an object."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 MAX_KEY_LENGTH = 64
 
 MIN_OPACITY = 0.05
-"""Opacity: what is fainter cannot be seen, for which there is ``ObjectAppearance.hidden``."""
+"""Minimum opacity; an invisible object is ``ObjectAppearance.hidden`` instead."""
 
 Colour = tuple[int, int, int]
-"""Red, green, blue of 255."""
+"""Red, green and blue, each from 0 to 255."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A mesh without its triangles, which stay where they are drawn: a state is to be small.
+    """A mesh without its triangles, which stay with the view so that a state is small.
 
     Attributes:
-        key: of the triangles, by their content.
-        size: of a box along the axes that holds them [m].
-        corners: (k, 3) of a convex body that holds them [m]; z = 0 is their underside, and the z
+        key: identifies the triangles by their content.
+        size: of their bounding box along the axes [m].
+        corners: (k, 3) corners of a convex body around them [m]. z = 0 is its underside, and the z
             axis goes through the middle of the box.
     """
 
@@ -36,27 +36,29 @@ class Solid:
 
     def __post_init__(self) -> None:
         if not (self.key.isalnum() and len(self.key) <= MAX_KEY_LENGTH):
-            raise InputError(f"The key of a mesh is up to {MAX_KEY_LENGTH} letters and digits.")
+            raise InputError(
+                f"The key of a mesh must be at most {MAX_KEY_LENGTH} letters and digits."
+            )
         size = finite_array(self.size, (3,), "The size of a mesh")
         if size.min() < 0.0 or size.max() <= 0.0:
-            raise InputError(f"The size of a mesh is three lengths, not {self.size}.")
+            raise InputError(f"The size of a mesh must be three lengths, not {self.size}.")
         x, y, z = size.tolist()
         object.__setattr__(self, "size", (x, y, z))
         corners = np.asarray(self.corners, dtype=np.float64)
         if not 4 <= len(corners) <= MAX_CORNERS:
-            raise InputError(f"A mesh counts as 4 to {MAX_CORNERS} corners, not {len(corners)}.")
+            raise InputError(f"A mesh must have 4 to {MAX_CORNERS} corners, not {len(corners)}.")
         corners = finite_array(corners, (len(corners), 3), "The corners of a mesh")
         object.__setattr__(self, "corners", frozen(corners))
 
 
 @dataclass(frozen=True)
 class ObjectAppearance:
-    """How an object is drawn.
+    """Appearance of an object.
 
     Attributes:
-        colour: None for its own.
-        opacity: 1 is solid.
-        hidden: not drawn. It counts for contacts even so: what is not seen is still in the way.
+        colour: the colour; None for the colours of the object itself.
+        opacity: from MIN_OPACITY to 1, which is solid.
+        hidden: whether it is not drawn. A hidden object still counts in collision checks.
     """
 
     colour: Colour | None = None
@@ -67,10 +69,12 @@ class ObjectAppearance:
         if self.colour is not None and not (
             len(self.colour) == 3 and all(type(c) is int and 0 <= c <= 255 for c in self.colour)
         ):
-            raise InputError(f"A colour is three whole numbers from 0 to 255, not {self.colour}.")
+            raise InputError(
+                f"A colour must be three whole numbers from 0 to 255, not {self.colour}."
+            )
         if not MIN_OPACITY <= self.opacity <= 1.0:
-            raise InputError(f"An opacity is from {MIN_OPACITY} to 1, not {self.opacity}.")
+            raise InputError(f"An opacity must be from {MIN_OPACITY} to 1, not {self.opacity}.")
 
 
 PLAIN = ObjectAppearance()
-"""Of an object of which nobody says."""
+"""The default appearance of an object."""

@@ -1,4 +1,4 @@
-"""The whole state of the session, one immutable value a tick."""
+"""The whole state of the session: one immutable value per tick."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ __all__ = [
 
 
 class Status(Enum):
-    """How the goal of the arm stands to what was wished."""
+    """Relation of the goal of the arm to its target."""
 
     OK = "ok"
     LIMITED = "limited"
@@ -61,7 +61,7 @@ class Status(Enum):
 
 
 class Reason(Enum):
-    """Why the goal differs from what was wished."""
+    """Reason why the goal differs from the target, or is not approached."""
 
     STOPPED = "stopped"
     PAUSED = "paused"
@@ -85,22 +85,22 @@ class Reason(Enum):
 
 
 GRIPPER_LIMITS = (Reason.GRIPPER_LIMIT, Reason.GRIPPER_SLIDE_LIMIT)
-"""The reasons that are about the fingers alone."""
+"""The reasons that concern only the fingers."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One reason with its number.
+    """One reason with its numbers.
 
     Attributes:
-        reason: what holds the goal back.
-        amount: by how much [m or rad]; for a limit, the limit itself [rad or m]; for a gap, the
-            leap across it [rad]; for a contact, the distance that is left [m]; for a stop, how far
-            the tool, or else any link, went until it was at rest [m]; for a plan, how far its start
-            is [rad].
-        axis: the axis it is about, counted from 0, where it is about one.
-        parts: the two links or objects it is about, where it is about two.
-        time: for a stop, how long that took [s].
+        reason: the reason.
+        amount: the size of the effect [m or rad]. For a limit, the limit itself [rad or m]; for a
+            gap, the leap across it [rad]; for a contact, the remaining distance [m]; for a
+            stop, the travel of the tool, or else of any link, until rest [m]; for a plan, the
+            distance of the arm from its start [rad].
+        axis: the axis that the finding concerns, counted from 0; None if it concerns no axis.
+        parts: the two links or objects that the finding concerns; None if it concerns none.
+        time: for a stop, the time until rest [s].
     """
 
     reason: Reason
@@ -111,14 +111,14 @@ class Finding:
 
 
 class Verdict(Enum):
-    """How far a command takes effect."""
+    """Extent to which a command takes effect."""
 
     ACCEPTED = "accepted"
-    """As it was given."""
+    """The command takes effect as given."""
     LIMITED = "limited"
-    """As far as the arm can; the findings say what is in the way."""
+    """The command takes effect as far as the arm can; the findings name the limits."""
     REFUSED = "refused"
-    """Not at all: nothing has changed."""
+    """The command takes no effect: nothing has changed."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ class PartRefusal:
     """A refused part of a batch.
 
     Attributes:
-        part: its place in the batch, from 0.
+        part: its index in the batch, from 0.
         command: name of its class.
         why: the reason in words.
     """
@@ -141,9 +141,9 @@ class Outcome:
     """The outcome of one command.
 
     Attributes:
-        verdict: how far it takes effect.
-        findings: what limits it.
-        why: the reason in words, where the verdict is REFUSED and no finding says it.
+        verdict: the extent to which it takes effect.
+        findings: the reasons that limit it.
+        why: the reason in words, if the verdict is REFUSED without a finding.
         refused: the parts of a batch that take no effect.
     """
 
@@ -158,8 +158,9 @@ ACCEPTED = Outcome()
 
 @dataclass(frozen=True)
 class StoppingDistance:
-    """Distance that the tool, or else any link, travels until it is at rest [m], and the time that
-    takes [s].
+    """Distance [m] and time [s] of a stop until rest.
+
+    The distance is that of the tool, or else of any link.
     """
 
     way: float
@@ -168,30 +169,30 @@ class StoppingDistance:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Everything the session knows after a tick.
+    """The complete state of the session after a tick.
 
     Attributes:
         t: time of the tick [s].
-        q, gripper: where the arm is, as the driver last said, (n,) and scalar [rad].
-        motion, gripper_setpoint: what the driver is told in this tick, and how it moves.
-        goal, gripper_goal: where the arm is going: the nearest it can do to the target.
-        tool: the tool frame that targets and read-outs are of; empty where there are only joints,
-            and then the branch and the reading say nothing.
+        q, gripper: the place of the arm that the driver reported last, (n,) and scalar [rad].
+        motion, gripper_setpoint: the setpoint for the driver in this tick, and its motion.
+        goal, gripper_goal: the nearest posture to the target, to which the arm moves.
+        tool: the tool frame that targets and read-outs refer to. It is empty for a robot that has
+            only joints; ``branch`` and ``priority`` have no meaning then.
         branch: the branch that dragging keeps.
-        priority: which numbers of a target count, and what gives way.
-        findings: why the goal is not what was last wished, or is not gone to; else empty.
-        blocked: whether the arm waits on its way because it would touch something.
-        stopped: the stop that holds the arm until it is cleared; None when there is none.
-        paused: whether the arm waits on its way because a person wants it to.
-        speed: the fraction of every greatest speed that is allowed, above 0 and up to 1.
-        mode: what decides where the goal is. A drag is over once the goal is there; until then
-            the findings are those from before.
-        objects: what stands around or is held, and can be put elsewhere.
+        priority: which part of a target is kept when five axes cannot satisfy all of it.
+        findings: why the goal is not the target, or is not approached; else empty.
+        blocked: whether the arm waits on its path because it would touch something.
+        stopped: the stop that holds the arm until it is cleared; None if there is none.
+        paused: whether the arm waits on its path during a pause.
+        speed: the fraction of every maximum speed that is allowed, above 0 and up to 1.
+        mode: the cause that decides where the goal is. A drag ends when the goal has reached its
+            target; until then the findings are those from before.
+        objects: the objects that stand around or are held.
         grip: the angle of the finger joint at which an object is held [rad]; None with an empty
-        hand.
-        poured: the water of the cup; None where there is none.
-        looks: how links and objects are shown.
-        outcomes: what became of the commands of this tick, one for each.
+            hand.
+        poured: the water of the cup; None if there is none.
+        appearance: how links and objects are drawn.
+        outcomes: the outcomes of the commands of this tick, one for each.
     """
 
     t: float
@@ -225,7 +226,7 @@ class State:
         branch: Branch,
         objects: tuple[SceneObject, ...] = (),
     ) -> State:
-        """Joints that stand at ``q`` (n,) and hold, with nothing asked of them yet."""
+        """Return the state of joints that stand at ``q`` (n,) and hold, without a target."""
         return State(
             t=t,
             q=q,
@@ -241,7 +242,7 @@ class State:
 
     @property
     def status(self) -> Status:
-        """What the findings come to."""
+        """The status that follows from the findings, the stop and the pause."""
         if any(finding.reason is Reason.INTERNAL for finding in self.findings):
             return Status.FAULT
         if self.stopped is not None:
@@ -256,12 +257,12 @@ class State:
 
     @property
     def intent(self) -> Idle | Positioning | Tracking | Jogging | Servoing | Following:
-        """The mode, or the one that has superseded the plan which the arm is leaving."""
+        """The mode, or the mode that has superseded the plan which the arm is leaving."""
         return self.mode.then if isinstance(self.mode, Leaving) else self.mode
 
     @property
     def target(self) -> Target:
-        """The target as it was given, or the goal in a mode that has none."""
+        """The target as it was given, or the goal in a mode without a target."""
         intent = self.intent
         if isinstance(intent, Positioning | Tracking):
             return intent.target
@@ -276,12 +277,12 @@ class State:
 
     @property
     def jogging(self) -> Jogging | None:
-        """The jog under way."""
+        """The jog under way; None if there is none."""
         return self.intent if isinstance(self.intent, Jogging) else None
 
     @property
     def servo(self) -> Stream | None:
-        """The stream that is followed."""
+        """The stream that is followed; None if there is none."""
         return self.intent.stream if isinstance(self.intent, Servoing) else None
 
     @property
@@ -291,23 +292,23 @@ class State:
 
     @property
     def moving(self) -> bool:
-        """Whether the arm or the gripper is still on its way."""
+        """True if the arm or the gripper is still under way."""
         resting = self.blocked or self.paused or self.stopped is not None
         return self.under_way and not (resting and self.motion.at_rest)
 
     @property
     def setpoint(self) -> FloatArray:
-        """Where the driver is told to be, (n,) [rad]."""
+        """The joint angles that the driver receives, (n,) [rad]."""
         return self.motion.q
 
     @property
     def x(self) -> FloatArray:
-        """Where the arm is and its finger joint behind it, (n + 1,) [rad], as bodies are placed."""
+        """Where the arm is: the joints and then the finger joint, (n + 1,) [rad]."""
         return np.append(self.q, self.gripper)
 
     @property
     def x_setpoint(self) -> FloatArray:
-        """Likewise, where the driver is told to be."""
+        """The setpoint of the joints and then of the finger joint, (n + 1,) [rad]."""
         return np.append(self.setpoint, self.gripper_setpoint)
 
     @property
@@ -318,12 +319,12 @@ class State:
 
     @property
     def held(self) -> SceneObject | None:
-        """What the fingers hold."""
+        """The object that the fingers hold; None if there is none."""
         return next((each for each in self.objects if each.held), None)
 
     @property
     def under_way(self) -> bool:
-        """Whether the setpoints differ from the goals, whatever stands between them."""
+        """True if the setpoints differ from the goals, even if the arm waits."""
         return bool(
             (self.setpoint != self.goal).any()
             or not self.motion.at_rest

@@ -13,18 +13,17 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import TableTop
 
-GAP = 1e-3
-"""[m] An object that hangs no higher than this over a surface stands on it."""
+SUPPORT_GAP = 1e-3
+"""[m] Height over a surface up to which an object counts as standing on it."""
 
-UPRIGHT = 0.999
+MIN_UPRIGHT = 0.999
 """Cosine of the tilt up to which the top of an object is level enough to carry another."""
 
 
 def is_loose(scene_object: SceneObject) -> bool:
-    """Whether ``scene_object`` needs something to stand on: the cup, the basin, and what can be
-    held.
+    """Return whether ``scene_object`` needs a support: the cup, the basin, and holdable objects.
 
-    Anything else is a part of the work cell and may hang in the air.
+    All other objects are parts of the work cell and may hang in the air.
     """
     return not scene_object.carried and (
         scene_object.can_be_held or scene_object.name in (CUP, BASIN)
@@ -34,11 +33,12 @@ def is_loose(scene_object: SceneObject) -> bool:
 def check_carried(
     table: TableTop | None, objects: Sequence[SceneObject], scene_object: SceneObject
 ) -> None:
-    """Raise InputError, with the position and the table's extent, if nothing carries
-    ``scene_object``.
+    """Raise InputError, with the position and the table's extent, if an object has no support.
 
-    An object is carried where its middle is over the table or over an upright object, and its
-    lowest point is on that. table: None where there is none to judge by.
+    An object is carried if its middle is over the table or over an upright object, and its
+    lowest point is on that.
+
+    table: None if the support is not checked.
     """
     if table is None or scene_object.carried:
         return
@@ -46,12 +46,12 @@ def check_carried(
     tops = [each.T[2, 3] + each.height for each in objects if _is_over(scene_object, each)]
     if table.x[0] <= x <= table.x[1] and table.y[0] <= y <= table.y[1]:
         tops.append(0.0)
-    if any(lowest - top <= GAP for top in tops):
+    if any(lowest - top <= SUPPORT_GAP for top in tops):
         return
     at = f"{scene_object.name} would be in the air at x {1e3 * x:.1f}, y {1e3 * y:.1f}"
     if tops:
         gap = f"{1e3 * (lowest - max(tops)):.1f} mm"
-        raise InputError(f"{at} mm, {gap} above what is below it: put it {gap} lower.")
+        raise InputError(f"{at} mm, {gap} above its support: put it {gap} lower.")
     (left, right), (front, back) = 1e3 * np.array(table.x), 1e3 * np.array(table.y)
     raise InputError(
         f"{at} mm: nothing carries it there. The table reaches from x {left:.0f} to {right:.0f} "
@@ -66,8 +66,7 @@ def check_mounted(
     to: Attachment,
     x: FloatArray,
 ) -> None:
-    """Raise InputError if ``scene_object``, taken off the hand, would be left where nothing carries
-    it.
+    """Raise InputError if ``scene_object``, taken off the hand, would have no support.
 
     x: (k,) joints and finger joint [rad].
     """
@@ -77,7 +76,7 @@ def check_mounted(
 
 
 def _lowest(scene_object: SceneObject) -> float:
-    """Height [m] of the lowest point in the base frame; of a tilted mesh, of the box round it."""
+    """Return the height [m] of the lowest point in the base frame; for a mesh, of its box."""
     T, down = scene_object.T_collision_shape, abs(scene_object.T[2, :3])
     match scene_object.shape:
         case Shape.SPHERE:
@@ -91,10 +90,10 @@ def _lowest(scene_object: SceneObject) -> float:
 
 
 def _is_over(scene_object: SceneObject, other: SceneObject) -> bool:
-    """Whether the middle of ``scene_object`` is over the level top of ``other``."""
+    """Return whether the middle of ``scene_object`` is over the level top of ``other``."""
     if other.name == scene_object.name or other.carried or other.shape is Shape.SPHERE:
         return False
-    if other.T[2, 2] < UPRIGHT:
+    if other.T[2, 2] < MIN_UPRIGHT:
         return False
     x, y, _ = se3.inverse(other.T)[:3] @ np.append(scene_object.T_collision_shape[:3, 3], 1.0)
     if other.shape is Shape.CYLINDER:

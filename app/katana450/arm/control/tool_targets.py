@@ -31,11 +31,11 @@ NO_RATES = frozen(np.zeros(5))
 """The rates of a jog that ends."""
 
 KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, *GRIPPER_LIMITS)
-"""The reasons that a jog does not work out anew."""
+"""The reasons that a jog keeps; it computes all others again."""
 
 
 def with_pose_target(arm: ArmModel, state: State, target: PoseTarget) -> State:
-    """``state`` with the nearest that ``arm`` can do to ``target`` on its branch as the goal."""
+    """Return ``state`` with the nearest pose to ``target`` on its branch as the goal."""
     chain = arm.chain_to(state.tool)
     best = project(chain, target.T, priority=state.priority, branch=state.branch, q_hint=state.goal)
     findings = of_projection(chain, best, state.priority, yaw_was_given=True)
@@ -43,13 +43,16 @@ def with_pose_target(arm: ArmModel, state: State, target: PoseTarget) -> State:
 
 
 def dragged(arm: ArmModel, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
-    """``state`` that tracks ``target`` from now on, along the path of the hand."""
+    """Return ``state`` that tracks ``target`` from now on, along the path of the drag.
+
+    let_go: whether the drag has ended already.
+    """
     since = current_target(arm, state) if state.since is None else state.since
     return with_mode(state, Tracking(target, since, let_go))
 
 
 def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
-    """``state`` with its goal taken on towards the target of a drag, as far as one tick allows."""
+    """Return ``state`` with its goal moved towards the dragged target, as far as a tick allows."""
     chain = arm.chain_to(state.tool)
     found = track(
         chain,
@@ -67,7 +70,7 @@ def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
 
 
 def with_reapplied_priority(arm: ArmModel, state: State) -> State:
-    """``state`` with its pose or tool target projected anew, in the reading there is now."""
+    """Return ``state`` with its pose or tool target projected again, under the present priority."""
     match state.intent:
         case Positioning(target=PoseTarget() as target):
             return with_pose_target(arm, state, target)
@@ -79,7 +82,7 @@ def with_reapplied_priority(arm: ArmModel, state: State) -> State:
 
 
 def with_branch(arm: ArmModel, state: State, branch: Branch) -> State:
-    """``state`` that goes to ``branch`` with the tool at its target."""
+    """Return ``state`` that moves to ``branch`` with the tool at its target."""
     best = branch_option(arm, state, branch)
     target: Target = JointTarget(best.q)
     if isinstance(state.target, PoseTarget):
@@ -96,9 +99,10 @@ def with_branch(arm: ArmModel, state: State, branch: Branch) -> State:
 
 
 def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> State:
-    """``state`` after a tick of a jog: the goal is ``rest`` (n,), where it would come to rest.
+    """Return ``state`` after a tick of a jog, with ``rest`` (n,) as the goal.
 
-    So the arm does come to rest there when the jog is not renewed.
+    rest: the posture at which a brake begun now ends. So the arm comes to rest there if the jog
+    is not renewed.
     """
     chain = arm.chain_to(state.tool)
     kept = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
@@ -106,5 +110,5 @@ def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> S
     aimed = replace(state, goal=rest, branch=branch_of(chain, rest), findings=kept + held)
     if state.t < jogging.until:
         return aimed
-    # Braked as a jog, in step, the tool stays on its way.
+    # The end of a jog brakes all joints in proportion, so the tool stays on its path.
     return with_mode(aimed, IDLE if state.motion.at_rest else replace(jogging, rates=NO_RATES))

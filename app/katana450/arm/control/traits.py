@@ -1,4 +1,4 @@
-"""Traits of the commands: what the rest of the program has to know of a command's class.
+"""Traits of the commands: the properties of a command's class that other modules need.
 
 A command declares them where it is defined. There is no other list of command classes.
 """
@@ -19,11 +19,11 @@ class CommandTraits:
         while_paused: takes effect during a pause. A jog does not: it has no goal to keep for later.
         supersedes: ends the motion or the program that is under way or being planned.
         passive: leaves a path that is being planned as it is; all others end the planning.
-        pacing: may be given by the owner of the running program too, which holds the lease itself.
+        pacing: may also be given by the owner of the running program, which holds the lease itself.
         joints_only: possible for a mechanism that has joints and no tool.
         planned: a path is planned first, so the command takes effect later than its ticket.
-        safety: may be given by everybody, at any time, whoever holds the arm. It is never refused,
-            and what waits before it is dropped.
+        safety: may be given by every participant at any time, also without the lease. It is never
+            refused, and commands that wait before it are dropped.
     """
 
     stream: bool = False
@@ -52,5 +52,5 @@ class BaseCommand:
         return (self,)
 
     def replaces(self, waiting: BaseCommand) -> bool:
-        """Return whether ``waiting``, the newest before this one, need not be executed any more."""
+        """Return whether ``waiting``, the newest command before this one, need not be executed."""
         return self.traits.stream and type(waiting) is type(self)

@@ -23,16 +23,16 @@ from katana450.arm.control.state import State
 class Effect(Enum):
     """The effect of a command on the mode.
 
-    A command can still be refused for a reason of its own, which is then a finding: a plan, because
-    the arm does not stand at its start.
+    A command can still be refused for a reason of its own, which is then a finding. For example,
+    a plan is refused if the arm does not stand at its start.
     """
 
     ACCEPTED = "accepted"
-    """It takes effect, and the mode stays as it is."""
+    """The command takes effect, and the mode stays."""
     CONTINUES = "continues"
-    """The mode goes on with what the command says."""
+    """The mode continues with the values of the command."""
     SUPERSEDES = "supersedes"
-    """Another mode begins, and nothing of the present one is left."""
+    """Another mode begins, and no data of the present one is left."""
     REFUSED = "refused"
     """Nothing changes."""
 
@@ -44,8 +44,9 @@ A, C, S, R = Effect
 class Row:
     """The effects of one command.
 
-    begins: the mode that it begins where it supersedes; None where it never does.
-    effects: by mode.
+    Attributes:
+        begins: the mode that the command begins where it supersedes; None if it never does.
+        effects: the effect in each mode.
     """
 
     begins: type[Mode] | None
@@ -74,9 +75,9 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     cmd.Stop: _row(Idle,                S,   S,   S,   S,   S,   S),
     cmd.ClearStop: _row(Idle,           S,   S,   S,   S,   S,   S),
     cmd.Hold: _row(Idle,                S,   S,   S,   S,   S,   S),
-    # The target was one of the other tool frame; the goal stays.
+    # A target refers to the earlier tool frame, so it ends; the goal stays.
     cmd.SetTool: _row(Positioning,      A,   S,   S,   S,   S,   A),
-    # A tool target is projected anew.
+    # A tool target is projected again.
     cmd.SetPriority: _row(None,          A,   C,   C,   A,   A,   A),
     cmd.Pause: _row(None,               A,   A,   A,   A,   A,   A),
     cmd.Resume: _row(None,              A,   A,   A,   A,   A,   A),
@@ -100,7 +101,7 @@ def row_of(kind: type[cmd.BaseCommand]) -> Row:
 
 
 def effect_of(command: cmd.Command, state: State) -> Effect:
-    """The effect that ``command`` has on ``state``."""
+    """Return the effect that ``command`` has on ``state``."""
     if state.stopped is not None and not command.traits.while_stopped:
         return Effect.REFUSED
     if state.paused and not command.traits.while_paused:

@@ -1,1 +1,1 @@
-"""What stands between a setpoint and an arm. Every driver is a ``Driver``; one is simulated."""
+"""Drivers: the connection between setpoints and an arm. One of them simulates an arm."""

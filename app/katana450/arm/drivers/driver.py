@@ -1,4 +1,4 @@
-"""What every arm, real or simulated, can do for the control loop."""
+"""The interface of every arm, real or simulated, to the control loop."""
 
 from __future__ import annotations
 
@@ -10,27 +10,28 @@ from katana450.maths.geometry.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class SentSetpoint:
-    """What a driver really told the arm: ``q`` (n,) [rad] and the finger joint [rad]."""
+    """The setpoint that a driver sent to the arm: ``q`` (n,) [rad] and the finger joint [rad]."""
 
     q: FloatArray
     gripper: float
 
 
 class Driver(Protocol):
-    """An arm that takes a position setpoint each tick. Called from the control loop alone."""
+    """An arm that takes a position setpoint each tick. Only the control loop calls it."""
 
     def start(self, t: float) -> SentSetpoint:
-        """Connect, and say where the arm stands. ``t``: now [s]."""
+        """Connect to the arm, and return where it stands. ``t``: now [s]."""
         ...
 
     def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
-        """Pass the setpoint (n,) [rad] and the finger joint [rad] on, and say what was sent.
+        """Send a setpoint to the arm, and return what was sent.
 
-        A driver never sends what its arm must not be sent: it refuses what is not finite with an
-        InputError and cuts the rest to the limits and speeds of its own arm.
+        q: (n,) [rad]. gripper: the finger joint [rad]. t: now [s]. A driver protects its arm: it
+        raises InputError for a setpoint that is not finite, and clips all others to the limits and
+        speeds of the arm.
         """
         ...
 
     def stop(self) -> None:
-        """Let go of the arm. May be called twice."""
+        """Disconnect from the arm. May be called twice."""
         ...

@@ -1,4 +1,4 @@
-"""An arm that follows its setpoints exactly, as far as its joints are able."""
+"""A simulated arm that follows its setpoints exactly, up to the limits of its joints."""
 
 from __future__ import annotations
 
@@ -14,22 +14,26 @@ from katana450.maths.motion.limiter import Limits
 
 
 class JointLimitsSource(Protocol):
-    """What it has to know of an arm; any ``Arm`` is one."""
+    """The limits of an arm that the simulation needs; any ``ArmModel`` or ``JointSet`` has them."""
 
     @property
-    def limits(self) -> Limits: ...
+    def limits(self) -> Limits:
+        """Limits of the joints."""
+        ...
 
     @property
-    def gripper(self) -> GripperModel: ...
+    def gripper(self) -> GripperModel:
+        """The finger joint."""
+        ...
 
 
 class SimulatedDriver:
-    """Keeps to limits and speeds by itself, so that a fault upstream shows instead of hiding."""
+    """A simulated arm that enforces limits and speeds itself, which reveals faults upstream."""
 
     def __init__(self, arm: JointLimitsSource, q: FloatArray, gripper: float) -> None:
-        """The arm stands at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad or m].
+        """Create an arm at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad or m].
 
-        What is beyond its limits is set to the limit.
+        Values beyond the limits are clipped.
         """
         self._limits = arm.limits
         self._fingers = arm.gripper
@@ -37,14 +41,20 @@ class SimulatedDriver:
         self._t: float | None = None
 
     def start(self, t: float) -> SentSetpoint:
+        """Start the clock at ``t`` [s], and return where the arm stands."""
         self._t = t
         return self._sent
 
     def send(self, q: FloatArray, gripper: float, t: float) -> SentSetpoint:
+        """Move towards the setpoint within limits and speeds, and return what was sent.
+
+        q: (n,) [rad]. gripper: [rad or m]. t: now [s]. Raises InputError before ``start`` and for a
+        setpoint that is not finite.
+        """
         if self._t is None:
-            raise InputError("The simulated arm takes no setpoint before it is started.")
+            raise InputError("The simulated arm is not started: call `start` first.")
         if not (np.isfinite(q).all() and np.isfinite(gripper)):
-            raise InputError(f"The arm was sent a setpoint that is not finite: {q}, {gripper}.")
+            raise InputError(f"The setpoint must be finite, not {q}, {gripper}.")
         dt = max(t - self._t, 0.0)
         self._t = max(t, self._t)
         if gripper == self._sent.gripper and (q == self._sent.q).all():
@@ -55,6 +65,7 @@ class SimulatedDriver:
         return self._sent
 
     def stop(self) -> None:
+        """End the motion; ``start`` is needed before the next setpoint."""
         self._t = None
 
     def _clamped(self, q: FloatArray) -> FloatArray:
@@ -63,5 +74,5 @@ class SimulatedDriver:
     def _gripper(self, angle: float, dt: float) -> float:
         fingers = self._fingers
         step = fingers.speed * dt
-        wanted = fingers.clamp(angle)
-        return self._sent.gripper + min(max(wanted - self._sent.gripper, -step), step)
+        goal = fingers.clamp(angle)
+        return self._sent.gripper + min(max(goal - self._sent.gripper, -step), step)

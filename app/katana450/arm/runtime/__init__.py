@@ -1,1 +1,1 @@
-"""The running arm: clock, mailbox, control loop. The one place where threads meet."""
+"""The running arm: clock, mailbox and control loop. All threads of the arm meet here."""

@@ -1,4 +1,4 @@
-"""Time, so that the loop can be run on another clock in a test."""
+"""Clocks for the control loop, which runs on another clock in a test."""
 
 from __future__ import annotations
 
@@ -7,24 +7,26 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """A clock that only goes forwards."""
+    """A monotonic clock."""
 
     def now(self) -> float:
-        """Seconds since some fixed moment."""
+        """Return the time since a fixed moment [s]."""
         ...
 
     def sleep_until(self, t: float) -> None:
-        """Return at ``t`` [s], at once when that has passed."""
+        """Return at ``t`` [s], or at once if that has passed."""
         ...
 
 
 class MonotonicClock:
-    """The machine's own."""
+    """The monotonic clock of the machine."""
 
     def now(self) -> float:
+        """Return the time since a fixed moment [s]."""
         return time.perf_counter()
 
     def sleep_until(self, t: float) -> None:
+        """Return at ``t`` [s], or at once if that has passed."""
         left = t - time.perf_counter()
         if left > 0.0:
             time.sleep(left)

@@ -1,8 +1,9 @@
-"""Between the process that moves the arm and the one that people and programs speak to.
+"""The pipe between the arm's process and the front end's process.
 
-What takes long over there, pictures for a crowd above all, must not make the control loop late, and
-what crashes there must not let the arm go on. So the loop has a process of its own. Commands and
-heartbeats come in by a pipe, snapshots go out; when nothing comes any more the arm stops.
+The control loop has a process of its own. So slow work in the front end, such as rendering for many
+viewers, cannot delay the loop, and a crash there cannot leave the arm in motion without control.
+Commands and heartbeats come in by the pipe, and snapshots go out. When no message comes any more,
+the arm stops.
 """
 
 from __future__ import annotations
@@ -34,27 +35,27 @@ from katana450.errors import InputError
 log = logging.getLogger(__name__)
 
 PIPE_ERRORS = (EOFError, OSError)
-"""What a pipe raises when there is nobody at its other end."""
+"""Errors that a pipe raises when its other end is closed."""
 
-PULSE_EVERY = 0.1
-"""[s] Between two words of the arm's process at least, as long as its control loop ticks."""
+PULSE_INTERVAL = 0.1
+"""[s] Maximum time between two messages of the arm's process, as long as its control loop ticks."""
 
 PULSE = b"."
-"""Says only that the control loop has ticked."""
+"""A message that reports only that the control loop has ticked."""
 
 COMMAND_TIMEOUT = 0.5
-"""[s] Without a word of the arm's process, after which it is given no command but a stop."""
+"""[s] Silence of the arm's process after which only a stop is sent to it."""
 
-REPORT_EVERY = 1.0
-"""[s] Between two reports of how late the ticks are."""
+REPORT_INTERVAL = 1.0
+"""[s] Time between two reports of the timing of the control loop."""
 
-ENDING_SECONDS = 2.0
-"""[s] A thread that waits to report wakes sooner."""
+JOIN_TIMEOUT = 2.0
+"""[s] Timeout for the end of a thread; a thread that waits to report wakes sooner."""
 
 
 @dataclass(frozen=True)
 class CommandMessage:
-    """A command with its giver, and the front's own number for it."""
+    """A command with its giver, and the number that the front end has given it."""
 
     number: int
     command: cmd.Command
@@ -63,14 +64,18 @@ class CommandMessage:
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """A heartbeat."""
+    """A message that proves that the front end is alive."""
 
 
 @dataclass(frozen=True, eq=False)
 class StateMessage:
-    """A snapshot, whose ticket is the front's number; what is new in the event log; how late it is.
+    """A snapshot with the new entries of the event log, the loop timing and new outcomes.
 
-    outcomes: what became of commands since the last, by the front's numbers.
+    Attributes:
+        snapshot: the state; its ticket is the number that the front end has given the command.
+        event_log: entries since the last message.
+        loop_timing: timing of the control loop.
+        outcomes: outcomes of commands since the last message, by the numbers of the front end.
     """
 
     snapshot: Snapshot
@@ -80,12 +85,23 @@ class StateMessage:
 
 
 class ArmEnd:
-    """The end at the arm: puts in what is told, shows what the loop does, stops when it is cut."""
+    """The end of the link in the arm's process.
+
+    It delivers commands to the mailbox and sends what the loop publishes. It stops the arm when the
+    link is cut or silent.
+    """
 
     def __init__(
         self, pipe: Connection, loop: ControlLoop, mailbox: Mailbox, silence: float
     ) -> None:
-        """``silence``: [s] without a word that stops an arm that moves."""
+        """Create the end; ``start`` runs it.
+
+        Args:
+            pipe: the pipe to the front end.
+            loop: the control loop.
+            mailbox: the mailbox of that loop.
+            silence: time without a message [s] after which a moving arm is stopped.
+        """
         self._pipe = pipe
         self._loop = loop
         self._mailbox = mailbox
@@ -97,43 +113,43 @@ class ArmEnd:
         self._heard = time.monotonic()
         self._names = PlanNames()
         self.cut = threading.Event()
-        """Set once there is nobody at the other end."""
+        """Set once the other end is closed."""
         self._threads = [
             threading.Thread(target=target, name=f"link {name}", daemon=True)
             for name, target in (("in", self._listen), ("out", self._show), ("watch", self._watch))
         ]
 
     def start(self) -> None:
-        """In threads of its own, until it is cut."""
+        """Run the link in threads of its own until it is cut."""
         for thread in self._threads:
             thread.start()
 
     @property
     def unheard(self) -> float:
-        """[s] Since anything came from the other end."""
+        """Time since the last message from the front end [s]."""
         return time.monotonic() - self._heard
 
     def close(self) -> None:
-        """Cut it: the other end hangs up, and the arm stops."""
+        """Cut the link: the front end disconnects, and the arm stops."""
         self.cut.set()
         with suppress(*PIPE_ERRORS):
             self._pipe.send(None)
 
     def join(self) -> None:
-        """Return once its threads have ended, as they do when both ends are closed."""
+        """Return once the threads have ended, which they do when both ends are closed."""
         for thread in self._threads:
-            thread.join(ENDING_SECONDS)
+            thread.join(JOIN_TIMEOUT)
 
     def _listen(self) -> None:
         try:
             while True:
-                said = self._pipe.recv()
+                message = self._pipe.recv()
                 self._heard = time.monotonic()
-                if isinstance(said, CommandMessage):
-                    self._put(said)
+                if isinstance(message, CommandMessage):
+                    self._put(message)
         except PIPE_ERRORS:
             self.cut.set()
-            # Nobody is left who could say where to go on to.
+            # Without a front end no command can come any more.
             self._mailbox.put(cmd.Stop())
 
     def _put(self, message: CommandMessage) -> None:
@@ -143,7 +159,7 @@ class ArmEnd:
             try:
                 ticket = self._mailbox.put(message.command, message.actor)
             except InputError as error:
-                # Checked over there, so only too many at once can be wrong with it.
+                # The front end has checked the command, so only the mailbox can be full.
                 log.warning("A command was dropped: %s", error)
                 ticket = self._mailbox.last_ticket
                 self._refused.append((message.number, refused(str(error))))
@@ -159,16 +175,16 @@ class ArmEnd:
             self._send(StateMessage(self._named(seen), event_log, state_publisher.loop_timing))
             last = event_log[-1] if event_log else None
             while not self.cut.is_set():
-                snapshot = state_publisher.wait_for_change(seen, PULSE_EVERY)
+                snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
                 now = time.monotonic()
                 if snapshot is seen and self._loop.ticks == ticks:
-                    # A loop that does not tick gives no heartbeat.
+                    # A loop that does not tick must give no pulse.
                     continue
                 ticks = self._loop.ticks
-                if snapshot is seen and now - reported < REPORT_EVERY:
+                if snapshot is seen and now - reported < REPORT_INTERVAL:
                     self._pipe.send_bytes(PULSE)
                     continue
-                if now - reported >= REPORT_EVERY:
+                if now - reported >= REPORT_INTERVAL:
                     reported, state_publisher.loop_timing = now, self._loop.loop_timing
                 fresh = _newer(state_publisher.event_log, last)
                 last = fresh[-1] if fresh else last
@@ -185,18 +201,18 @@ class ArmEnd:
         self._pipe.send_bytes(self._names.dumped(message))
 
     def _named(self, snapshot: Snapshot) -> Snapshot:
-        """``snapshot`` with the front's number of the last command that is in it."""
+        """Return ``snapshot`` with the front end's number of the last command that it includes."""
         with self._numbering:
             while len(self._numbers) > 1 and self._numbers[1][0] <= snapshot.ticket:
                 self._numbers.popleft()
             return Snapshot(snapshot.state, self._numbers[0][1])
 
     def _outcomes(self) -> tuple[TicketOutcome, ...]:
-        """Return what is new of the outcomes, by the front's numbers."""
-        told = self._loop.state_publisher.take_outcomes()
+        """Return the new outcomes, by the numbers of the front end."""
+        outcomes = self._loop.state_publisher.take_outcomes()
         with self._numbering:
-            # Those of other ends, and the stops of this one, have no number here.
-            new = [(self._number_of.pop(ticket, None), outcome) for ticket, outcome in told]
+            # Commands of other ends, and stops by this end, have no number here.
+            new = [(self._number_of.pop(ticket, None), outcome) for ticket, outcome in outcomes]
             named = [(number, outcome) for number, outcome in new if number is not None]
             named += self._refused
             self._refused.clear()
@@ -207,15 +223,23 @@ class ArmEnd:
             silent = self.unheard
             state = self._loop.state_publisher.snapshot.state
             if silent > self._silence and state.moving and state.stopped is None:
-                log.error("Nothing was heard from the page's server for %.2f s: STOP.", silent)
+                log.error("The front end was silent for %.2f s: STOP.", silent)
                 self._mailbox.put(cmd.Stop())
 
 
 class FrontEnd:
-    """The end where people and programs are: a mailbox that reaches over, and a board."""
+    """The end of the link in the front end: it takes commands and publishes the arm's states."""
 
     def __init__(self, pipe: Connection, check: Callable[[cmd.Command], None]) -> None:
-        """Waits for the first snapshot. ``check``: see ``Mailbox``. Raises EOFError."""
+        """Create the end, and wait for the first snapshot.
+
+        Args:
+            pipe: the pipe to the arm's process.
+            check: see ``Mailbox``.
+
+        Raises:
+            EOFError: the arm's process has closed the pipe.
+        """
         self._pipe = pipe
         self._check = check
         self._sending = threading.Lock()
@@ -227,14 +251,14 @@ class FrontEnd:
         self.state_publisher = StatePublisher(first.snapshot, first.loop_timing)
         self.state_publisher.pin(first.snapshot, first.event_log)
         self.cut = threading.Event()
-        """Set once there is no arm any more."""
+        """Set once the arm's process has closed the pipe."""
         self._thread = threading.Thread(target=self._listen, name="link", daemon=True)
 
     def start(self) -> None:
-        """Take in all states that have arrived, then follow the arm in a thread of its own.
+        """Read all states that have arrived, then follow the arm in a thread of its own.
 
-        Between construction and start the arm may have moved, or stopped: after this call
-        ``board`` holds the newest state.
+        Between construction and start the arm may have moved, or stopped. After this call
+        ``state_publisher`` holds the newest state.
         """
         with suppress(*PIPE_ERRORS):
             while readable(self._pipe.fileno()):
@@ -248,20 +272,19 @@ class FrontEnd:
             return self._number
 
     def deliver(self, command: cmd.Command, actor: Actor | None = None) -> int:
-        """Send ``command`` of ``actor`` to the arm; returns its ticket.
+        """Send ``command`` of ``actor`` to the arm, and return its ticket.
 
-        Raises InputError for a command that the arm cannot be given.
-
-        Where the arm's process does not answer, only a stop is sent.
+        Raises InputError for a command that the arm does not support. If the arm's process does not
+        answer, every command but a stop is refused.
         """
         self._check(command)
         age = self.age
         if isinstance(command, cmd.Servo):
-            # The sooner it is stamped, the less of our own delays looks like its motion.
+            # An early stamp keeps delays in this process from looking like motion.
             command = replace(command, t=MonotonicClock().now())
         with self._sending:
             if command.traits.safety:
-                # What has not gone yet is dropped; an earlier stop is fulfilled by this one.
+                # Unsent commands are dropped; an earlier stop is fulfilled by this one.
                 unsent = (each for each in self._unsent if not each.command.traits.safety)
                 self.state_publisher.outcomes.note((each.number, DROPPED) for each in unsent)
                 self._unsent.clear()
@@ -278,31 +301,31 @@ class FrontEnd:
 
     @property
     def age(self) -> float:
-        """Time since the newest word of the arm's process [s], which came from a running loop.
+        """Time since the newest message of the arm's process [s]; a running loop has sent it.
 
-        What came and is not read yet counts as new.
+        A message that has arrived and is not read yet counts as new.
         """
         if self.cut.is_set():
             return time.monotonic() - self._heard
         return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
 
     def heartbeat(self) -> None:
-        """Give a heartbeat."""
+        """Send a heartbeat, unless commands still wait to be sent."""
         with self._sending:
             if self._flush():
                 self._send(Heartbeat())
 
     def _flush(self) -> bool:
-        """Send what waits; whether nothing waits any more. A full pipe keeps nobody waiting."""
+        """Send the waiting commands; return whether none is left. A full pipe does not block."""
         while self._unsent and self._send(self._unsent[0]):
             self._unsent.popleft()
         return not self._unsent
 
-    def _send(self, said: CommandMessage | Heartbeat) -> bool:
+    def _send(self, message: CommandMessage | Heartbeat) -> bool:
         try:
             if not writable(self._pipe.fileno()):
                 return False
-            self._pipe.send(said)
+            self._pipe.send(message)
         except PIPE_ERRORS:
             self.cut.set()
         return True
@@ -315,7 +338,7 @@ class FrontEnd:
             self.cut.set()
 
     def _take(self, data: bytes) -> None:
-        """Publish what ``data`` from the arm's end reports. Raises EOFError when that hangs up."""
+        """Publish the content of ``data`` from the arm's end. Raises EOFError when that closes."""
         self._heard = time.monotonic()
         if self._unsent:
             with self._sending:
@@ -327,14 +350,14 @@ class FrontEnd:
         seen = self.state_publisher.snapshot
         if message.snapshot.state.t != seen.state.t or message.snapshot.ticket != seen.ticket:
             self.state_publisher.pin(_known(message.snapshot, seen), message.event_log)
-        # After the state: a client that is answered finds one with its command in it.
+        # The state comes first: a client with an answer must find its command in the state.
         self.state_publisher.outcomes.note(message.outcomes)
 
 
 def _known(message: Snapshot, seen: Snapshot) -> Snapshot:
-    """``news`` with the objects of ``seen`` where they are the same.
+    """Return ``message`` with the objects of ``seen`` if they are the same.
 
-    What comes by the pipe is another object each time, which would be taken for a change.
+    Objects from the pipe are new Python objects each time, which would be taken for a change.
     """
     if not same(message.state.objects, seen.state.objects):
         return message
@@ -342,7 +365,7 @@ def _known(message: Snapshot, seen: Snapshot) -> Snapshot:
 
 
 def _loaded(data: bytes, plans: PlanStore) -> StateMessage:
-    """What ``data`` from the arm's end says; EOFError when that hangs up."""
+    """Return the message in ``data`` from the arm's end. Raises EOFError when that closes."""
     message = plans.loaded(data)
     if not isinstance(message, StateMessage):
         raise EOFError
@@ -350,7 +373,7 @@ def _loaded(data: bytes, plans: PlanStore) -> StateMessage:
 
 
 def _newer(event_log: tuple[LogEntry, ...], last: LogEntry | None) -> tuple[LogEntry, ...]:
-    """What stands in ``event_log`` behind ``last``."""
+    """Return the entries of ``event_log`` after ``last``."""
     for index in range(len(event_log) - 1, -1, -1):
         if event_log[index] is last:
             return event_log[index + 1 :]

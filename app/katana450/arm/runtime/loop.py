@@ -1,4 +1,4 @@
-"""The control loop: a fixed number of ticks a second, whatever the view does."""
+"""The control loop: a fixed number of ticks per second, independent of the view."""
 
 from __future__ import annotations
 
@@ -25,19 +25,27 @@ log = logging.getLogger(__name__)
 
 
 class Rules(Protocol):
-    """What decides; a ``Session`` is one."""
+    """The rules that decide each next state; a ``Session`` has them."""
 
-    def begin(self, q: FloatArray, gripper: float, t: float) -> State: ...
+    def begin(self, q: FloatArray, gripper: float, t: float) -> State:
+        """Return the first state of a robot that stands at ``q`` (n,) [rad or m]."""
+        ...
 
-    def step(self, state: State, commands: Iterable[Command], t: float) -> State: ...
+    def step(self, state: State, commands: Iterable[Command], t: float) -> State:
+        """Return the state after ``commands`` and the time until ``t`` [s]."""
+        ...
 
-    def observe(self, state: State, q: FloatArray, gripper: float) -> State: ...
+    def observe(self, state: State, q: FloatArray, gripper: float) -> State:
+        """Return ``state`` with the place of the robot that the driver reports."""
+        ...
 
-    def fail(self, state: State) -> State: ...
+    def fail(self, state: State) -> State:
+        """Return ``state`` that holds after an internal error."""
+        ...
 
 
 class ControlLoop:
-    """Drain, step, send, publish."""
+    """The control loop: each tick drains the mailbox, steps, sends the setpoint and publishes."""
 
     def __init__(
         self,
@@ -48,8 +56,16 @@ class ControlLoop:
         rate: float,
         held_up: float = math.inf,
     ) -> None:
-        """``rate``: ticks a second [Hz]. ``held_up``: lateness of a tick [s] that stops an arm
-        which moves: nobody watched over it meanwhile.
+        """Create the loop, and start the driver.
+
+        Args:
+            session: the rules of the robot.
+            driver: the connection to the arm.
+            mailbox: the source of commands.
+            clock: the clock of the ticks.
+            rate: ticks per second [Hz].
+            held_up: lateness of a tick [s] that stops a moving arm, because the loop did not
+                supervise it meanwhile.
         """
         self._session = session
         self._driver = driver
@@ -65,17 +81,17 @@ class ControlLoop:
         self._punctuality = Punctuality(self._period)
         self._newest: Submission | None = None
         self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
-        """Where it shows what it does."""
+        """Publisher of the states of the loop."""
         self.ticks = 0
-        """Ticks that were completed."""
+        """Number of completed ticks."""
 
     @property
     def loop_timing(self) -> LoopTiming:
-        """How well the ticks come when they are due."""
+        """Timing of the last ticks."""
         return self._punctuality.loop_timing
 
     def tick(self) -> None:
-        """One turn: take the commands, move on, tell the arm, publish what changed."""
+        """Execute one tick: take the commands, step, send the setpoint, publish changes."""
         drained = self._mailbox.drain()
         if drained.submissions:
             self._newest = drained.submissions[-1]
@@ -86,18 +102,18 @@ class ControlLoop:
             sent = self._driver.send(state.setpoint, state.gripper_setpoint, t)
             state = self._session.observe(state, sent.q, sent.gripper)
         except Exception:
-            # Whatever went wrong, the loop lives on and the arm holds: a person must see it.
+            # The loop continues after any error and the arm holds: the state reports the error.
             log.exception("The control loop met an error; the arm holds.")
             state = replace(self._session.fail(before), outcomes=(FAILED,) * len(drained.commands))
         self._state = state
-        # An arm at rest wakes nobody: time alone is no news.
+        # A state that differs only in its time is not published.
         if drained.commands or _differs(before, state):
             self.state_publisher.note(_outcomes(drained, state))
             self.state_publisher.pin(Snapshot(state, drained.last), self._entries(before, state))
         self.ticks += 1
 
     def _entries(self, before: State, after: State) -> tuple[LogEntry, ...]:
-        """Return what is new in the event log, attributed to the newest command."""
+        """Return the new entries of the event log, attributed to the newest command."""
         if self._newest is None:
             return entries_between(before, after)
         command, actor = self._newest
@@ -105,7 +121,7 @@ class ControlLoop:
 
     @property
     def running(self) -> bool:
-        """Whether the thread runs; False once it has ended, for whatever reason."""
+        """True if the thread runs; False once it has ended for any reason."""
         return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:
@@ -114,7 +130,7 @@ class ControlLoop:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread and let go of the arm."""
+        """End the thread and stop the driver."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join()
@@ -129,7 +145,7 @@ class ControlLoop:
                 log.error("The control loop was %.2f s late while the arm moved: STOP.", late)
                 self._mailbox.put(Stop())
             if late > self._period:
-                # Do not run after lost ticks: the session moves by the time that passed.
+                # Skip lost ticks: the next step covers the time that passed.
                 due += late
             self.tick()
             due += self._period
@@ -137,7 +153,7 @@ class ControlLoop:
 
 
 def _outcomes(drained: Drained, state: State) -> Iterator[TicketOutcome]:
-    """Yield what became of each ticket of ``drained`` in the tick that ended in ``state``."""
+    """Yield the outcome of each ticket of ``drained`` in the tick that ended in ``state``."""
     for ticket in drained.dropped:
         yield ticket, DROPPED
     for tickets, outcome in zip(drained.tickets, state.outcomes, strict=False):

@@ -1,4 +1,4 @@
-"""How well the control loop keeps its period."""
+"""Timing of the control loop: the lateness of its ticks."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 TIMED_TICKS = 1000
-"""Ticks: the last ten seconds of a loop at 100 Hz."""
+"""Number of ticks that are measured: the last ten seconds of a loop at 100 Hz."""
 
 
 @dataclass(frozen=True)
 class LoopTiming:
-    """How much later than due the ticks came.
+    """Lateness of the ticks of a loop.
 
     Attributes:
-        period: of the loop [s].
-        count: ticks that are looked at.
-        p50, p99, most: [s] of these; a tick is never early.
-        lost: ticks that came more than a whole period late, since the start.
+        period: period of the loop [s].
+        count: number of ticks that are measured.
+        p50, p99, maximum: quantiles and maximum of their lateness [s]; a tick is never early.
+        lost: number of ticks since the start that were more than a whole period late.
     """
 
     period: float
@@ -31,22 +31,22 @@ class LoopTiming:
 
 
 class Punctuality:
-    """Takes down when ticks come; one thread notes, any reads."""
+    """Record of the lateness of ticks. One thread notes, any thread reads."""
 
     def __init__(self, period: float) -> None:
-        """``period``: of the loop [s]."""
+        """Create an empty record for a loop of ``period`` [s]."""
         self._period = period
         self._late: deque[float] = deque(maxlen=TIMED_TICKS)
         self._lost = 0
 
     def note(self, late: float) -> None:
-        """A tick came ``late`` [s] after it was due."""
+        """Record a tick that came ``late`` [s] after it was due."""
         self._late.append(max(late, 0.0))
         self._lost += late > self._period
 
     @property
     def loop_timing(self) -> LoopTiming:
-        """Of the last ticks."""
+        """Timing of the last ticks."""
         late = np.array(self._late.copy())
         if late.size == 0:
             return LoopTiming(self._period)

@@ -1,4 +1,4 @@
-"""The only way from other threads into the control loop."""
+"""The mailbox: the only path by which other threads send commands to the control loop."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from katana450.arm.control.commands import Command
 from katana450.errors import InputError
 
 CAPACITY = 256
-"""Commands that may wait for one tick: far more than people make in 10 ms, few enough to do."""
+"""Maximum number of commands that wait for one tick: far more than people make in 10 ms, and few
+enough to execute in one tick."""
 
 
 class Submission(NamedTuple):
@@ -23,9 +24,9 @@ class Submission(NamedTuple):
 
 
 class CommandSink(Protocol):
-    """Takes commands, here or at the end of a pipe.
+    """Receiver of commands, in this process or at the other end of a pipe.
 
-    In the process that people speak to, ``CommandGate.submit`` alone puts commands into one.
+    In the front end only ``CommandGate.submit`` delivers commands to one.
     """
 
     @property
@@ -34,9 +35,9 @@ class CommandSink(Protocol):
         ...
 
     def deliver(self, command: Command, actor: Actor | None) -> int:
-        """Leave ``command`` of ``actor`` for the next tick; returns its ticket.
+        """Leave ``command`` of ``actor`` for the next tick, and return its ticket.
 
-        Raises InputError.
+        Raises InputError for an invalid command.
         """
         ...
 
@@ -46,8 +47,8 @@ class Drained:
     """Content of the mailbox when a tick empties it.
 
     Attributes:
-        submissions: what waited, oldest first.
-        tickets: of each submission, with those of the commands of its stream that it replaced.
+        submissions: the waiting commands, oldest first.
+        tickets: for each submission, its ticket and those of the commands that it replaced.
         dropped: tickets of the commands that waited when a stop came.
         last: the last ticket that was given.
     """
@@ -64,14 +65,14 @@ class Drained:
 
 
 class Mailbox:
-    """Commands in the order they came, each checked at the door.
+    """Queue of checked commands, in the order of their arrival.
 
-    A ticket is the number of commands put in so far; ``drain`` hands them out, so that the loop can
-    tell a sender what became of its command.
+    A ticket is the number of commands put in so far. ``drain`` hands the tickets out, so that the
+    loop can report the outcome of each command to its sender.
     """
 
     def __init__(self, check: Callable[[Command], None]) -> None:
-        """``check`` raises an InputError for a command that must not enter."""
+        """Create an empty mailbox. ``check`` raises InputError for a command that is invalid."""
         self._check = check
         self._lock = threading.Lock()
         self._waiting: list[Submission] = []
@@ -80,12 +81,15 @@ class Mailbox:
         self._tickets = 0
 
     def put(self, command: Command, actor: Actor | None = None) -> int:
-        """Leave ``command`` for the next tick; returns its ticket. Never blocks for long."""
+        """Leave ``command`` for the next tick, and return its ticket. Never blocks for long.
+
+        Raises InputError for an invalid command, and when the mailbox is full.
+        """
         self._check(command)
         with self._lock:
             replaced: list[int] = []
             if command.traits.safety:
-                # Never refused, and what waits before it is dropped; an earlier stop is fulfilled.
+                # Never refused. Waiting commands are dropped; an earlier stop is fulfilled.
                 for each, tickets in zip(self._waiting, self._of_waiting, strict=True):
                     earlier = each.command.traits.safety
                     (replaced if earlier else self._dropped).extend(tickets)
@@ -101,7 +105,7 @@ class Mailbox:
             return self._tickets
 
     def drain(self) -> Drained:
-        """Hand out everything that waits."""
+        """Remove and return all waiting commands."""
         with self._lock:
             drained = Drained(self._waiting, self._of_waiting, self._dropped, self._tickets)
             self._waiting, self._of_waiting, self._dropped = [], [], []

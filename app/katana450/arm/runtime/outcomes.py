@@ -1,4 +1,4 @@
-"""Record of what became of commands, by their tickets, for whoever waits for it."""
+"""Record of the outcomes of commands by their tickets, for threads that wait for them."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from contextlib import suppress
 from katana450.arm.control.state import Outcome
 
 MAX_KEPT_OUTCOMES = 1024
-"""Outcomes that are remembered, and tickets that are waited for: many seconds of a quick stream."""
+"""Maximum number of recorded outcomes, and of awaited tickets: many seconds of a fast stream."""
 
 TicketOutcome = tuple[int, Outcome]
-"""A ticket and what became of its command."""
+"""A ticket and the outcome of its command."""
 
 
 class Outcomes:
-    """The newest outcomes. Safe for every thread."""
+    """The newest outcomes. Safe for use by any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._known: OrderedDict[int, Outcome] = OrderedDict()
         self._awaited: OrderedDict[int, Future[Outcome]] = OrderedDict()
 
-    def note(self, told: Iterable[TicketOutcome]) -> None:
-        """Record ``told`` and wake whoever waits for it."""
+    def note(self, outcomes: Iterable[TicketOutcome]) -> None:
+        """Record ``outcomes``, and wake the threads that wait for them."""
         ready = []
         with self._lock:
-            for ticket, outcome in told:
+            for ticket, outcome in outcomes:
                 self._known[ticket] = outcome
                 if ticket in self._awaited:
                     ready.append((self._awaited.pop(ticket), outcome))
             while len(self._known) > MAX_KEPT_OUTCOMES:
                 self._known.popitem(last=False)
         for future, outcome in ready:
-            # Cancelled meanwhile: nobody waits any more.
+            # A future that was cancelled meanwhile takes no result.
             with suppress(InvalidStateError):
                 future.set_result(outcome)
 
     def of(self, ticket: int) -> Future[Outcome]:
-        """Return the outcome of ``ticket``, once it is recorded. For one that waits."""
+        """Return a future of the outcome of ``ticket``, for one waiting caller per ticket."""
         future: Future[Outcome] = Future()
         with self._lock:
             known = self._known.get(ticket)

@@ -1,4 +1,4 @@
-"""Ways that take a while to find: worked out beside everything else, and followed once found."""
+"""Planning of branch changes in a thread of its own; the arm follows the plan once it is found."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ from katana450.errors import KatanaError
 
 log = logging.getLogger(__name__)
 
-REST_SECONDS = 5.0
-"""[s] In which an arm that is to set out from rest has come to it."""
+REST_TIMEOUT = 5.0
+"""[s] Timeout for the arm to come to rest before a plan starts."""
 
 
 class PlanningWorker:
-    """Between whoever commands and the arm: a branch is taken on a planned way, clear from end to
-    end; all else goes on at once, and ends the work on a way.
+    """Command sink that plans branch changes and passes all other commands on at once.
+
+    A branch change follows a planned path that is clear from end to end. Every other command that
+    is not passive ends the planning.
     """
 
     def __init__(self, session: Session, state_publisher: StatePublisher, arm: CommandSink) -> None:
@@ -35,45 +37,45 @@ class PlanningWorker:
         self._lock = threading.Lock()
         self._work: threading.Event | None = None
         self.tell: Callable[[str], None] = log.warning
-        """Is told why no way was found."""
+        """Called with the reason if no path was found."""
         self.redirected: Callable[[], None] = lambda: None
-        """Is called, in any thread, when the arm is told to go elsewhere, to hold or to stop."""
+        """Called, in any thread, when a command gives the arm another motion, a hold or a stop."""
 
     @property
     def last_ticket(self) -> int:
-        """The ticket of the newest command that went to the arm."""
+        """The ticket of the newest command that was sent to the arm."""
         return self._arm.last_ticket
 
     @property
     def busy(self) -> bool:
-        """Whether a way is under work, or found and not begun yet."""
+        """True if a path is being planned, or is found and not started yet."""
         return self._work is not None or self._state_publisher.snapshot.ticket < self.last_ticket
 
     def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
-        """Implement ``CommandSink``; a command that follows a path found later has no ticket."""
+        """Implement ``CommandSink``. A command that is planned first gets no ticket of its own."""
         traits = [each.traits for each in command.parts]
         if not all(each.passive for each in traits):
             self.cancel()
         if any(each.supersedes for each in traits):
             self.redirected()
         if isinstance(command, cmd.TakeBranch):
-            self._set_out(command, actor)
+            self._plan(command, actor)
             return self.last_ticket
         return self._arm.deliver(command, actor)
 
     def cancel(self) -> None:
-        """Give up the way under work."""
+        """End the planning."""
         with self._lock:
             if self._work is not None:
                 self._work.set()
                 self._work = None
 
-    def _set_out(self, command: cmd.TakeBranch, actor: Actor | None) -> None:
+    def _plan(self, command: cmd.TakeBranch, actor: Actor | None) -> None:
         cancelled = threading.Event()
         with self._lock:
             self._work = cancelled
         threading.Thread(
-            target=self._find, args=(command, actor, cancelled), name="planning worker", daemon=True
+            target=self._find, args=(command, actor, cancelled), name="planning", daemon=True
         ).start()
 
     def _find(
@@ -90,18 +92,18 @@ class PlanningWorker:
         except KatanaError as error:
             self.tell(str(error))
         except Exception:
-            log.exception("A way could not be worked out.")
-            self.tell("Something went wrong inside while a way was worked out; see the log.")
+            log.exception("The planning of a path failed.")
+            self.tell("Internal error while a path was planned: see the server's log.")
         finally:
             with self._lock:
                 if self._work is cancelled:
                     self._work = None
 
     def _at_rest(self, actor: Actor | None, cancelled: threading.Event) -> State:
-        """The state of an arm that stands, which it is made to."""
+        """Return the state of the arm at rest; a moving arm is sent a hold first."""
         if self._state_publisher.snapshot.state.moving:
             self._unless(cancelled, cmd.Hold(), actor)
-        end = time.monotonic() + REST_SECONDS
+        end = time.monotonic() + REST_TIMEOUT
         snapshot = self._state_publisher.snapshot
         while snapshot.state.moving or snapshot.ticket < self._arm.last_ticket:
             if time.monotonic() > end or cancelled.is_set():

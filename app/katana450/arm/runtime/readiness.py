@@ -1,4 +1,4 @@
-"""Whether a socket or pipe can be read or written without waiting, and when data last came."""
+"""Readiness of sockets and pipes, and the age of the newest data of a connection."""
 
 from __future__ import annotations
 
@@ -12,38 +12,42 @@ LAST_DATA_RECEIVED = 52
 
 
 class SocketChannel(Protocol):
-    """A socket, or what asyncio gives of one."""
+    """A socket, or the object that asyncio provides for one."""
 
-    def fileno(self) -> int: ...
+    def fileno(self) -> int:
+        """Return the file descriptor; negative once closed."""
+        ...
 
-    def getsockopt(self, level: int, name: int, size: int, /) -> bytes: ...
+    def getsockopt(self, level: int, name: int, size: int, /) -> bytes:
+        """Return a socket option as bytes."""
+        ...
 
 
 def readable(fd: int) -> bool:
-    """Return whether data, or the other side's end, waits at ``fd``; False where unknown."""
+    """Return whether data, or the end of the other side, waits at ``fd``; False if unknown."""
     return _polled(fd, getattr(select, "POLLIN", 0), unknown=False)
 
 
 def writable(fd: int) -> bool:
-    """Return whether a short message can be written without waiting; True where unknown."""
+    """Return whether a short message can be written without waiting; True if unknown."""
     return _polled(fd, getattr(select, "POLLOUT", 0), unknown=True)
 
 
-def data_age(line: SocketChannel) -> float:
-    """Return how long ago the kernel received the newest data of a TCP connection [s].
+def data_age(channel: SocketChannel) -> float:
+    """Return the time since the kernel received the newest data of a TCP connection [s].
 
-    0 where the system does not tell: data that is being read then counts as new.
+    Returns 0 if the system does not report it: data that is being read then counts as new.
     """
     option = getattr(socket, "TCP_INFO", None)
-    if option is None or line.fileno() < 0:
+    if option is None or channel.fileno() < 0:
         return 0.0
     try:
-        about = line.getsockopt(socket.IPPROTO_TCP, option, LAST_DATA_RECEIVED + 4)
+        info = channel.getsockopt(socket.IPPROTO_TCP, option, LAST_DATA_RECEIVED + 4)
     except OSError:
         return 0.0
-    if len(about) < LAST_DATA_RECEIVED + 4:
+    if len(info) < LAST_DATA_RECEIVED + 4:
         return 0.0
-    milliseconds: int = struct.unpack_from("=I", about, LAST_DATA_RECEIVED)[0]
+    milliseconds: int = struct.unpack_from("=I", info, LAST_DATA_RECEIVED)[0]
     return 1e-3 * milliseconds
 
 

@@ -1,4 +1,4 @@
-"""Where the control loop shows what it does, to whoever looks, in this process or another."""
+"""Publication of the states of the control loop to other threads and to the pipe."""
 
 from __future__ import annotations
 
@@ -13,68 +13,68 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.outcomes import Outcomes, TicketOutcome
 
 MAX_KEPT_ENTRIES = 500
-"""Entries of the event log that are kept."""
+"""Maximum number of entries of the event log."""
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """What the loop shows the world: a state, and the last mailbox ticket that is in it."""
+    """A state, and the ticket of the last command that it includes."""
 
     state: State
     ticket: int
 
 
 class StatePublisher:
-    """One thread pins up, any look."""
+    """The newest snapshot, the event log and outcomes. One thread publishes, any thread reads."""
 
     def __init__(self, first: Snapshot, loop_timing: LoopTiming) -> None:
         self._snapshot = first
         self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._pinned = threading.Condition()
-        self._untold: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_ENTRIES)
+        self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_ENTRIES)
         self.outcomes = Outcomes()
-        """What became of commands, by their tickets."""
+        """Outcomes of commands, by their tickets."""
         self.loop_timing = loop_timing
-        """How well the loop keeps its period."""
+        """Timing of the control loop."""
 
     @property
     def snapshot(self) -> Snapshot:
-        """The newest one."""
+        """The newest snapshot."""
         return self._snapshot
 
     @property
     def event_log(self) -> tuple[LogEntry, ...]:
-        """The last reasons why the arm did not do what was wished, oldest first."""
+        """The last entries of the event log, oldest first."""
         return tuple(self._event_log)
 
-    def pin(self, snapshot: Snapshot, news: Sequence[LogEntry] = ()) -> None:
-        """Show ``snapshot`` from now on, and ``news`` in the event log."""
+    def pin(self, snapshot: Snapshot, entries: Sequence[LogEntry] = ()) -> None:
+        """Publish ``snapshot``, and add ``entries`` to the event log."""
         with self._pinned:
-            self._event_log.extend(news)
+            self._event_log.extend(entries)
             self._snapshot = snapshot
             self._pinned.notify_all()
 
-    def note(self, told: Iterable[TicketOutcome]) -> None:
-        """Record what became of commands; to be called before ``pin``."""
-        told = tuple(told)
-        self.outcomes.note(told)
+    def note(self, outcomes: Iterable[TicketOutcome]) -> None:
+        """Record outcomes of commands; to be called before ``pin``."""
+        outcomes = tuple(outcomes)
+        self.outcomes.note(outcomes)
         with self._pinned:
-            self._untold.extend(told)
+            self._unsent.extend(outcomes)
 
     def take_outcomes(self) -> tuple[TicketOutcome, ...]:
-        """Hand out the outcomes that were noted since this was last called."""
+        """Return the outcomes that were noted since the last call."""
         with self._pinned:
-            told = tuple(self._untold)
-            self._untold.clear()
-            return told
+            outcomes = tuple(self._unsent)
+            self._unsent.clear()
+            return outcomes
 
     def wait_for_change(self, seen: Snapshot, timeout: float) -> Snapshot:
-        """The newest snapshot, as soon as it is another than ``seen`` or ``timeout`` [s] is up."""
+        """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s]."""
         with self._pinned:
             self._pinned.wait_for(lambda: self._snapshot is not seen, timeout)
             return self._snapshot
 
     def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
-        """Return as soon as a command newer than ``seen`` is in, or ``timeout`` [s] is up."""
+        """Return once a command newer than ``seen`` is published, or after ``timeout`` [s]."""
         with self._pinned:
             self._pinned.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)

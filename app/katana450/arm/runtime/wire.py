@@ -1,8 +1,8 @@
-"""How snapshots cross the pipe: what is large and does not change crosses once.
+"""Serialization of snapshots for the pipe, in which large unchanged values are sent once.
 
-A plan that came from the other end goes back as its number, and over there it is the very plan
-that was sent, with the bodies it was made for. The solid of a mesh goes whole at first, and as its
-key for as long as it is in every message.
+A plan from the front end goes back as its number. There it becomes the same object that was sent,
+with the bodies that it was made for. The solid of a mesh is sent completely at first, and then as
+its key for as long as it is in every message.
 """
 
 from __future__ import annotations
@@ -14,25 +14,29 @@ from typing import Any
 from katana450.arm.control.solid import Solid
 from katana450.maths.planning.plan import Plan
 
-KEPT_HERE, KEPT_THERE = 8, 32
-"""Plans remembered: fewer where they are named than where the names are understood."""
+MAX_NAMED_PLANS, MAX_STORED_PLANS = 8, 32
+"""Number of plans that the arm's end (8) and the front end (32) remember. The end that names the
+plans keeps fewer than the end that looks the names up."""
 
 
 class PlanNames:
-    """At the end that follows plans: numbers of the newest that came in, and what was last sent."""
+    """Serializer at the arm's end, which follows plans.
+
+    It knows the numbers of the newest plans that came in, and the solids in the last message.
+    """
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[int, Plan]] = {}
         self._solids: frozenset[str] = frozenset()
 
     def note(self, number: int, plan: Plan) -> None:
-        """``plan`` came as ``number``."""
+        """Record that ``plan`` came in as ``number``."""
         self._known[id(plan)] = number, plan
-        while len(self._known) > KEPT_HERE:
+        while len(self._known) > MAX_NAMED_PLANS:
             self._known.pop(next(iter(self._known)))
 
     def dumped(self, value: Any) -> bytes:
-        """``value`` as bytes, its plans by their numbers."""
+        """Return ``value`` as bytes, with its plans replaced by their numbers."""
         file = io.BytesIO()
         pickler = _Pickler(file, self._known, self._solids)
         pickler.dump(value)
@@ -41,20 +45,23 @@ class PlanNames:
 
 
 class PlanStore:
-    """At the end that makes plans: the newest that went out by their numbers; what last came."""
+    """Deserializer at the front end, which makes plans.
+
+    It knows the newest plans that were sent, by their numbers, and the solids in the last message.
+    """
 
     def __init__(self) -> None:
         self._sent: dict[int, Plan] = {}
         self._solids: dict[str, Solid] = {}
 
     def note(self, number: int, plan: Plan) -> None:
-        """``plan`` goes as ``number``."""
+        """Record that ``plan`` is sent as ``number``."""
         self._sent[number] = plan
-        while len(self._sent) > KEPT_THERE:
+        while len(self._sent) > MAX_STORED_PLANS:
             self._sent.pop(next(iter(self._sent)))
 
     def loaded(self, data: bytes) -> Any:
-        """What ``data`` holds; each message is to be loaded, in the order they were dumped."""
+        """Return the value in ``data``. Every message must be loaded, in the order of dumping."""
         unpickler = _Unpickler(io.BytesIO(data), self._sent, self._solids)
         value = unpickler.load()
         self._solids = unpickler.solids
@@ -76,9 +83,9 @@ class _Pickler(pickle.Pickler):
             return None if found is None else found[0]
         if not isinstance(value, Solid):
             return None
-        told = value.key in self._there or value.key in self.solids
+        known = value.key in self._there or value.key in self.solids
         self.solids.add(value.key)
-        return (value.key,) if told else (value.key, value.size, value.corners)
+        return (value.key,) if known else (value.key, value.size, value.corners)
 
 
 class _Unpickler(pickle.Unpickler):
