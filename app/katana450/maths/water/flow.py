@@ -84,7 +84,7 @@ class WaterSurface:
         tilt: tilt [rad].
         level: level [m].
         downhill: unit vector to the lowest side of the rim, in the cup's frame and perpendicular to
-        its axis.
+            its axis.
     """
 
     tilt: float

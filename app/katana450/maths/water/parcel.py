@@ -17,7 +17,7 @@ class Parcel(NamedTuple):
     Attributes:
         volume: volume [fl].
         start, velocity: place [m] and velocity [m/s] of its last part at the lip, in the base
-        frame.
+            frame.
         age: time since then [s].
         span: time that it took to leave [s]; its first part is ahead by this.
     """
