@@ -19,7 +19,7 @@ from katana450.maths.geometry.arrays import FloatArray
 
 @pytest.fixture(scope="module", autouse=True, params=["coal", "fcl"])
 def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
-    """Every test of this folder runs on coal, and on FCL as on a machine without coal."""
+    """Run every test of this folder on coal, and on FCL as on a machine without coal."""
     pytest.importorskip(request.param)
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "fcl":
@@ -31,7 +31,7 @@ def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
 
 @pytest.fixture(scope="module")
 def bare(robot: Robot, engine: Engine) -> CollisionWorld:
-    """The arm without anything round it."""
+    """The arm without an environment."""
     world, notes = world_of(robot)
     assert world is not None
     assert notes == ()
@@ -54,5 +54,5 @@ def limits(arm: MountedArm) -> tuple[FloatArray, FloatArray]:
 
 @pytest.fixture
 def postures(limits: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """(200, 6) random ones [rad]."""
+    """Random postures (200, 6) [rad]."""
     return np.random.default_rng(7).uniform(*limits, (200, 6))

@@ -1,4 +1,4 @@
-"""How far a step goes: all the way where there is room, never too near, always away."""
+"""Limits on a step: full length with room, never too near, and always free to move away."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks
 
 
 def approach(x: FloatArray, end: FloatArray, speed: FloatArray, dt: float) -> FloatArray:
-    """``x`` (k,) a step of ``dt`` [s] on, straight towards ``end`` at the greatest speed."""
+    """Return the end of a step of ``dt`` [s] from ``x`` (k,) towards ``end`` at maximum speed."""
     needed = float(np.max(np.abs(end - x) / speed))
     return end if needed <= dt else np.asarray(x + (end - x) * (dt / needed))
 
@@ -48,7 +48,7 @@ def bar() -> CollisionWorld:
 
 
 def turned(bar: CollisionWorld, start: float, goal: float, speed: float) -> Iterator[FloatArray]:
-    """The postures of the bar, tick by tick, until it rests."""
+    """Yield the postures of the bar, tick by tick, until it rests."""
     x, end = np.array([start]), np.array([goal])
     for _ in range(2000):
         step = advance(bar, x, approach(x, end, np.array([speed]), TICK), TICK)
@@ -68,9 +68,9 @@ def test_the_bar_stops_before_the_wall(bar: CollisionWorld, speed: float) -> Non
     assert STOP - SLIGHTLY <= contact.distance < STOP + 10.0 * MIN_TRAVEL / (TICK / MIN_STOP_TIME)
 
 
-def test_it_slows_down_on_the_way(bar: CollisionWorld) -> None:
-    way = [0.0, *(float(x[0]) for x in turned(bar, 0.0, 3.0, 2.0))]
-    steps = np.diff(way)
+def test_bar_slows_down_before_the_wall(bar: CollisionWorld) -> None:
+    angles = [0.0, *(float(x[0]) for x in turned(bar, 0.0, 3.0, 2.0))]
+    steps = np.diff(angles)
     assert steps.max() == pytest.approx(2.0 * TICK)
     slowing = steps[steps < 0.99 * steps.max()]
     assert len(slowing) > 10
@@ -78,9 +78,7 @@ def test_it_slows_down_on_the_way(bar: CollisionWorld) -> None:
 
 
 @pytest.mark.parametrize("speed", [2.0, 8.0, 20.0])
-def test_it_does_not_jump_over_a_reed_thinner_than_its_step(
-    bar: CollisionWorld, speed: float
-) -> None:
+def test_bar_does_not_jump_over_a_thin_reed(bar: CollisionWorld, speed: float) -> None:
     *_, last = turned(bar, 0.0, -1.5, speed)
     assert last[0] > -np.pi / 4
     contact = bar.nearest(last)
@@ -89,7 +87,7 @@ def test_it_does_not_jump_over_a_reed_thinner_than_its_step(
     assert contact.distance >= STOP - SLIGHTLY
 
 
-def test_away_it_goes_as_fast_as_it_can(bar: CollisionWorld) -> None:
+def test_motion_away_is_not_slowed(bar: CollisionWorld) -> None:
     *_, last = turned(bar, 0.0, 3.0, 2.0)
     step = advance(bar, last, last - 2.0 * TICK, TICK)
     assert step.contact is None
@@ -97,8 +95,8 @@ def test_away_it_goes_as_fast_as_it_can(bar: CollisionWorld) -> None:
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.002, 0.008])
-def test_from_too_near_it_goes_away_and_no_nearer(bar: CollisionWorld, depth: float) -> None:
-    """Where the wall was put onto the bar, or a driver went too far."""
+def test_from_too_near_only_motion_away_is_allowed(bar: CollisionWorld, depth: float) -> None:
+    """Test a wall that was placed onto the bar, or a driver that overshot."""
     *_, last = turned(bar, 0.0, 3.0, 2.0)
     x = last + (STOP - 0.004 + depth) / 1.1
     contact = bar.nearest(x)
@@ -118,7 +116,7 @@ def test_from_too_near_it_goes_away_and_no_nearer(bar: CollisionWorld, depth: fl
     assert away.distance > 2.0 * STOP
 
 
-def test_a_step_with_room_is_done_to_the_bit(bar: CollisionWorld) -> None:
+def test_step_with_room_is_unchanged(bar: CollisionWorld) -> None:
     x, towards = np.array([0.1]), np.array([0.1 + 1e-3])
     step = advance(bar, x, towards, TICK)
     assert step.x is towards
@@ -127,7 +125,7 @@ def test_a_step_with_room_is_done_to_the_bit(bar: CollisionWorld) -> None:
     assert advance(bar, x, np.array([0.1]), TICK).x is x
 
 
-def test_the_same_step_is_the_same_to_the_bit(world: CollisionWorld, postures: FloatArray) -> None:
+def test_advance_is_deterministic(world: CollisionWorld, postures: FloatArray) -> None:
     for x, towards in zip(postures[:50], postures[50:100], strict=True):
         end = x + 0.02 * np.sign(towards - x)
         one, two = advance(world, x, end, TICK), advance(world, x, end, TICK)
@@ -137,7 +135,7 @@ def test_the_same_step_is_the_same_to_the_bit(world: CollisionWorld, postures: F
 def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
     arm: MountedArm, world: CollisionWorld, limits: tuple[FloatArray, FloatArray]
 ) -> None:
-    """From goal to goal, most of them in the table or in the arm itself; also between the ticks."""
+    """Drive to goals, most of them in the table or in the arm itself; also check between ticks."""
     rng = np.random.default_rng(10)
     speed = np.append(arm.chain.speed, arm.gripper.speed)
     x = np.append(np.radians((0.0, -68.0, 85.0, 8.0, 0.0)), 0.0)
@@ -159,6 +157,6 @@ def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
     assert stops >= 5
 
 
-def test_a_graze_is_thinner_than_any_part(world: CollisionWorld) -> None:
+def test_unchecked_path_is_shorter_than_any_part(world: CollisionWorld) -> None:
     thinnest = min(2.0 * float(half.min()) for half in world.box_half)
     assert thinnest > MAX_UNCHECKED_PATH

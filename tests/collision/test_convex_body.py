@@ -1,4 +1,4 @@
-"""The few corners that stand for a mesh hold all of it, and not much more."""
+"""The convex body of a mesh contains all of it, and not much more."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from katana450.maths.geometry.arrays import FloatArray
 
 
 def check_holds(found: ConvexBody, points: FloatArray) -> None:
-    """By the planes of another hull: that of trimesh, which asks qhull itself."""
+    """Check with the planes of another hull: that of trimesh, which uses qhull."""
     assert 4 <= len(found.corners) <= MAX_CORNERS
     mesh = trimesh.Trimesh(found.corners).convex_hull
     heights = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles[:, 0])
     assert (points @ mesh.face_normals.T - heights).max() <= 1e-6 * np.ptp(points, axis=0).max()
-    # What coal, which ends the program over bodies without a volume, takes.
+    # Bodies that coal accepts: it ends the process for bodies without a volume.
     hull(found.corners)
 
 
@@ -37,7 +37,7 @@ def check_holds(found: ConvexBody, points: FloatArray) -> None:
     st.floats(0.01, 100.0),
 )
 @settings(max_examples=25, deadline=None)
-def test_any_points_are_held(
+def test_random_points_are_contained(
     count: int, seed: int, stretch: tuple[float, ...], scale: float
 ) -> None:
     random = np.random.default_rng(seed)
@@ -47,8 +47,8 @@ def test_any_points_are_held(
 
 
 @pytest.mark.parametrize("count", [300, 30_000])
-def test_points_all_on_a_sphere_are_held(count: int) -> None:
-    """Every one is a corner of the true hull, and more than are looked for."""
+def test_points_on_a_sphere_are_contained(count: int) -> None:
+    """Every point is a corner of the true hull, and there are more than the search takes."""
     points = np.random.default_rng(3).normal(size=(count, 3))
     points = 0.1 * points / np.linalg.norm(points, axis=1, keepdims=True)
     found = convex_body(points)
@@ -69,7 +69,7 @@ def test_a_box_of_many_triangles_is_a_box() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mesh", "most"),
+    ("mesh", "max_excess"),
     [
         (trimesh.creation.icosphere(3, radius=0.05), 0.1 * 0.05),
         (trimesh.creation.cylinder(0.05, 0.2, sections=64), 0.02 * 0.05),
@@ -77,19 +77,19 @@ def test_a_box_of_many_triangles_is_a_box() -> None:
     ],
     ids=["ball", "cylinder", "ring"],
 )
-def test_what_is_round_is_held_nearly(mesh: trimesh.Trimesh, most: float) -> None:
+def test_round_mesh_has_a_small_excess(mesh: trimesh.Trimesh, max_excess: float) -> None:
     found = convex_body(mesh.vertices)
     check_holds(found, mesh.vertices)
-    assert 0.0 < found.off < most
+    assert 0.0 < found.off < max_excess
     assert found.volume == pytest.approx(mesh.convex_hull.volume, rel=0.02)
-    # How far it stands off is measured anew, from the hull that trimesh finds.
+    # The excess is measured again with the hull of trimesh.
     true = mesh.convex_hull
     heights = np.einsum("ij,ij->i", true.face_normals, true.triangles[:, 0])
     assert (found.corners @ true.face_normals.T - heights).max() >= found.off - 1e-9
 
 
 @pytest.mark.parametrize("flat", [(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)], ids=["sheet", "wire"])
-def test_what_is_flat_is_given_a_thickness(flat: tuple[float, ...]) -> None:
+def test_flat_mesh_is_thickened(flat: tuple[float, ...]) -> None:
     points = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 3)) * flat
     found = convex_body(points @ so3.exp((0.3, 0.4, 0.5)).T)
     assert found.thickened

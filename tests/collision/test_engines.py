@@ -20,10 +20,10 @@ fcl_engine = importlib.import_module("katana450.maths.collision.fcl_engine")
 SAME = 1e-6  # m
 
 SHAPES = ("hull", "round hull", "box", "cylinder", "sphere")
-"""Kinds that are measured against each other."""
+"""Kinds of geometries that are compared with each other."""
 
 ROUND = {"cylinder", "sphere"}
-"""Kinds of which coal finds ways out of an overlap that are not the shortest."""
+"""Kinds for which coal does not find the shortest way out of an overlap."""
 
 
 def built(engine: Engine, kind: str, random: np.random.Generator) -> Any:
@@ -57,7 +57,7 @@ def poses(random: np.random.Generator, count: int) -> Iterator[tuple[FloatArray,
 def measured(
     engine: Engine, one: Any, T_one: FloatArray, other: Any, T_other: FloatArray
 ) -> Witness:
-    """Return what ``engine`` finds, once its two ways to say a distance are compared."""
+    """Return the result of ``engine``, after comparing its two functions for a distance."""
     placed = one, engine.transform(T_one), other, engine.transform(T_other)
     found = engine.witness(*placed)
     assert engine.distance(*placed) == pytest.approx(found.distance, abs=1e-9)
@@ -66,7 +66,7 @@ def measured(
 
 @pytest.mark.parametrize("kinds", list(combinations_with_replacement(SHAPES, 2)), ids="-".join)
 def test_fcl_measures_the_distances_of_coal(engine: Engine, kinds: tuple[str, str]) -> None:
-    """Compare apart from ways out of round bodies, of which the shorter one is right."""
+    """Compare all results except overlaps of round bodies, of which the smaller depth is right."""
     if not isinstance(engine, fcl_engine.FclEngine):
         pytest.skip("compared once")
     pytest.importorskip("coal")
@@ -85,7 +85,7 @@ def test_fcl_measures_the_distances_of_coal(engine: Engine, kinds: tuple[str, st
         theirs = measured(coal, pairs[1][0], T_one, pairs[1][1], T_other)
         if theirs.distance > 0.0 or not ROUND & set(kinds):
             assert ours.distance == pytest.approx(theirs.distance, abs=SAME)
-        # Nearest points cannot be too near, nor a way out of an overlap too short.
+        # Nearest points cannot be too near, nor can the depth of an overlap be too small.
         assert abs(ours.distance) <= abs(theirs.distance) + SAME
         assert (ours.distance > 0.0) == (theirs.distance > 0.0)
         np.testing.assert_allclose(
@@ -96,7 +96,7 @@ def test_fcl_measures_the_distances_of_coal(engine: Engine, kinds: tuple[str, st
 def test_distances_of_the_arm_are_on_their_bounds(
     world: CollisionWorld, postures: FloatArray
 ) -> None:
-    """No body reaches beyond the plane across its nearest point: so no distance is too great."""
+    """No body reaches beyond the plane across its nearest point, so no distance is too large."""
     points = hull_points(world)
     for x in postures[:10]:
         T = world.linkage.poses(x)
@@ -117,7 +117,7 @@ def test_distances_of_the_arm_are_on_their_bounds(
 
 
 def hull_points(world: CollisionWorld) -> dict[int, FloatArray]:
-    """Return the corners of the hulls of ``world``, in the frames of the pieces."""
+    """Return the corners of the hulls of ``world``, in the frames of the groups."""
     shapes = [shape for part in world.parts for shape in part.shapes]
     found = {}
     for number, (shape, T) in enumerate(zip(shapes, world.T_mover_body, strict=True)):
@@ -140,9 +140,9 @@ def test_nearest_points_of_cubes(at: tuple[float, float, float], distance: float
     one, other = cube((0.0, 0.0, 0.0)), cube(at)
     points = nearest_points(one, other, np.array([0.1, -0.2, 1.0]))
     assert points is not None
-    way = points[1] - points[0]
-    assert np.linalg.norm(way) == pytest.approx(distance, abs=1e-9)
-    assert -overlap(one, other, way / distance) == pytest.approx(distance, abs=1e-9)
+    gap = points[1] - points[0]
+    assert np.linalg.norm(gap) == pytest.approx(distance, abs=1e-9)
+    assert -overlap(one, other, gap / distance) == pytest.approx(distance, abs=1e-9)
 
 
 @pytest.mark.parametrize("depth", [0.0, 1e-7, 0.1, 0.4])
@@ -157,8 +157,8 @@ def test_depth_of_cubes(depth: float) -> None:
     np.testing.assert_allclose(found.points[1] - found.points[0], -depth * found.normal, atol=1e-8)
 
 
-def wrong(distance: float) -> Callable[..., float]:
-    """Return an FCL that measures ``distance`` [mm], with nearest points that far apart."""
+def wrong_engine(distance: float) -> Callable[..., float]:
+    """Return a substitute for FCL's ``distance`` [mm], with nearest points that far apart."""
 
     def measure(_one: Any, _other: Any, _request: Any, result: Any) -> float:
         result.nearest_points = [np.zeros(3), np.array([abs(distance), 0.0, 0.0])]
@@ -172,7 +172,9 @@ def failing(*_: Any) -> float:
 
 
 @pytest.mark.parametrize(
-    "measure", [wrong(314.0), wrong(-3.0), wrong(0.0), failing], ids=["far", "in", "on", "raises"]
+    "measure",
+    [wrong_engine(314.0), wrong_engine(-3.0), wrong_engine(0.0), failing],
+    ids=["far", "in", "on", "raises"],
 )
 @pytest.mark.parametrize("distance", [0.3, 1e-4, -0.1])
 def test_wrong_results_of_fcl_are_repaired(

@@ -1,4 +1,4 @@
-"""Where the moving pieces are, against another reader of the same file."""
+"""Poses of the moving groups, against another reader of the same file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 
 
-def test_every_part_is_where_the_description_has_it(
+def test_poses_agree_with_the_description(
     robot: Robot, bare: CollisionWorld, postures: FloatArray
 ) -> None:
     urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
@@ -24,7 +24,7 @@ def test_every_part_is_where_the_description_has_it(
             np.testing.assert_allclose(T[part.mover] @ part.T_mover_shape[0], expected, atol=1e-12)
 
 
-def test_what_lies_between_two_pieces(bare: CollisionWorld) -> None:
+def test_variables_between_two_groups(bare: CollisionWorld) -> None:
     mover = {part.name: part.mover for part in bare.parts}
 
     def between(a: str, b: str) -> frozenset[int]:

@@ -1,4 +1,4 @@
-"""The pair table, which is found out and not listed."""
+"""The pair table, which is computed and not listed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def names(world: CollisionWorld) -> set[tuple[str, str]]:
     return {(world.parts[a].name, world.parts[b].name) for a, b in world.pairs}
 
 
-def test_neighbours_and_the_two_fingers_are_left_out(bare: CollisionWorld) -> None:
+def test_neighbours_and_fingers_are_excluded(bare: CollisionWorld) -> None:
     found = names(bare)
     assert not found & {
         ("base_link", "arm_base_link"),
@@ -34,15 +34,15 @@ def test_neighbours_and_the_two_fingers_are_left_out(bare: CollisionWorld) -> No
     }
 
 
-def test_parts_that_can_meet_are_in(bare: CollisionWorld) -> None:
+def test_parts_that_can_meet_are_included(bare: CollisionWorld) -> None:
     tools = ("roll_link", "gripper_link", "finger_right_link", "finger_left_link")
     assert names(bare) >= set(product(("base_link", "arm_base_link", "upper_arm_link"), tools))
 
 
-def test_pairs_left_out_never_come_near(
+def test_excluded_pairs_never_come_near(
     bare: CollisionWorld, limits: tuple[FloatArray, FloatArray]
 ) -> None:
-    """Each is driven as near as it goes, from many postures, by the steepest of random steps."""
+    """Drive each pair as near as possible, from many postures, by the steepest of random steps."""
     lower, upper = limits
     candidates = {
         (a, b)
@@ -72,8 +72,8 @@ def test_pairs_left_out_never_come_near(
         assert nearest > STOP, [alone.parts[number].name for number in pair]
 
 
-def test_parts_in_each_other_by_design_are_left_out() -> None:
-    """A sleeve on the second of two joints that turn about one line."""
+def test_parts_that_overlap_by_design_are_excluded() -> None:
+    """Test a sleeve on the second of two joints that turn about one line."""
     moved = se3.from_rotation_translation(np.eye(3), (1.0, 0.0, 0.0))
     linkage = Linkage([RigidGroup(0, np.eye(4), UP, 0), RigidGroup(1, np.eye(4), UP, 1)])
     cube = box((1.0, 1.0, 1.0))

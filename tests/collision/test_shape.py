@@ -1,4 +1,4 @@
-"""Convex shapes against sizes known beforehand."""
+"""Convex shapes against known sizes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
 def apart(one: CollisionShape, other: CollisionShape, p: tuple[float, float, float]) -> float:
-    """The distance between two shapes, the second at ``p`` [m] on a joint that stays at zero."""
+    """Return the distance between two shapes, the second at ``p`` [m] on a joint at zero."""
     T = se3.from_rotation_translation(np.eye(3), p)
     linkage = Linkage([RigidGroup(0, T, np.array([0.0, 0.0, 1.0]), 0)])
     parts = [obstacle("one", np.eye(4), one), Part("other", 1, (np.eye(4),), (other,))]
@@ -55,17 +55,17 @@ def test_distances(
     assert apart(cube(), other(), p) == pytest.approx(distance, abs=1e-6)
 
 
-def test_shapes_in_each_other_have_a_depth() -> None:
+def test_overlapping_shapes_have_a_depth() -> None:
     assert apart(hull(CUBE), hull(CUBE), (0.9, 0.0, 0.0)) == pytest.approx(-0.1, abs=1e-5)
 
 
 @pytest.mark.parametrize("side", [0.0, 0.7, -2.0])
-def test_a_half_space_is_flat_and_endless(side: float) -> None:
+def test_half_space_is_flat_and_infinite(side: float) -> None:
     assert apart(half_space(), hull(CUBE), (side, -side, 0.6)) == pytest.approx(0.1, abs=1e-9)
     assert apart(half_space(), hull(CUBE), (side, 0.0, 0.45)) == pytest.approx(-0.05, abs=1e-6)
 
 
-def test_shapes_are_where_they_are_put() -> None:
+def test_shapes_have_the_given_poses() -> None:
     T = se3.from_rotation_translation(so3.rotation_z(np.pi / 4), (2.0, 0.0, 0.0))
     linkage = Linkage([RigidGroup(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)])
     parts = [Part("turning", 1, (np.eye(4),), (hull(CUBE),)), obstacle("turned", T, hull(CUBE))]

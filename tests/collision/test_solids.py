@@ -18,7 +18,7 @@ LOOK = 30.0  # mm
 
 @functools.cache
 def solid(link: str) -> Manifold:
-    """Return everything of ``link``, mm."""
+    """Return the solid of ``link``, in mm."""
     return whole(next(make() for make in PARTS if make.__name__ == link))
 
 

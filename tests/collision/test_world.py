@@ -1,4 +1,4 @@
-"""The nearest pair, and the bounds that spare most pairs a closer look."""
+"""The nearest pair, and the bounds that make most distance computations unnecessary."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
 
-def test_the_nearest_pair_is_the_nearest_of_all(
+def test_nearest_pair_is_the_minimum_of_all_pairs(
     world: CollisionWorld, postures: FloatArray
 ) -> None:
     for x in postures[:60]:
@@ -24,12 +24,14 @@ def test_the_nearest_pair_is_the_nearest_of_all(
         assert contact.parts == (one, other)
 
 
-def test_points_and_normal_tell_the_distance(world: CollisionWorld, postures: FloatArray) -> None:
+def test_points_and_normal_agree_with_the_distance(
+    world: CollisionWorld, postures: FloatArray
+) -> None:
     for x in postures[:60]:
         contact = world.nearest(x)
         assert contact is not None
-        way = contact.points[1] - contact.points[0]
-        np.testing.assert_allclose(way, contact.distance * contact.normal, atol=2e-6)
+        gap = contact.points[1] - contact.points[0]
+        np.testing.assert_allclose(gap, contact.distance * contact.normal, atol=2e-6)
 
 
 def test_no_pair_is_nearer_than_its_bound(world: CollisionWorld, postures: FloatArray) -> None:
@@ -41,7 +43,7 @@ def test_no_pair_is_nearer_than_its_bound(world: CollisionWorld, postures: Float
         assert (placed.distances(pairs) >= bounds - 2e-6).all()
 
 
-def test_pairs_not_looked_at_are_far(world: CollisionWorld, postures: FloatArray) -> None:
+def test_skipped_pairs_are_far(world: CollisionWorld, postures: FloatArray) -> None:
     limit = np.linspace(0.0, 0.2, len(world.first))
     for x in postures[:30]:
         placed = world.at(x)
@@ -49,7 +51,7 @@ def test_pairs_not_looked_at_are_far(world: CollisionWorld, postures: FloatArray
         assert (placed.distances(left) >= limit[left] - 2e-6).all()
 
 
-def test_no_distance_changes_more_than_the_bodies_travel(
+def test_distance_changes_by_at_most_the_travel(
     world: CollisionWorld, postures: FloatArray
 ) -> None:
     rng = np.random.default_rng(8)
@@ -63,11 +65,11 @@ def test_no_distance_changes_more_than_the_bodies_travel(
         apart = here.distances(pairs) > 0.0
         assert (change <= travel + 2e-6)[apart].all()
         tightest = max(tightest, float((change / np.maximum(travel, 1e-6))[apart].max()))
-    # The bound is no mere formality.
+    # The bound is tight enough to matter.
     assert tightest > 0.8
 
 
-def test_a_joint_that_carries_both_bodies_brings_none_nearer(world: CollisionWorld) -> None:
+def test_joint_that_carries_both_bodies_keeps_their_distance(world: CollisionWorld) -> None:
     x = np.zeros(6)
     placed = world.at(x)
     travel = world.travel(placed, x, np.array([0.02, 0.0, 0.0, 0.0, 0.0, 0.0]))
@@ -77,11 +79,13 @@ def test_a_joint_that_carries_both_bodies_brings_none_nearer(world: CollisionWor
     assert (travel[~both] > 0.0).all()
 
 
-def test_a_world_without_pairs_has_no_nearest(bare: CollisionWorld) -> None:
+def test_world_without_pairs_has_no_nearest_pair(bare: CollisionWorld) -> None:
     assert CollisionWorld(bare.linkage, bare.parts, []).nearest(np.zeros(6)) is None
 
 
-def test_obstacles_meet_all_that_moves(world: CollisionWorld, bare: CollisionWorld) -> None:
+def test_obstacles_are_paired_with_all_moving_parts(
+    world: CollisionWorld, bare: CollisionWorld
+) -> None:
     table = len(bare.parts)
     met = {a for a, b in world.pairs if b == table}
     assert met == {number for number, part in enumerate(bare.parts) if part.mover > 0}

@@ -12,7 +12,7 @@ from katana450.maths.geometry.arrays import FloatArray
 
 repeatable = settings(max_examples=80, derandomize=True, deadline=None, database=None)
 
-# Near 0, near pi, and in between.
+# Angles near 0, near pi, and in between.
 angles = st.one_of(
     st.floats(0.0, math.pi),
     st.floats(-12.0, -1.0).map(lambda e: 10.0**e),

@@ -15,7 +15,7 @@ def test_finite_array_copies_and_converts() -> None:
     np.testing.assert_array_equal(got, [1.0, 2.0, 3.0])
 
 
-def test_its_error_says_what_where_and_which() -> None:
+def test_error_names_array_place_and_value() -> None:
     with pytest.raises(InputError, match=r"The list has -inf at \[1\]"):
         finite_array([0.0, -np.inf], (2,), "The list")
 

@@ -29,7 +29,7 @@ def test_vee_undoes_hat(V: FloatArray) -> None:
 @repeatable
 @given(twists)
 def test_exp_is_the_matrix_exponential(V: FloatArray) -> None:
-    # Scaling and squaring of the power series, which knows nothing of rotations.
+    # Scaling and squaring of the power series, which is independent of the formulas for rotations.
     X = se3.hat(V) / 1024.0
     term, expected = np.eye(4), np.eye(4)
     for k in range(1, 12):

@@ -38,7 +38,7 @@ def test_exp_is_a_rotation_about_its_vector(w: FloatArray) -> None:
 def test_log_undoes_exp_near_zero_and_near_pi(w: FloatArray) -> None:
     back = so3.log(so3.exp(w))
     if np.linalg.norm(w) > math.pi - 1e-12:
-        # At pi the opposite axis is as right.
+        # At pi the opposite axis is also right.
         assert min(np.abs(back - w).max(), np.abs(back + w).max()) < 1e-11
     else:
         np.testing.assert_allclose(back, w, rtol=1e-13, atol=ROUNDING)
@@ -149,9 +149,7 @@ def test_invalid_quaternion_is_refused(value: list[float]) -> None:
 
 @repeatable
 @given(rotation_vectors, rotation_vectors)
-def test_a_product_of_quaternions_turns_as_that_of_their_rotations(
-    a: FloatArray, b: FloatArray
-) -> None:
+def test_product_of_quaternions_is_the_product_of_rotations(a: FloatArray, b: FloatArray) -> None:
     A, B = so3.exp(a), so3.exp(b)
     product = so3.quaternion_product(so3.to_quaternion(A), so3.to_quaternion(B))
     np.testing.assert_allclose(so3.from_quaternion(product), A @ B, atol=ROUNDING)

@@ -10,7 +10,7 @@ from tests.geometry.strategies import angles, directions, points, repeatable
 
 @repeatable
 @given(points, points)
-def test_they_agree_with_numpy(a: FloatArray, b: FloatArray) -> None:
+def test_vectors_agree_with_numpy(a: FloatArray, b: FloatArray) -> None:
     u, v = vectors.vector(a), vectors.vector(b)
     np.testing.assert_array_equal(vectors.add(u, v), a + b)
     np.testing.assert_array_equal(vectors.sub(u, v), a - b)
@@ -22,7 +22,7 @@ def test_they_agree_with_numpy(a: FloatArray, b: FloatArray) -> None:
 
 @repeatable
 @given(points, directions)
-def test_perpendicular_is_what_the_axis_leaves(a: FloatArray, omega: FloatArray) -> None:
+def test_perpendicular_removes_the_part_along_the_axis(a: FloatArray, omega: FloatArray) -> None:
     left = np.array(vectors.perpendicular(vectors.vector(a), vectors.vector(omega)))
     np.testing.assert_allclose(left @ omega, 0.0, atol=1e-14)
     np.testing.assert_allclose(np.cross(a - left, omega), 0.0, atol=1e-14)

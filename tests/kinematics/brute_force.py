@@ -1,4 +1,4 @@
-"""The nearest pose by search: slow, approximate, and knowing nothing of the closed forms."""
+"""The nearest pose by a slow, approximate search without closed forms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ Mask = npt.NDArray[np.bool_]
 
 
 def tool_points(lengths: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Tool points (k, 3) and radial coordinates (k,) of joint angles (k, >= 4), by trigonometry."""
+    """Return tool points (k, 3) and radial coordinates (k,) of joint angles (k, >= 4).
+
+    Computed by trigonometry.
+    """
     a = q[:, 1]
     b = a + q[:, 2]
     c = b + q[:, 3]
@@ -32,7 +35,7 @@ def on_branch(branch: Branch | None, r: FloatArray, theta3: FloatArray) -> Mask:
 
 
 class NearestPoint:
-    """The least distance between the tool point inside the limits and a target."""
+    """The minimum distance between the tool point inside the limits and a target."""
 
     STARTS, SAMPLES, ROUNDS = 12, 48, 160
 
@@ -44,7 +47,10 @@ class NearestPoint:
         self.points, self.r = tool_points(lengths, self.grid)
 
     def distance(self, target: FloatArray, branch: Branch | None, seed: int) -> float:
-        """Least distance [m] found from the best grid points by a shrinking random search."""
+        """Return the minimum distance [m] that a shrinking random search finds.
+
+        It starts from the best grid points.
+        """
         rng = np.random.default_rng(seed)
         d = np.linalg.norm(self.points - target, axis=1)
         d[~on_branch(branch, self.r, self.grid[:, 2])] = np.inf
@@ -54,7 +60,7 @@ class NearestPoint:
         rows = np.arange(self.STARTS)
         for _ in range(self.ROUNDS):
             step = rng.normal(size=(self.STARTS, self.SAMPLES, 4)) * width[:, None, None]
-            # Moving few joints at a time keeps the others on their limits.
+            # Moving few joints at a time keeps the others at their limits.
             step *= rng.random(step.shape) < 0.6
             tried = np.clip(best[:, None] + step, self.lower, self.upper)
             flat = tried.reshape(-1, 4)
@@ -78,10 +84,10 @@ def least_rotation(
     branch: Branch | None,
     theta1s: FloatArray,
 ) -> float:
-    """Least rotation angle [rad] to `T` found over pitch and roll with the tool point at `point`.
+    """Return the minimum rotation angle [rad] to `T` found with the tool point at `point`.
 
-    theta1s: those to try. The pitch is scanned in steps of a thousandth of a radian, for both
-    elbows by the law of cosines; the roll likewise.
+    ``theta1s`` are the angles to try. The pitch is scanned in steps of a thousandth of a radian,
+    for both elbows by the law of cosines; so is the roll.
     """
     l1, l2, l3 = lengths
     lower, upper = chain.lower, chain.upper
@@ -107,12 +113,12 @@ def least_rotation(
 
 
 def _over_roll(R: FloatArray, theta1: float, phi: FloatArray, roll: FloatArray) -> float:
-    """Least angle over the grid phi x roll, from the trace of the rotation between."""
+    """Return the minimum angle over the grid phi x roll, from the trace of the rotation between."""
     c, s = np.cos(theta1), np.sin(theta1)
     A = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
     cf, sf = np.cos(phi)[:, None], np.sin(phi)[:, None]
     cp, sp = np.cos(roll)[None, :], np.sin(roll)[None, :]
-    # trace(A^T Ry(phi) Rx(roll)), the columns of Ry Rx written out.
+    # trace(A^T Ry(phi) Rx(roll)), with the columns of Ry Rx written out.
     trace = (
         (A[0, 0] * cf - A[2, 0] * sf)
         + (A[0, 1] * sf * sp + A[1, 1] * cp + A[2, 1] * cf * sp)

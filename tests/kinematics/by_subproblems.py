@@ -1,6 +1,6 @@
-"""The inverse of any member of the family by the Paden-Kahan subproblems on its own screw axes.
+"""The inverse of any member of the family by the Paden-Kahan subproblems on its screw axes.
 
-The specification the closed form is held to: it knows no canonical arm, only axes and points, and
+This is the specification of the closed form. It uses no canonical arm, only axes and points, and
 follows the paper's eq. (12) to (29) with both shoulders and both elbows.
 """
 
@@ -19,13 +19,13 @@ Line = tuple[Vector, Vector]
 
 
 def _foot(p: Vector, line: Line) -> Vector:
-    """The point of the line nearest to `p`."""
+    """Return the point of the line nearest to `p`."""
     omega, r = line
     return add(r, scale(dot(sub(p, r), omega), omega))
 
 
 def solve(chain: Chain, T: FloatArray) -> list[FloatArray]:
-    """Joint vectors (5,) [rad] for the pose `T`, every branch that reaches it, in no order."""
+    """Return the joint vectors (5,) [rad] for the pose `T`, on every branch, in no order."""
     lines: list[Line] = [
         (vector(chain.S[:3, i]), vector(screws.point_on(chain.S[:, i]))) for i in range(5)
     ]
@@ -61,19 +61,19 @@ def solve(chain: Chain, T: FloatArray) -> list[FloatArray]:
 
 
 def _undone(p: Vector, turns: list[tuple[Line, float]]) -> Vector:
-    """`p` with the turns about the lines taken back, the last one first."""
+    """Return `p` with the turns about the lines undone, the last one first."""
     for line, theta in reversed(turns):
         p = rotate(p, *line, -theta)
     return p
 
 
 def same(qa: FloatArray, qb: FloatArray, within: float) -> bool:
-    """Whether two joint vectors are equal but for whole turns."""
+    """Return True if two joint vectors are equal up to whole turns."""
     return bool(np.abs(np.exp(1j * np.asarray(qa)) - np.exp(1j * np.asarray(qb))).max() < within)
 
 
 def matched(a: list[FloatArray], b: list[FloatArray], within: float) -> bool:
-    """Whether each of `a` is one of `b` and the other way round."""
+    """Return True if `a` and `b` contain the same joint vectors, up to whole turns."""
     return all(any(same(x, y, within) for y in b) for x in a) and all(
         any(same(x, y, within) for x in a) for y in b
     )

@@ -14,7 +14,7 @@ TOOL_LENGTHS = {"tcp": 0.3028, "flange": 0.1883}
 
 
 def katana(tool: str = "tcp") -> Chain:
-    """The arm with a tool point that far along its last axis, in the frame of the shoulder."""
+    """Return the arm with a tool point on its last axis, in the frame of the shoulder."""
     M = np.eye(4)
     M[0, 3] = L1 + L2 + TOOL_LENGTHS[tool]
     x, y, z = np.eye(3)

@@ -1,4 +1,4 @@
-"""Random members of the family of arms, made from their offsets and from nothing of the app's."""
+"""Random members of the family of arms, made from their offsets without code of the app."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ from katana450.maths.kinematics.chain import Chain
 
 @dataclass(frozen=True)
 class Offsets:
-    """What a member is made of; lengths in m, angles in rad.
+    """The dimensions of a member; lengths in m, angles in rad.
 
-    radial, lateral: of the shoulder from axis 1. links: axes 2 to 3 to 4, and 4 to the foot of the
-    tool point on the roll axis. bearings: of the links and of the roll axis above the horizontal at
-    q = 0. roll_offset: of axis 4 from the roll axis, in the plane. signs: of the axes.
+    Attributes:
+        radial, lateral: offset of the shoulder from axis 1.
+        links: distances from axis 2 to 3, from 3 to 4, and from 4 to the foot of the tool point on
+            the roll axis.
+        bearings: angles of the links and of the roll axis above the horizontal at q = 0.
+        roll_offset: offset of axis 4 from the roll axis, in the plane.
+        signs: signs of the axes.
     """
 
     radial: float
@@ -30,11 +34,12 @@ class Offsets:
 
     @property
     def size(self) -> float:
+        """An upper bound on the reach [m]."""
         return abs(self.radial) + abs(self.lateral) + sum(self.links) + abs(self.roll_offset)
 
 
 def random_offsets(rng: np.random.Generator, *, lateral: bool) -> Offsets:
-    """Each offset is there or not, so that arms with few are met as well."""
+    """Return random offsets; each is zero in some members, so that simple arms are tested too."""
     there = rng.random(4) < 0.7
     low, middle, high = rng.uniform(-math.pi, math.pi, 3) * there[0]
     one, two, three, four, five = rng.choice((-1, 1), size=5).tolist()
@@ -59,10 +64,10 @@ def random_pose(rng: np.random.Generator, spread: float) -> FloatArray:
 
 
 def member(offsets: Offsets, T_S_base: FloatArray, T_foot_tool: FloatArray) -> Chain:
-    """The chain with axis 1 along z of {base} and the arm's plane at its x at q = 0.
+    """Return the chain with axis 1 along z of {base} and the arm's plane at its x at q = 0.
 
-    T_foot_tool: the tool frame from the foot of its point on the roll axis, x along that axis.
-    Limits are a turn wide.
+    ``T_foot_tool`` is the tool frame relative to the foot of its point on the roll axis, with x
+    along that axis. The limits are one turn wide.
     """
 
     def along(length: float, angle: float) -> FloatArray:
@@ -75,7 +80,7 @@ def member(offsets: Offsets, T_S_base: FloatArray, T_foot_tool: FloatArray) -> C
     wrist = elbow + along(l2, two)
     foot = wrist + along(l3, roll) + along(offsets.roll_offset, roll + math.pi / 2.0)
     y, z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    # A point on axis 1 or 2 may be any.
+    # Any point on axis 1 or 2 will do.
     lines = [
         (z, 0.3 * z),
         (y, shoulder - 0.2 * y),
@@ -101,7 +106,7 @@ def member(offsets: Offsets, T_S_base: FloatArray, T_foot_tool: FloatArray) -> C
 
 
 def random_member(rng: np.random.Generator, *, lateral: bool = True) -> tuple[Chain, Offsets]:
-    """A member with {S} anywhere and the tool turned any way on its roll axis."""
+    """Return a member with {S} anywhere and the tool in any orientation on its roll axis."""
     offsets = random_offsets(rng, lateral=lateral)
     turned = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), np.zeros(3))
     return member(offsets, random_pose(rng, 0.5), turned), offsets

@@ -16,7 +16,7 @@ from katana450.maths.kinematics.inverse import inverse
 from tests.kinematics.family import random_member
 
 
-def test_lengths_are_read_off_the_chain(chain: Chain, lengths: FloatArray) -> None:
+def test_lengths_follow_from_the_chain(chain: Chain, lengths: FloatArray) -> None:
     arm = arm_of(chain)
     np.testing.assert_allclose([arm.l1, arm.l2, arm.l3], lengths, atol=1e-16)
     assert arm_of(chain) is arm
@@ -28,16 +28,19 @@ def _with_axis(chain: Chain, i: int, direction: list[float], point: list[float])
     return dataclasses.replace(chain, S=S)
 
 
-def test_other_arms_are_refused_with_the_axis_the_amount_and_what_is_needed(chain: Chain) -> None:
+def test_arm_outside_the_family_is_refused_with_axis_amount_and_condition(chain: Chain) -> None:
     _, y, z = np.eye(3).tolist()
     elbow, wrist = [0.19, 0.0, 0.0], [0.329, 0.0, 0.0]
     tilt = [0.0, 1.0, 1e-3]
     cases = [
-        (_with_axis(chain, 0, y, [0.0] * 3), r"axis 2 must be square to axis 1 and is 90 deg off"),
-        (_with_axis(chain, 0, tilt, [0.0] * 3), r"axis 2 must be square to axis 1"),
+        (
+            _with_axis(chain, 0, y, [0.0] * 3),
+            r"axis 2 must be perpendicular to axis 1 and is 90 deg off",
+        ),
+        (_with_axis(chain, 0, tilt, [0.0] * 3), r"axis 2 must be perpendicular to axis 1"),
         (_with_axis(chain, 2, tilt, elbow), r"axis 3 must be parallel to axis 2 .* 0\.0573 deg"),
         (_with_axis(chain, 3, z, wrist), r"axis 4 must be parallel to axis 2 .* 90 deg"),
-        (_with_axis(chain, 4, y, wrist), r"axis 5 must be square to axis 4 .* 90 deg"),
+        (_with_axis(chain, 4, y, wrist), r"axis 5 must be perpendicular to axis 4 .* 90 deg"),
         (_with_axis(chain, 2, y, [0.0, 0.3, 0.0]), r"axes 2 and 3 are 0 mm apart"),
         (_with_axis(chain, 3, y, elbow), r"axes 3 and 4 are 0 mm apart"),
         (chain.with_tool(se3.from_rotation_translation(np.eye(3), wrist)), r"axis 4 and the tool"),
@@ -47,7 +50,7 @@ def test_other_arms_are_refused_with_the_axis_the_amount_and_what_is_needed(chai
             arm_of(other)
 
 
-def test_every_fault_is_named_at_once(chain: Chain) -> None:
+def test_all_faults_are_named_in_one_error(chain: Chain) -> None:
     wrong = _with_axis(chain, 2, [0.0, 1.0, 0.1], [0.19, 0.0, 0.0])
     wrong = _with_axis(wrong, 4, [1.0, 0.2, 0.0], [0.4, 0.0, 0.0])
     with pytest.raises(
@@ -56,7 +59,7 @@ def test_every_fault_is_named_at_once(chain: Chain) -> None:
         arm_of(wrong)
 
 
-def test_the_rounding_of_a_file_is_taken(chain: Chain) -> None:
+def test_rounding_in_a_file_is_accepted(chain: Chain) -> None:
     rounded = _with_axis(chain, 2, [0.0, 1.0, 3.7e-6], [0.19, 0.0, 0.0])
     rounded = rounded.with_tool(
         chain.M + np.array([[0.0] * 4, [0, 0, 0, 8e-6], [0.0] * 4, [0] * 4])
@@ -70,7 +73,7 @@ def test_the_rounding_of_a_file_is_taken(chain: Chain) -> None:
         assert s.rotation_error < 1e-4
 
 
-def test_offsets_are_read_off_any_member(rng: np.random.Generator) -> None:
+def test_offsets_follow_from_any_member(rng: np.random.Generator) -> None:
     for _ in range(200):
         chain, offsets = random_member(rng)
         arm = arm_of(chain)

@@ -19,8 +19,8 @@ def random_q(chain: Chain, rng: np.random.Generator, n: int) -> FloatArray:
     return rng.uniform(chain.lower, chain.upper, size=(n, 5))
 
 
-def assert_as_one_by_one(chain: Chain, T: FloatArray, angle: float, error: float) -> None:
-    """Angles and errors of every branch within these [rad], [m or rad] of those of `inverse`."""
+def assert_as_single_poses(chain: Chain, T: FloatArray, angle: float, error: float) -> None:
+    """Compare angles [rad] and errors [m or rad] of every branch with those of `inverse`."""
     found = inverse_batch(chain, T, residuals=True)
     assert found.position_error is not None
     assert found.rotation_error is not None
@@ -34,7 +34,7 @@ def assert_as_one_by_one(chain: Chain, T: FloatArray, angle: float, error: float
             assert found.within_limits[i, b] == s.within_limits
 
 
-def test_forward_is_that_of_each(chain: Chain, rng: np.random.Generator) -> None:
+def test_forward_equals_that_of_single_poses(chain: Chain, rng: np.random.Generator) -> None:
     for arm in (chain, random_member(rng)[0]):
         q = random_q(arm, rng, 200)
         T = forward_batch(arm, q)
@@ -53,37 +53,39 @@ def test_every_solution_takes_its_pose_over_several_chunks(
     assert found.position_error.max() < 2e-15
     assert found.rotation_error.max() < 1e-12
     original = np.abs(found.q - q[:, None]).max(axis=2).min(axis=1)
-    # Next to the stretched arm angles are known to the root of rounding.
+    # Near the stretched arm angles are known to the root of rounding.
     assert original.max() < 1e-6
     assert np.median(original) < 1e-14
     assert 2.0 < found.within_limits.sum(axis=1).mean() < 2.4
 
 
-def test_each_pose_is_solved_as_alone(chain: Chain, rng: np.random.Generator) -> None:
-    assert_as_one_by_one(chain, forward_batch(chain, random_q(chain, rng, 300)), 1e-9, 1e-14)
+def test_poses_are_solved_as_single_poses(chain: Chain, rng: np.random.Generator) -> None:
+    assert_as_single_poses(chain, forward_batch(chain, random_q(chain, rng, 300)), 1e-9, 1e-14)
 
 
-def test_members_of_the_family_are_solved_as_alone(rng: np.random.Generator) -> None:
+def test_members_of_the_family_are_solved_as_single_poses(rng: np.random.Generator) -> None:
     for _ in range(60):
         arm, _ = random_member(rng)
-        assert_as_one_by_one(arm, forward_batch(arm, random_q(arm, rng, 5)), 1e-6, 1e-11)
+        assert_as_single_poses(arm, forward_batch(arm, random_q(arm, rng, 5)), 1e-6, 1e-11)
 
 
-def test_hard_poses_are_solved_as_alone(chain: Chain, rng: np.random.Generator) -> None:
+def test_hard_poses_are_solved_as_single_poses(chain: Chain, rng: np.random.Generator) -> None:
     q = random_q(chain, rng, 40)
     q[:10, 2] = 0.0
     q[10:20, 2] = math.pi
     q[20:30, 3] = math.pi / 2 - q[20:30, 1] - q[20:30, 2]
     T = forward_batch(chain, q)
     for i in range(30, 40):
-        # The tool point on axis 1.
+        # The tool point is on axis 1.
         x, _, z = forward(chain, [0.0, *q[i, 1:]])[:3, 3]
         T[i] = forward(chain, [q[i, 0], q[i, 1] - math.atan2(x, z), *q[i, 2:]])
         T[i, :2, 3] = 0.0
-    assert_as_one_by_one(chain, T, 1e-7, 1e-12)
+    assert_as_single_poses(chain, T, 1e-7, 1e-12)
 
 
-def test_poses_no_arm_can_take_are_missed_as_alone(chain: Chain, rng: np.random.Generator) -> None:
+def test_infeasible_poses_have_the_errors_of_single_poses(
+    chain: Chain, rng: np.random.Generator
+) -> None:
     sizes = (0.0, 1e-300, 1e-9, 0.1, 1e3, 1e200)
     T = np.array(
         [
@@ -92,15 +94,15 @@ def test_poses_no_arm_can_take_are_missed_as_alone(chain: Chain, rng: np.random.
             for _ in range(5)
         ]
     )
-    assert_as_one_by_one(chain, T, 1e-6, 1e-9)
+    assert_as_single_poses(chain, T, 1e-6, 1e-9)
 
 
-def test_a_tool_square_to_the_plane_is_solved_as_alone(chain: Chain) -> None:
+def test_tool_perpendicular_to_the_plane_is_solved_as_single_pose(chain: Chain) -> None:
     p = [0.4, 0.0, 0.1]
     rolls = [so3.rotation_x(roll) for roll in (0.3, -2.0, 3.0)]
     T = [se3.from_rotation_translation(so3.rotation_z(0.5 * math.pi) @ R, p) for R in rolls]
     T[0][:3, 0] = 0.0, 1.0, 0.0
-    assert_as_one_by_one(chain, np.array(T), 1e-9, 1e-12)
+    assert_as_single_poses(chain, np.array(T), 1e-9, 1e-12)
 
 
 def test_no_pose_depends_on_its_neighbours(chain: Chain, rng: np.random.Generator) -> None:
@@ -113,12 +115,14 @@ def test_no_pose_depends_on_its_neighbours(chain: Chain, rng: np.random.Generato
     np.testing.assert_array_equal(among.q[:50], alone)
 
 
-def test_single_precision_is_made_a_rotation_again(chain: Chain, rng: np.random.Generator) -> None:
+def test_single_precision_rotation_is_made_orthonormal(
+    chain: Chain, rng: np.random.Generator
+) -> None:
     T = forward_batch(chain, random_q(chain, rng, 20)).astype(np.float32).astype(np.float64)
-    assert_as_one_by_one(chain, T, 1e-6, 1e-12)
+    assert_as_single_poses(chain, T, 1e-6, 1e-12)
 
 
-def test_no_pose_has_no_solution(chain: Chain) -> None:
+def test_empty_batch_has_no_solutions(chain: Chain) -> None:
     assert inverse_batch(chain, np.empty((0, 4, 4))).q.shape == (0, 4, 5)
     assert forward_batch(chain, np.empty((0, 5))).shape == (0, 4, 4)
 
@@ -134,7 +138,7 @@ def test_no_pose_has_no_solution(chain: Chain) -> None:
         (lambda T: np.where(np.arange(16).reshape(4, 4) == 7, 1.7e308, T), "Pose 5000 is 1.7e"),
     ],
 )
-def test_the_first_pose_that_is_none_is_named(chain: Chain, spoilt: object, words: str) -> None:
+def test_first_invalid_pose_is_named(chain: Chain, spoilt: object, words: str) -> None:
     T = forward_batch(chain, np.zeros((6000, 5)))
     assert callable(spoilt)
     T[5000] = spoilt(T[5000])

@@ -1,4 +1,4 @@
-"""What is named as binding binds, and nothing else does."""
+"""The reported constraints are exactly the binding ones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.kinematics.family import Offsets, member, random_member
 CASES = 1000 if os.environ.get("KATANA450_LONG") else 40
 
 SAME = 1e-7
-"""[m], [rad] What a widening gains less by is rounding."""
+"""A smaller gain [m], [rad] by a wider limit is rounding."""
 
 
 def limited_member(seed: int, *, lateral: bool) -> Chain:
@@ -46,7 +46,7 @@ def widened(chain: Chain, axes: FloatArray, by: float) -> Chain:
 
 
 def random_target(chain: Chain, rng: np.random.Generator) -> FloatArray:
-    """Anywhere, far away, near axis 1, next to limits, or within the limits but turned."""
+    """Return a target: anywhere, far away, near axis 1, near limits, or feasible but turned."""
     arm = arm_of(chain)
     kind = rng.integers(5)
     if kind >= 3:
@@ -65,7 +65,7 @@ def random_target(chain: Chain, rng: np.random.Generator) -> FloatArray:
 
 
 def misses(p: Projection, priority: Priority) -> tuple[float, ...]:
-    """What counts most first; of a pitch that no posture has, as POSITION."""
+    """Return the errors in order of priority; a pitch that no posture has counts as POSITION."""
     if priority is Priority.POSE:
         return p.position_error, p.rotation_error
     if priority is Priority.PITCH and p.pitch_error <= SAME:
@@ -74,13 +74,13 @@ def misses(p: Projection, priority: Priority) -> tuple[float, ...]:
 
 
 def same_way(chain: Chain, a: Projection, b: Projection) -> bool:
-    """Whether both tools face away from axis 1, or both towards it."""
+    """Return True if both tools face away from axis 1, or both towards it."""
     (one, _), (two, _) = (pitch_and_roll(chain, each.q) for each in (a, b))
     return abs(math.remainder(one - two, math.tau)) <= SAME
 
 
 def gained(before: tuple[float, ...], after: tuple[float, ...], least: float) -> int:
-    """1 where `after` is nearer, -1 where it is farther, by more than `least`; else 0."""
+    """Return 1 if `after` is nearer, -1 if it is farther, by more than `least`; else 0."""
     for miss, miss_after in zip(before, after, strict=True):
         if abs(miss - miss_after) > least:
             return 1 if miss_after < miss else -1
@@ -106,11 +106,11 @@ def test_reported_limits_are_exactly_the_binding_ones(name: str, priority: Prior
         pitched = priority is not Priority.PITCH or p.pitch_error <= SAME
         if p.position_error > SAME and pitched and not p.limits:
             free = project(chain, T, priority=priority, branch=p.branch, within_limits=False)
-            # With the pitch kept, a limit may be why the tool does not face the other way.
+            # With the pitch kept, a limit may keep the tool from facing the other way.
             if priority is not Priority.PITCH or same_way(chain, p, free):
                 assert gained(missed, misses(free, priority), SAME) <= 0
 
-        # The roll counts least, and depends on its own limit alone.
+        # The roll counts least and depends on its own limit alone.
         named[4] *= priority is Priority.POSE
         if named.any() and not p.axis1:
             wide = project(widened(chain, named, 1e-3), T, priority=priority, branch=p.branch)
@@ -119,7 +119,7 @@ def test_reported_limits_are_exactly_the_binding_ones(name: str, priority: Prior
             limited += 1
             idle += gain == 0
     assert limited > 0.3 * CASES
-    # Next to axis 1 a turn of it gains next to nothing.
+    # Near axis 1 a turn of it gains almost nothing.
     assert idle <= 0.01 * limited
 
 
@@ -135,14 +135,14 @@ def test_the_limit_of_the_roll_is_named_where_it_binds(priority: Priority) -> No
         beyond = not chain.lower[4] - 1e-9 <= wide.q[4] <= chain.upper[4] + 1e-9
         assert (4 in p.limits) == beyond
         named += beyond
-    # With the pitch kept the tool rather faces the other way.
+    # With the pitch kept the tool faces the other way instead.
     assert named > 0 or priority is Priority.PITCH
 
 
 def test_axis_1_is_named_where_the_branch_ends_on_it() -> None:
-    """The tool is asked for behind the arm, and axis 1 cannot turn so far."""
-    most = np.array([0.8, 2.3, 2.3, 2.3, 0.8])
-    chain = dataclasses.replace(katana(), lower=-most, upper=most)
+    """The target is behind the arm, and axis 1 cannot turn so far."""
+    limits = np.array([0.8, 2.3, 2.3, 2.3, 0.8])
+    chain = dataclasses.replace(katana(), lower=-limits, upper=limits)
     T = se3.from_rotation_translation(np.eye(3), [-0.2, 0.01, 0.3])
     for elbow in ("up", "down"):
         p = project(chain, T, branch=Branch("front", elbow))

@@ -9,7 +9,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import joint_frames
 
 
-def test_there_are_four_and_text_names_them() -> None:
+def test_four_branches_are_named_by_text() -> None:
     assert len(set(BRANCHES)) == 4
     assert [str(b) for b in BRANCHES] == ["front-up", "front-down", "back-up", "back-down"]
     assert all(Branch.parse(str(b)) == b for b in BRANCHES)
@@ -23,7 +23,7 @@ def test_other_text_is_refused_with_the_names(text: str) -> None:
 
 def test_front_means_the_arm_faces_the_tool_point(chain: Chain) -> None:
     assert branch_of(chain, [1.0, -0.4, 0.8, 0.1, 0.0]) == Branch("front", "up")
-    # Leaned far back with the tool over its shoulder.
+    # Leaning far back with the tool over its shoulder.
     assert branch_of(chain, [1.0, -2.1, -1.0, 0.0, 0.0]) == Branch("back", "down")
     assert branch_of(chain, np.zeros(5)).shoulder == "front"
 

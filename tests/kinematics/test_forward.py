@@ -39,7 +39,7 @@ def test_forward_at_zero_is_the_home_configuration(chain: Chain) -> None:
 
 
 def _differences(chain: Chain, q: FloatArray) -> FloatArray:
-    """(6, 5) body twists by central differences."""
+    """Return the (6, 5) body twists by central differences."""
     h = 1e-6
     columns = []
     for step in h * np.eye(5):
@@ -53,7 +53,7 @@ def test_body_jacobian_is_the_derivative_of_forward(chain: Chain, rng: np.random
         np.testing.assert_allclose(jacobian_body(chain, q), _differences(chain, q), atol=1e-9)
 
 
-def test_space_jacobian_is_the_body_one_seen_from_the_base(
+def test_space_jacobian_is_the_body_jacobian_in_the_base_frame(
     chain: Chain, rng: np.random.Generator
 ) -> None:
     for q in rng.uniform(chain.lower, chain.upper, size=(20, 5)):
@@ -66,7 +66,7 @@ def test_space_jacobian_at_zero_is_the_screw_axes(chain: Chain) -> None:
 
 
 @pytest.mark.parametrize("function", [forward, jacobian_space, jacobian_body])
-def test_a_joint_vector_that_is_none_is_refused(chain: Chain, function: object) -> None:
+def test_invalid_joint_vector_is_refused(chain: Chain, function: object) -> None:
     assert callable(function)
     with pytest.raises(InputError, match="axis 2"):
         function(chain, [0.0, np.nan, 0.0, 0.0, 0.0])

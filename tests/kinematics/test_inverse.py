@@ -27,7 +27,7 @@ Solved = list[tuple[FloatArray, FloatArray, Sequence[Solution]]]
 
 @pytest.fixture(scope="module")
 def solved(chain: Chain) -> Solved:
-    """(q, T, inverse(T)) of joint vectors anywhere inside the limits."""
+    """Return (q, T, inverse(T)) of joint vectors anywhere inside the limits."""
     rng = np.random.default_rng(2013)
     result: Solved = []
     for q in rng.uniform(chain.lower, chain.upper, size=(POSES, 5)):
@@ -70,20 +70,20 @@ def test_errors_are_those_forward_kinematics_measures(chain: Chain, solved: Solv
             assert (s.position_error, s.rotation_error) == pytest.approx(measured, abs=1e-15)
 
 
-def test_inclusion_the_original_is_among_them(chain: Chain, solved: Solved) -> None:
+def test_inclusion_original_is_among_the_solutions(chain: Chain, solved: Solved) -> None:
     for q, _, solutions in solved:
         original = solutions[BRANCHES.index(branch_of(chain, q))]
         np.testing.assert_allclose(original.q, q, atol=1e-9)
         assert original.within_limits
 
 
-def test_completeness_one_solution_a_branch(chain: Chain, solved: Solved) -> None:
+def test_completeness_one_solution_per_branch(chain: Chain, solved: Solved) -> None:
     for _, _, solutions in solved:
         assert tuple(s.branch for s in solutions) == BRANCHES
         assert tuple(branch_of(chain, s.q) for s in solutions) == BRANCHES
 
 
-def test_strictness_the_verdict_on_limits_is_right(chain: Chain, solved: Solved) -> None:
+def test_strictness_limits_are_checked_correctly(chain: Chain, solved: Solved) -> None:
     counts = []
     for _, _, solutions in solved:
         for s in solutions:
@@ -122,7 +122,7 @@ def test_near_the_folded_arm(chain: Chain, gap: float, sign: float) -> None:
 
 
 def tool_over_shoulder(chain: Chain, q: FloatArray, r: float) -> FloatArray:
-    """`q` with theta1 = 0 and theta2 such that the tool point's radial coordinate is `r` [m]."""
+    """Return `q` with theta1 = 0 and theta2 such that the tool point's radius is `r` [m]."""
     q = np.array([0.0, *q[1:]])
     x, _, z = forward(chain, q)[:3, 3]
     q[1] += math.asin(r / math.hypot(x, z)) - math.atan2(x, z)
@@ -167,8 +167,8 @@ def test_tool_vertical(chain: Chain, pitch: float) -> None:
 def test_tool_vertical_on_axis_1_leaves_theta1_to_the_hint(
     chain: Chain, hint: float | None
 ) -> None:
-    """Whatever its turn, and the other shoulder stands half a turn on in the turn that fits."""
-    # The wrist straight above the shoulder, the tool pointing up.
+    """The hint chooses theta1 in any turn; the other shoulder differs by half a turn."""
+    # The wrist is straight above the shoulder, and the tool points up.
     T = se3.from_rotation_translation(
         so3.rotation_z(0.9) @ so3.rotation_y(-math.pi / 2), [0.0, 0.0, 0.55]
     )
@@ -201,7 +201,7 @@ def test_at_the_edge_of_the_workspace(chain: Chain) -> None:
         assert contains(solutions, np.array(q), 1e-7)
 
 
-def test_beyond_reach_the_errors_say_by_how_much(chain: Chain) -> None:
+def test_beyond_reach_the_errors_give_the_distance(chain: Chain) -> None:
     T = forward(chain, [0.4, -0.3, 0.0, 0.0, 0.2])
     T[:3, 3] *= 1.1
     solutions = inverse(chain, T)
@@ -213,7 +213,7 @@ def test_beyond_reach_the_errors_say_by_how_much(chain: Chain) -> None:
         assert (s.position_error, s.rotation_error) == pytest.approx(errors(chain, s.q, T))
 
 
-def test_an_orientation_five_axes_cannot_take_shows_as_its_error(chain: Chain) -> None:
+def test_infeasible_orientation_is_reported_as_rotation_error(chain: Chain) -> None:
     T = forward(chain, [0.4, -0.9, 0.8, 0.5, 0.2])
     T[:3, :3] = so3.rotation_z(0.1) @ T[:3, :3]
     for s in inverse(chain, T):
@@ -222,7 +222,7 @@ def test_an_orientation_five_axes_cannot_take_shows_as_its_error(chain: Chain) -
 
 
 def sideways(theta1: float, pitch: float) -> FloatArray:
-    """A rotation that has x square to the arm's plane at `theta1`."""
+    """Return a rotation whose x axis is perpendicular to the arm's plane at `theta1`."""
     return so3.rotation_z(theta1 + 0.5 * math.pi) @ so3.rotation_x(pitch)
 
 
@@ -244,7 +244,7 @@ def test_the_roll_is_the_nearest_for_the_pitch(chain: Chain, rng: np.random.Gene
             assert math.cos(theta5 - nearest) > 1.0 - 1e-9
 
 
-def test_the_solutions_are_a_sequence_made_once(chain: Chain) -> None:
+def test_solutions_are_a_sequence_created_once(chain: Chain) -> None:
     solutions = inverse(chain, chain.M)
     assert isinstance(solutions, Sequence)
     assert len(solutions) == len(BRANCHES)
@@ -264,7 +264,7 @@ def test_the_hint_decides_between_turns(chain: Chain) -> None:
 
 
 @pytest.mark.parametrize("turns", [-3, -1, 0, 1, 2])
-def test_a_limit_beyond_pi_moves_the_answer_into_its_turn(chain: Chain, turns: int) -> None:
+def test_limit_beyond_pi_moves_the_solution_into_its_turn(chain: Chain, turns: int) -> None:
     whole = turns * math.tau * np.array([1.0, 0.0, 0.0, 0.0, -1.0])
     shifted = dataclasses.replace(
         chain,
@@ -317,6 +317,6 @@ def test_invalid_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> Non
         inverse(chain, T)
 
 
-def test_a_hint_that_is_no_joint_vector_is_refused(chain: Chain) -> None:
+def test_invalid_hint_is_refused(chain: Chain) -> None:
     with pytest.raises(InputError, match="axis 1"):
         inverse(chain, chain.M, q_hint=[np.nan, 0.0, 0.0, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""The inverse of every member of the family: the five questions asked of random arms."""
+"""The inverse of random members of the family."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.kinematics.by_subproblems import matched, same, solve
 from tests.kinematics.family import Offsets, member, random_member, random_offsets, random_pose
 
 MEMBERS, POSES = 200, 10
-# [m] and [rad]; {S} may stand two metres away, at which forward kinematics is no better.
+# [m] and [rad]; {S} may be two metres away, where forward kinematics is no more accurate.
 POSITION, ROTATION = 1e-14, 1e-12
 
 Case = tuple[Chain, Offsets, FloatArray, FloatArray, Sequence[Solution]]
@@ -29,7 +29,7 @@ Case = tuple[Chain, Offsets, FloatArray, FloatArray, Sequence[Solution]]
 
 @pytest.fixture(scope="module")
 def solved() -> list[Case]:
-    """(member, what it is made of, q, T, inverse(T)) of joint vectors anywhere."""
+    """Return (member, offsets, q, T, inverse(T)) of joint vectors anywhere."""
     rng = np.random.default_rng(25)
     result: list[Case] = []
     for _ in range(MEMBERS):
@@ -40,7 +40,7 @@ def solved() -> list[Case]:
     return result
 
 
-def test_consistency_what_claims_to_take_the_pose_does(solved: list[Case]) -> None:
+def test_consistency_exact_solutions_take_the_pose(solved: list[Case]) -> None:
     for chain, _, _, T, solutions in solved:
         for s in solutions:
             reached = forward(chain, s.q)
@@ -51,7 +51,7 @@ def test_consistency_what_claims_to_take_the_pose_does(solved: list[Case]) -> No
                 assert s.rotation_error < ROTATION
 
 
-def test_correctness_it_is_what_the_subproblems_give(solved: list[Case]) -> None:
+def test_correctness_solutions_equal_those_of_the_subproblems(solved: list[Case]) -> None:
     for chain, _, _, T, solutions in solved:
         exact = [s.q for s in solutions if s.exact]
         specified = [q for q in solve(chain, T) if np.abs(forward(chain, q) - T).max() < 1e-9]
@@ -65,7 +65,7 @@ def test_inclusion_the_original_is_on_its_branch(solved: list[Case]) -> None:
         assert same(original.q, q, 1e-7)
 
 
-def test_completeness_as_many_as_the_offsets_leave(solved: list[Case]) -> None:
+def test_completeness_offsets_determine_the_number_of_solutions(solved: list[Case]) -> None:
     counts: dict[bool, list[int]] = {True: [], False: []}
     for chain, offsets, _, _, solutions in solved:
         exact = [s for s in solutions if s.exact]
@@ -74,7 +74,7 @@ def test_completeness_as_many_as_the_offsets_leave(solved: list[Case]) -> None:
         if offsets.lateral == offsets.radial == offsets.roll_offset == 0.0:
             assert len(exact) == 4
         counts[offsets.lateral != 0.0].append(len(exact))
-    # Beside axis 1 the plane that holds the roll axis is one; through it, it has two sides.
+    # Beside axis 1 one plane holds the roll axis; through axis 1 the plane has two sides.
     assert set(counts[True]) == {2}
     assert set(counts[False]) == {2, 4}
 
@@ -93,10 +93,10 @@ def at_canonical(chain: Chain, alpha: list[float]) -> tuple[FloatArray, FloatArr
 
 
 def assert_exact(chain: Chain, q: FloatArray, T: FloatArray, within: float) -> None:
-    """`q` is found, and every branch that takes the pose takes it exactly.
+    """Check that `q` is found, and that every branch that takes the pose takes it exactly.
 
-    Beside axis 1 the other shoulder is left out: it takes next to what the first one does where
-    the two planes nearly meet.
+    Beside axis 1 the other shoulder is ignored: where the two planes nearly meet, it takes nearly
+    the same pose as the first.
     """
     solutions = [s for s in inverse(chain, T) if s.exact]
     assert any(same(s.q, q, within) for s in solutions)
@@ -121,8 +121,8 @@ def test_stretched_and_folded(three: float, within: float, rng: np.random.Genera
 
 
 @pytest.mark.parametrize("u", [0.0, 1e-15, 1e-12, -1e-9, 1e-7, -1e-5, 1e-3])
-def test_tool_point_on_and_by_axis_1(u: float, rng: np.random.Generator) -> None:
-    """At the distance u from where axis 1, or the cylinder about it, holds the tool point."""
+def test_tool_point_on_and_near_axis_1(u: float, rng: np.random.Generator) -> None:
+    """Test a tool point at the distance u from axis 1, or from the cylinder about it."""
     tried = 0
     while tried < 60:
         chain, _ = random_member(rng)
@@ -152,7 +152,7 @@ def test_tool_upright(pitch: float, rng: np.random.Generator) -> None:
 def by_axis_1(
     chain: Chain, u: float, tip: float, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Joints and pose with the tool point at `u` [m], and the tool `tip` [rad] from upright."""
+    """Return joints and pose, tool point at `u` [m] and tool `tip` [rad] from upright."""
     arm = arm_of(chain)
     phi = float(rng.choice((-1.0, 1.0))) * 0.5 * math.pi + tip + arm.tilt
     out = u - arm.a - arm.l3 * math.cos(phi)
@@ -169,13 +169,13 @@ def by_axis_1(
 
 @pytest.mark.parametrize("distance", [10.0**k for k in range(-15, -2)])
 @pytest.mark.parametrize("lateral", [False, True])
-def test_by_axis_1_no_digit_is_lost(
+def test_near_axis_1_no_digit_is_lost(
     lateral: bool, distance: float, rng: np.random.Generator
 ) -> None:
-    """Wherever the tool points, upright as well, where its direction tells as little as its place.
+    """Test tools in any direction, also upright, where direction and place tell equally little.
 
-    As exact as far from the axis; with {S} near the arm, so that it is not forward kinematics that
-    rounds.
+    The accuracy must be that far from the axis. {S} is near the arm, so that rounding in the
+    forward kinematics does not dominate.
     """
     tried = 0
     while tried < 60:
@@ -192,7 +192,7 @@ def test_by_axis_1_no_digit_is_lost(
         assert best.rotation_error < 1e-12
 
 
-def test_inside_the_lateral_offset_the_least_miss_is_told(rng: np.random.Generator) -> None:
+def test_inside_the_lateral_offset_the_smallest_error_is_reported(rng: np.random.Generator) -> None:
     offsets = Offsets(0.03, 0.05, (0.2, 0.2, 0.15), (0.0, 0.0, 0.0), 0.0, (1, 1, 1, 1, 1))
     chain = member(offsets, np.eye(4), np.eye(4))
     for rho in (0.0, 1e-10, 0.01, 0.049):
@@ -214,8 +214,11 @@ def test_a_tool_point_beside_the_roll_axis_is_solved(rng: np.random.Generator) -
         assert any(s.exact and same(s.q, q, 1e-6) for s in solutions)
 
 
-def test_what_is_rounding_in_a_file_leaves_a_solution_exact(rng: np.random.Generator) -> None:
-    """Also by axis 1, where theta1 makes much of it; a yaw that is off is none of it."""
+def test_rounding_in_a_file_keeps_a_solution_exact(rng: np.random.Generator) -> None:
+    """Also test near axis 1, where theta1 magnifies rounding.
+
+    A wrong yaw does not count as rounding.
+    """
     for number in range(200):
         chain, _ = random_member(rng)
         if number % 2:
@@ -251,7 +254,7 @@ def test_every_finite_pose_has_finite_angles(rng: np.random.Generator) -> None:
                     assert np.isfinite(q).all()
 
 
-def test_beyond_reach_the_arm_points_the_nearest_way(rng: np.random.Generator) -> None:
+def test_beyond_reach_the_arm_points_towards_the_target(rng: np.random.Generator) -> None:
     for _ in range(30):
         chain, _ = random_member(rng, lateral=False)
         arm = arm_of(chain)

@@ -1,4 +1,4 @@
-"""The nearest tool point at a held pitch, against a search that knows no geometry."""
+"""The nearest tool point at a fixed pitch, against a search without geometry."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def planar(elbow: str, side: int) -> PlanarArm:
 
 
 def least_gap(arm: PlanarArm, u: float, v: float, phi: float) -> float:
-    """Least distance [m] over a grid of (theta2, theta3), made finer round the best of it."""
+    """Return the minimum distance [m] over a grid of (theta2, theta3), refined round the best."""
     centers, widths = np.array([[0.0, 0.0]]), np.array([4.5, 4.5])
     best = math.inf
     for _ in range(9):
         a, b = np.meshgrid(*(np.linspace(-1.0, 1.0, 41) * width for width in widths))
         grid = (centers[:, None, :] + np.stack((a.ravel(), b.ravel()), axis=1)).reshape(-1, 2)
-        # The finer grids have to hold the edges too.
+        # The finer grids must also contain the edges.
         theta2 = np.clip(grid[:, 0], arm.theta2.lower, arm.theta2.upper)
         theta3 = np.clip(grid[:, 1], arm.theta3.lower, arm.theta3.upper)
         gaps = gap(arm, u, v, phi, theta2, theta3)
@@ -54,7 +54,7 @@ def gap(
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("elbow", ["up", "down"])
-def test_it_is_the_nearest(elbow: str, side: int, rng: np.random.Generator) -> None:
+def test_found_posture_is_the_nearest(elbow: str, side: int, rng: np.random.Generator) -> None:
     arm, found = planar(elbow, side), 0
     for _ in range(60):
         u, v = rng.uniform(-0.8, 0.8, size=2)
@@ -70,12 +70,12 @@ def test_it_is_the_nearest(elbow: str, side: int, rng: np.random.Generator) -> N
         assert pu * side >= -1e-12
         for angle, ends in zip(posture[:3], (arm.theta2, arm.theta3, arm.theta4), strict=True):
             assert ends.lower <= angle <= ends.upper
-        # It can be taken, so the search may miss it but not beat it.
+        # The pitch is feasible, so the search may miss the optimum but not beat it.
         assert math.hypot(pu - u, pv - v) <= least + 1e-9
     assert found > 30
 
 
-def test_a_point_that_can_be_reached_is(rng: np.random.Generator) -> None:
+def test_reachable_point_is_reached(rng: np.random.Generator) -> None:
     arm, reached = planar("up", 1), 0
     for _ in range(200):
         q = rng.uniform((LOWER[0], 0.0, LOWER[2]), UPPER)
@@ -91,7 +91,7 @@ def test_a_point_that_can_be_reached_is(rng: np.random.Generator) -> None:
     assert reached > 80
 
 
-def test_a_pitch_that_no_posture_has_is_refused() -> None:
+def test_infeasible_pitch_is_refused() -> None:
     arm = PlanarArm(
         L1, L2, L3, Interval(-0.1, 0.1), Interval(0.0, 0.2), Interval(-0.1, 0.1), 1, 0.0, 1
     )

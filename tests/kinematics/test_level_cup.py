@@ -1,4 +1,4 @@
-"""A level cup asked for with yaw 0 all round the arm stays level while the position gives way."""
+"""A level cup with a target yaw of 0 all round the arm stays level; the position gives way."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member
 
 LEVEL = 1e-6
-"""[rad]"""
+"""Tolerance of the level [rad]."""
 
 FRONT = tuple(branch for branch in BRANCHES if branch.shoulder == "front")
 
@@ -28,7 +28,7 @@ COUNT = 2_000
 
 
 def ring(rng: np.random.Generator, count: int, reach: float) -> FloatArray:
-    """Points (count, 3) [m] all round axis 1, evenly in azimuth; straight behind the arm too."""
+    """Return points (count, 3) [m] evenly all round axis 1, also straight behind the arm."""
     azimuth = np.linspace(-math.pi, math.pi, count)
     radius = rng.uniform(0.05, reach, count)
     height = rng.uniform(-0.6, 0.9, count) * reach
@@ -36,7 +36,7 @@ def ring(rng: np.random.Generator, count: int, reach: float) -> FloatArray:
 
 
 def tilt(T: FloatArray) -> float:
-    """Angle [rad] between the tool's z axis and the vertical."""
+    """Return the angle [rad] between the tool's z axis and the vertical."""
     return math.atan2(math.hypot(T[0, 2], T[1, 2]), T[2, 2])
 
 
@@ -79,7 +79,7 @@ def test_yaw_does_not_move_a_level_cup(chain: Chain, rng: np.random.Generator) -
 
 @pytest.mark.parametrize("seed", range(6))
 def test_pitch_and_roll_are_kept_wherever_a_member_has_them(seed: int) -> None:
-    """With offsets, and with the tool point beside the roll axis, on every branch."""
+    """Test arms with offsets and with the tool point beside the roll axis, on every branch."""
     rng = np.random.default_rng(seed)
     chain = limited_member(rng, lateral=seed % 2 == 1)
     if seed >= 4:
@@ -99,7 +99,7 @@ def test_pitch_and_roll_are_kept_wherever_a_member_has_them(seed: int) -> None:
                 assert p.pitch_error <= LEVEL
                 checked += 1
             if p.position_error > 1e-6 and all(possible[branch]):
-                # With half a turn between the two rolls, one of them is inside most limits.
+                # The two rolls differ by half a turn, so one of them is inside most limits.
                 rolls = [arm.joints((0.0, 0.0, 0.0, 0.0, psi))[4] for psi in (0.0, math.pi)]
                 if any(fits(chain, roll) for roll in rolls):
                     assert p.roll_error <= LEVEL
@@ -112,7 +112,7 @@ def fits(chain: Chain, roll: float) -> bool:
 
 
 def level_postures(chain: Chain, branch: Branch, rng: np.random.Generator) -> tuple[bool, bool]:
-    """Whether a random search on the branch finds the roll axis level outward, and inward."""
+    """Return True for outward and for inward level postures that a random search finds."""
     arm = arm_of(chain)
     alpha = arm.canonical(rng.uniform(chain.lower, chain.upper, size=(20_000, 5)))
     lower, upper = np.sort((arm.canonical(chain.lower), arm.canonical(chain.upper)), axis=0)

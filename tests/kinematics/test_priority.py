@@ -1,4 +1,4 @@
-"""Each reading keeps what it promises, and measures what it gives up."""
+"""Each priority keeps its part of the target, and measures the errors of the rest."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def random_pose(rng: np.random.Generator) -> FloatArray:
 
 
 def pitch_of(T: FloatArray) -> float:
-    """Angle of the tool's x axis below the horizontal [rad]."""
+    """Return the angle of the tool's x axis below the horizontal [rad]."""
     return math.asin(max(-1.0, min(1.0, -T[2, 0])))
 
 
@@ -37,7 +37,7 @@ def pitch_distance(a: float, b: float) -> float:
 
 @pytest.mark.parametrize("priority", Priority)
 @pytest.mark.parametrize("branch", BRANCHES, ids=str)
-def test_what_it_says_is_what_it_does(
+def test_reported_errors_are_the_measured_ones(
     chain: Chain, priority: Priority, branch: Branch, rng: np.random.Generator
 ) -> None:
     for _ in range(25):
@@ -66,7 +66,7 @@ def test_pitch_is_kept_and_the_position_gives_way(chain: Chain, rng: np.random.G
         T = random_pose(rng)
         found = project(chain, T, priority=Priority.PITCH, branch=FRONT_UP)
         if found.pitch_error > 1e-9:
-            # No posture of the branch has that pitch: then as with POSITION.
+            # No posture of the branch has that pitch: the result is that of POSITION.
             other = project(chain, T, priority=Priority.POSITION, branch=FRONT_UP)
             assert np.allclose(found.q, other.q, atol=1e-12)
             continue
@@ -80,7 +80,7 @@ def test_pitch_is_kept_and_the_position_gives_way(chain: Chain, rng: np.random.G
 def test_position_is_kept_and_the_pitch_is_the_nearest_there(
     chain: Chain, rng: np.random.Generator
 ) -> None:
-    """Against every pitch the arm can have at that point, a thousandth of a radian apart."""
+    """Compare with every pitch that the arm can have at that point, in steps of 0.001 rad."""
     checked = 0
     for _ in range(25):
         T = random_pose(rng)
@@ -102,7 +102,7 @@ def test_position_is_kept_and_the_pitch_is_the_nearest_there(
 
 
 def at_pitch(chain: Chain, target: ToolTarget, phi: float) -> bool:
-    """Whether the front-up arm can have its tool point at the target with that pitch."""
+    """Return True if the front-up arm can have its tool point at the target with that pitch."""
     l1, l2 = 0.190, 0.139
     u = float(np.hypot(*target.position[:2])) - 0.3028 * math.cos(phi)
     v = -float(target.position[2]) - 0.3028 * math.sin(phi)
@@ -117,7 +117,7 @@ def at_pitch(chain: Chain, target: ToolTarget, phi: float) -> bool:
 
 @pytest.mark.parametrize("priority", [Priority.PITCH, Priority.POSITION])
 def test_the_yaw_of_the_target_does_not_count(chain: Chain, priority: Priority) -> None:
-    """Turned sideways by less than a right angle, POSE tilts the tool and these do not."""
+    """Turned sideways by less than a right angle, POSE tilts the tool and the others do not."""
     q = np.radians([0.0, -68.0, 85.0, 8.0, 0.0])
     T = forward(chain, q)
     for yaw in np.radians([-50.0, 20.0, 70.0]):
@@ -133,7 +133,7 @@ def test_the_yaw_of_the_target_does_not_count(chain: Chain, priority: Priority) 
         assert abs(pitch_and_roll(chain, tilted.q)[0] - pitch_and_roll(chain, q)[0]) > 1e-3
 
 
-def test_of_a_pose_the_arm_can_take_all_readings_are_one(
+def test_feasible_pose_is_the_same_for_all_priorities(
     chain: Chain, rng: np.random.Generator
 ) -> None:
     for _ in range(30):
@@ -164,7 +164,7 @@ def test_over_axis_1_a_tool_target_stays_in_the_arms_plane(chain: Chain) -> None
 def test_without_a_branch_the_one_that_keeps_the_pitch_best_is_taken(
     chain: Chain, rng: np.random.Generator
 ) -> None:
-    """The pitch comes before the roll and the yaw, though another branch has these nearer."""
+    """The pitch comes before the roll and the yaw, even if another branch has these nearer."""
     for T in targets(chain, rng, 15):
         p = project(chain, T, priority=Priority.POSITION)
         each = [project(chain, T, priority=Priority.POSITION, branch=branch) for branch in BRANCHES]

@@ -1,4 +1,4 @@
-"""The readings on random members of the family, against searches on the joints."""
+"""The priorities on random members of the family, against searches on the joints."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member, nearest_point, random_targets
 
 
-def wished_pitch(chain: Chain, T: FloatArray, alpha1: FloatArray) -> FloatArray:
-    """Pitch (k,) [rad] of the roll axis asked for, from planes at `alpha1` (k,) [rad]."""
+def target_pitch(chain: Chain, T: FloatArray, alpha1: FloatArray) -> FloatArray:
+    """Return the target pitch (k,) [rad] of the roll axis in planes at `alpha1` (k,) [rad]."""
     dx, dy, dz = arm_of(chain).pose(T)[:3, 0]
     inwards = np.cos(alpha1) * dx + np.sin(alpha1) * dy < 0.0
     return np.asarray(np.arctan2(-dz, np.where(inwards, -1.0, 1.0) * math.hypot(dx, dy)))
 
 
 def least_pitch(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
-    """Least error of the pitch [rad] with the tool point of `T` kept, over a grid of pitches."""
+    """Return the minimum pitch error [rad] over a grid, with the tool point of `T` kept."""
     targets = [ToolTarget(T[:3, 3], float(p), 0.0) for p in np.linspace(-math.pi, math.pi, 2001)]
     poses = [
         target.pose(chain, target.facing(chain, branch, float(q0[0])))
@@ -44,22 +44,23 @@ def least_pitch(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
     fits &= (found.position_error < 1e-9) & (found.rotation_error < 1e-9)
     alpha = arm_of(chain).canonical(found.q[fits])
     pitch = alpha[:, 1:4].sum(axis=1) - arm_of(chain).tilt
-    error = np.abs(pitch - wished_pitch(chain, T, alpha[:, 0]) + math.pi) % math.tau - math.pi
+    error = np.abs(pitch - target_pitch(chain, T, alpha[:, 0]) + math.pi) % math.tau - math.pi
     return float(np.abs(error).min()) if error.size else math.inf
 
 
 def nearest_at_pitch(
     chain: Chain, T: FloatArray, held: Projection, pitch: float, rng: np.random.Generator
 ) -> float:
-    """Least distance [m] to the point of `T` that a random search on the branch of `held` finds.
+    """Return the minimum distance [m] to the point of `T` that a random search finds.
 
-    With the `pitch` held, in planes that see the asked roll axis as the plane of `held` does. A
-    limit of axis 1 that holds the arm is taken for the best place of it.
+    The search stays on the branch of `held`, keeps the `pitch`, and uses planes that see the target
+    roll axis from the same side as the plane of `held`. A limit of axis 1 that holds the arm is
+    assumed to be the best place of that axis.
     """
     arm, branch = arm_of(chain), held.branch
     lower, upper = np.sort((arm.canonical(chain.lower), arm.canonical(chain.upper)), axis=0)
     middle = 0.5 * (lower + upper)[3]
-    seen = float(wished_pitch(chain, T, arm.canonical(held.q)[:1])[0])
+    seen = float(target_pitch(chain, T, arm.canonical(held.q)[:1])[0])
 
     if 0 in held.limits:
         lower[0] = upper[0] = arm.canonical(held.q)[0]
@@ -71,7 +72,7 @@ def nearest_at_pitch(
         x, y, _ = arm.T_C_S[:3, :3] @ points.T + arm.T_C_S[:3, 3:]
         r = x * np.cos(alpha[:, 0]) + y * np.sin(alpha[:, 0])
         fits = (alpha[:, 3] >= lower[3]) & (alpha[:, 3] <= upper[3])
-        fits &= np.abs(wished_pitch(chain, T, alpha[:, 0]) - seen) < 1e-9
+        fits &= np.abs(target_pitch(chain, T, alpha[:, 0]) - seen) < 1e-9
         fits &= (r >= 0.0) if branch.shoulder == "front" else (r <= 0.0)
         fits &= (np.sin(alpha[:, 2]) >= 0.0) == (branch.elbow == "up")
         return np.where(fits, np.linalg.norm(points - T[:3, 3], axis=1), np.inf)
@@ -84,9 +85,9 @@ def nearest_at_pitch(
     rows = np.arange(starts)
     for _ in range(90):
         step = rng.normal(size=(starts, samples, 5)) * width[:, None, None]
-        # Moving few joints at a time keeps the others on their limits.
+        # Moving few joints at a time keeps the others at their limits.
         step *= rng.random(step.shape) < 0.6
-        # With axis 4 at a limit the two before it have to move against each other.
+        # With axis 4 at a limit the two axes before it must move against each other.
         step[:, ::3, 2] = -step[:, ::3, 1]
         tried = np.clip(alpha[:, None] + step, lower, upper).reshape(-1, 5)
         d = distances(tried).reshape(starts, samples)
@@ -99,7 +100,7 @@ def nearest_at_pitch(
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_no_search_keeps_the_promise_of_a_reading_better(seed: int) -> None:
+def test_no_search_satisfies_a_priority_better(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     chain = limited_member(rng, lateral=seed % 2 == 1)
     kept = 0
@@ -111,16 +112,16 @@ def test_no_search_keeps_the_promise_of_a_reading_better(seed: int) -> None:
         for branch in BRANCHES:
             held = project(chain, T, priority=Priority.PITCH, branch=branch)
             alpha1 = arm_of(chain).canonical(held.q)[:1]
-            pitch = float(wished_pitch(chain, T, alpha1)[0])
+            pitch = float(target_pitch(chain, T, alpha1)[0])
             # The tool may face away from axis 1 or towards it.
-            ways = (pitch, math.pi - pitch)
-            least = [nearest_at_pitch(chain, T, held, way, rng) for way in ways]
+            pitches = (pitch, math.pi - pitch)
+            least = [nearest_at_pitch(chain, T, held, facing, rng) for facing in pitches]
             if held.pitch_error > 1e-9:
                 assert min(least) == math.inf
                 continue
             kept += 1
             taken, _ = pitch_and_roll(chain, held.q)
-            misses = [abs(math.remainder(taken - way, math.tau)) for way in ways]
+            misses = [abs(math.remainder(taken - facing, math.tau)) for facing in pitches]
             assert min(misses) <= 1e-9
             assert held.position_error <= least[int(np.argmin(misses))] + 1e-6
     assert kept > 0
@@ -146,7 +147,7 @@ def test_reachable_pose_is_unchanged_by_every_priority(
 def test_five_numbers_of_a_posture_lead_back_to_it(
     priority: Priority, rng: np.random.Generator
 ) -> None:
-    """Also with the tool point beside the roll axis."""
+    """Also test a tool point beside the roll axis."""
     for number in range(120):
         chain = limited_member(rng)
         if number % 2:

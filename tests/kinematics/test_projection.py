@@ -27,7 +27,7 @@ def pose(w: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
 
 
 def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatArray]:
-    """Poses of every kind the arm cannot take as they are, one of each a round."""
+    """Return poses of every kind that the arm cannot take, one of each per round."""
     result = []
     for _ in range(rounds):
         turned = forward(chain, rng.uniform(chain.lower, chain.upper))
@@ -54,7 +54,7 @@ def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatAr
 
 
 def assert_measured(chain: Chain, T: FloatArray, p: Projection) -> None:
-    """Every figure of `p`, by other means than its own."""
+    """Check every error of `p` by independent computations."""
     np.testing.assert_array_equal(p.T, forward(chain, p.q))
     assert p.position_error == pytest.approx(
         float(np.linalg.norm(p.T[:3, 3] - T[:3, 3])), abs=1e-15
@@ -71,7 +71,7 @@ def assert_measured(chain: Chain, T: FloatArray, p: Projection) -> None:
 
 
 def assert_on_branch(p: Projection) -> None:
-    """On `p.branch` or its edge."""
+    """Check that `p` is on `p.branch` or its edge."""
     r = p.T[0, 3] * math.cos(p.q[0]) + p.T[1, 3] * math.sin(p.q[0])
     assert abs(r) < 1e-11 or (r > 0.0) == (p.branch.shoulder == "front")
     assert p.q[2] == 0.0 or (p.q[2] > 0.0) == (p.branch.elbow == "up")
@@ -107,9 +107,7 @@ def test_a_feasible_pose_on_limits_comes_back_unchanged(
         assert chain.within_limits(p.q, slack=0.0)
 
 
-def test_every_figure_is_what_forward_kinematics_measures(
-    chain: Chain, rng: np.random.Generator
-) -> None:
+def test_errors_are_those_of_forward_kinematics(chain: Chain, rng: np.random.Generator) -> None:
     for T in targets(chain, rng, 15):
         for branch in (None, *BRANCHES):
             p = project(chain, T, branch=branch)
@@ -125,13 +123,13 @@ def test_inverse_of_the_feasible_pose_gives_its_joints(
     for T in targets(chain, rng, 15):
         p = project(chain, T, branch=FRONT_UP)
         solutions = inverse(chain, p.T, q_hint=p.q)
-        # Stretched out, joints are known to the root of rounding; the pose is exact all the same.
+        # Stretched out, joints are known to the root of rounding, but the pose is exact.
         assert min(np.abs(s.q - p.q).max() for s in solutions) < 1e-6
         assert max(s.position_error for s in solutions) < 1e-12
 
 
 def test_too_near_the_shoulder_the_tool_folds_back_as_far_as_it_goes(chain: Chain) -> None:
-    # An elbow that bends by 0.4 rad at most keeps the wrist farther out than the tool is long.
+    # An elbow that bends by at most 0.4 rad keeps the wrist farther out than the tool is long.
     lower, upper = np.array([-3.0, -3.0, -0.4, 2.0, -3.0]), np.array([3.0, 3.0, 0.3, 3.6, 3.0])
     stiff = dataclasses.replace(chain, lower=lower, upper=upper)
     hole = math.hypot(0.190 + 0.139 * math.cos(0.4), 0.139 * math.sin(0.4)) - 0.3028
@@ -156,7 +154,7 @@ def test_too_near_the_shoulder_the_forearm_folds_back_with_the_wrist_at_its_end(
     assert p.reach
 
 
-def test_a_yawed_tool_loses_its_yaw_alone(chain: Chain, rng: np.random.Generator) -> None:
+def test_yawed_tool_loses_only_its_yaw(chain: Chain, rng: np.random.Generator) -> None:
     q = np.array([0.5, -0.9, 1.1, 0.3, 0.4])
     T = forward(chain, q)
     in_plane = np.cross([-math.sin(q[0]), math.cos(q[0]), 0.0], T[:3, 0])
@@ -184,14 +182,14 @@ def test_beyond_reach_the_arm_stretches_towards_the_target(chain: Chain) -> None
 
 
 def overdriven(chain: Chain, axis: int) -> tuple[FloatArray, FloatArray]:
-    """A posture with one axis 0.1 rad over its limit, and its pose."""
+    """Return a posture with one axis 0.1 rad beyond its limit, and its pose."""
     q = np.array([0.3, -0.8, 1.0, 0.4, 0.5])
     q[axis] = chain.upper[axis] + 0.1
     return q, forward(chain, q)
 
 
 @pytest.mark.parametrize("axis", range(5))
-def test_a_limit_holds_when_on_and_is_gone_when_off(chain: Chain, axis: int) -> None:
+def test_limit_binds_only_within_limits(chain: Chain, axis: int) -> None:
     q, T = overdriven(chain, axis)
     branch = branch_of(chain, q)
     free = project(chain, T, branch=branch, within_limits=False)
@@ -222,7 +220,7 @@ def test_held_axis_1_waits_at_the_limit_the_hint_is_near(chain: Chain) -> None:
         assert p.limits[0] == 0
 
 
-def test_of_equally_near_rolls_the_hint_decides(chain: Chain) -> None:
+def test_hint_decides_between_equally_near_rolls(chain: Chain) -> None:
     lower, upper = chain.lower[4], chain.upper[4]
     between = 0.5 * (lower + upper) + math.pi
     T = forward(chain, [0.3, -0.8, 1.0, 0.4, between])
@@ -233,7 +231,7 @@ def test_of_equally_near_rolls_the_hint_decides(chain: Chain) -> None:
         assert p.rotation_error == pytest.approx(between - upper, abs=1e-12)
 
 
-def test_of_equal_branches_the_hint_decides(chain: Chain) -> None:
+def test_hint_decides_between_equal_branches(chain: Chain) -> None:
     q = np.array([0.3, -1.2, 0.9, 0.2, 0.5])
     T = forward(chain, q)
     inside = [s for s in inverse(chain, T) if s.within_limits]
@@ -298,7 +296,7 @@ def test_tool_along_axis_1_takes_theta1_from_the_hint(chain: Chain) -> None:
 def test_tool_along_axis_1_turns_axis_1_for_a_roll_beyond_its_limits(
     chain: Chain, pitch: float
 ) -> None:
-    """There axes 1 and 5 turn about one line, so that either does what the other cannot."""
+    """Axes 1 and 5 turn about one line there, so either can replace the other."""
     height = 0.6 if pitch < 0.0 else -0.1
     for roll in np.radians(np.arange(0.0, 360.0, 7.5)):
         R = so3.rotation_y(pitch) @ so3.rotation_x(roll)
@@ -309,7 +307,7 @@ def test_tool_along_axis_1_turns_axis_1_for_a_roll_beyond_its_limits(
             assert p.rotation_error < 1e-9
 
 
-def test_over_axis_1_a_roll_at_its_end_has_a_plane_of_its_own(
+def test_over_axis_1_roll_at_its_limit_has_a_plane_of_its_own(
     chain: Chain, rng: np.random.Generator
 ) -> None:
     theta1, pitch = np.meshgrid(np.linspace(-3.0, 2.8, 59), np.linspace(-math.pi, math.pi, 73))
@@ -344,7 +342,7 @@ def test_small_steps_of_the_target_are_small_steps_of_the_arm(chain: Chain) -> N
         reach += p.reach
         if previous is not None:
             assert np.linalg.norm(p.T[:3, 3] - previous.T[:3, 3]) < 3e-3
-            # Next to the stretched arm joints move as the root of what the target moves.
+            # Near the stretched arm joints move as the root of the target's motion.
             assert np.abs(p.q - previous.q).max() < 0.2
         previous, hint = p, p.q
     assert held
@@ -368,7 +366,7 @@ def test_every_pose_has_an_answer(chain: Chain, rng: np.random.Generator) -> Non
 
 
 def so3_corners() -> list[FloatArray]:
-    """Orientations along the axes, where two pitches, rolls or branches are equally near."""
+    """Return orientations along the axes, where two pitches, rolls or branches are equally near."""
     quarter = math.pi / 2
     return [
         so3.from_rpy(roll * quarter, pitch * quarter, yaw * quarter)
@@ -376,7 +374,7 @@ def so3_corners() -> list[FloatArray]:
     ]
 
 
-def test_the_same_question_has_the_same_answer(chain: Chain, rng: np.random.Generator) -> None:
+def test_projection_is_deterministic(chain: Chain, rng: np.random.Generator) -> None:
     for T in targets(chain, rng, 3):
         a, b = project(chain, T), project(chain, np.array(T))
         np.testing.assert_array_equal(a.q, b.q)
@@ -399,7 +397,7 @@ def test_invalid_pose_is_refused(chain: Chain, T: FloatArray, words: str) -> Non
         project(chain, T)
 
 
-def test_a_hint_that_is_no_joint_vector_is_refused(chain: Chain) -> None:
+def test_invalid_hint_is_refused(chain: Chain) -> None:
     with pytest.raises(InputError, match="shape"):
         project(chain, chain.M, q_hint=np.zeros(4))
     with pytest.raises(InputError, match="axis 4"):

@@ -21,14 +21,14 @@ from tests.kinematics.family import Offsets, member, random_member, random_pose
 
 
 def limited_member(rng: np.random.Generator, *, lateral: bool = True) -> Chain:
-    """A member with limits of any width and place."""
+    """Return a member with limits of random width and place."""
     chain, _ = random_member(rng, lateral=lateral)
     middle, half = rng.uniform(-1.5, 1.5, 5), rng.uniform(0.4, 2.4, 5)
     return dataclasses.replace(chain, lower=middle - half, upper=middle + half)
 
 
 def random_targets(chain: Chain, rng: np.random.Generator, n: int) -> list[FloatArray]:
-    """Poses near what the arm can do, beyond its limits, and anywhere."""
+    """Return poses near the feasible ones, beyond limits, and anywhere."""
     origin = se3.inverse(arm_of(chain).T_C_S)
     result = []
     for i in range(n):
@@ -43,7 +43,10 @@ def random_targets(chain: Chain, rng: np.random.Generator, n: int) -> list[Float
 
 
 def nearest_point(chain: Chain, target: FloatArray, rng: np.random.Generator) -> float:
-    """Least distance [m] to the target found by a shrinking random search inside the limits."""
+    """Return the minimum distance [m] to the target found by a shrinking random search.
+
+    The search stays inside the limits.
+    """
     starts, samples = 10, 40
     q = rng.uniform(chain.lower, chain.upper, size=(20_000, 5))
     d = np.linalg.norm(forward_batch(chain, q)[:, :3, 3] - target, axis=1)
@@ -52,7 +55,7 @@ def nearest_point(chain: Chain, target: FloatArray, rng: np.random.Generator) ->
     rows = np.arange(starts)
     for _ in range(120):
         step = rng.normal(size=(starts, samples, 5)) * width[:, None, None]
-        # Moving few joints at a time keeps the others on their limits.
+        # Moving few joints at a time keeps the others at their limits.
         step *= rng.random(step.shape) < 0.6
         tried = np.clip(q[:, None] + step, chain.lower, chain.upper)
         points = forward_batch(chain, tried.reshape(-1, 5))[:, :3, 3]
@@ -66,7 +69,7 @@ def nearest_point(chain: Chain, target: FloatArray, rng: np.random.Generator) ->
 
 
 def least_rotation(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
-    """Least angle [rad] to `T`, its point kept, over a grid of pitches and rolls in the limits."""
+    """Return the minimum angle [rad] to `T`, its point kept, over a grid of pitches and rolls."""
     pitches, rolls = np.linspace(-math.pi, math.pi, 721), np.linspace(0.0, 1.0, 97)
     poses = [
         target.pose(chain, target.facing(chain, branch, float(q0[0])))
@@ -104,7 +107,7 @@ def test_no_search_finds_a_nearer_point_or_turn(seed: int) -> None:
     assert exact > 0
 
 
-def test_what_a_member_can_do_comes_back_unchanged(rng: np.random.Generator) -> None:
+def test_feasible_pose_of_a_member_is_unchanged(rng: np.random.Generator) -> None:
     for _ in range(120):
         chain = limited_member(rng)
         for q in rng.uniform(chain.lower, chain.upper, size=(3, 5)):
@@ -117,7 +120,7 @@ def test_what_a_member_can_do_comes_back_unchanged(rng: np.random.Generator) -> 
                 assert not p.reach
 
 
-def test_every_branch_answers_and_the_best_is_taken(rng: np.random.Generator) -> None:
+def test_every_branch_has_a_solution_and_the_best_is_taken(rng: np.random.Generator) -> None:
     for _ in range(25):
         chain = limited_member(rng)
         for T in random_targets(chain, rng, 3):
@@ -130,7 +133,7 @@ def test_every_branch_answers_and_the_best_is_taken(rng: np.random.Generator) ->
             assert best.position_error == pytest.approx(nearest, abs=2e-9)
 
 
-def test_an_elbow_that_limits_forbid_is_answered_with_the_nearest_bend() -> None:
+def test_elbow_excluded_by_limits_gets_the_nearest_bend() -> None:
     offsets = Offsets(0.0, 0.0, (0.2, 0.2, 0.15), (0.0, 0.0, 0.0), 0.0, (1, 1, 1, 1, 1))
     chain = dataclasses.replace(
         member(offsets, np.eye(4), np.eye(4)),
@@ -159,7 +162,7 @@ def test_limits_beyond_the_folded_arm_hold_both_elbows() -> None:
         np.testing.assert_allclose(p.q, q, atol=1e-12)
 
 
-def test_inside_the_lateral_offset_the_miss_is_the_least(rng: np.random.Generator) -> None:
+def test_inside_the_lateral_offset_the_error_is_the_smallest(rng: np.random.Generator) -> None:
     offsets = Offsets(0.02, 0.05, (0.2, 0.2, 0.15), (0.0, 0.0, 0.0), 0.0, (1, 1, 1, 1, 1))
     chain = member(offsets, np.eye(4), np.eye(4))
     for rho in (0.0, 0.02, 0.05 - 1e-6):
@@ -180,11 +183,11 @@ def test_beside_axis_1_out_of_reach_is_as_near_as_the_stretched_arm() -> None:
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_beside_axis_1_the_end_that_comes_nearer_is_taken(side: float) -> None:
-    """In the gap of axis 1, which is not always the end that is nearer in angle."""
+    """The target is in the gap of axis 1; the nearer place is not always at the nearer limit."""
     offsets = Offsets(0.0, 0.06 * side, (0.1, 0.1, 0.05), (0.0,) * 3, 0.0, (1, 1, 1, 1, 1))
     limits = np.array([2.5, 3.0, 3.0, 3.0, 3.0])
     chain = dataclasses.replace(member(offsets, np.eye(4), np.eye(4)), lower=-limits, upper=limits)
-    # The plane through a far target is turned less against it than that of the stretched arm.
+    # The plane through a far target differs less in angle from it than that of the stretched arm.
     azimuth = side * (math.pi + 0.13)
     target = 2.0 * np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     p = project(chain, se3.from_rotation_translation(np.eye(3), target), branch=BRANCHES[0])

@@ -1,4 +1,4 @@
-"""The nearest pose against searches that know nothing of its closed forms."""
+"""The nearest pose against searches without closed forms."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from tests.kinematics.test_projection import FRONT_UP, assert_on_branch, targets
 
 
 def assert_no_search_beats_it(
-    chain: Chain, lengths: FloatArray, asked: list[FloatArray], branch: Branch | None
+    chain: Chain, lengths: FloatArray, poses: list[FloatArray], branch: Branch | None
 ) -> None:
     search = NearestPoint(chain, lengths, steps=15)
     inexact = 0
-    for i, T in enumerate(asked):
+    for i, T in enumerate(poses):
         p = project(chain, T, branch=branch)
         assert_on_branch(p)
         if p.position_error > 1e-9:
@@ -32,24 +32,24 @@ def assert_no_search_beats_it(
         theta1s = theta1s[(theta1s >= chain.lower[0]) & (theta1s <= chain.upper[0])]
         least = least_rotation(chain, lengths, T, p.T[:3, 3], branch, theta1s)
         assert p.rotation_error <= least + 1e-4
-    assert 0 < inexact < len(asked)
+    assert 0 < inexact < len(poses)
 
 
 def test_no_search_beats_it(chain: Chain, lengths: FloatArray) -> None:
-    asked = targets(chain, np.random.default_rng(5), 5)
-    assert_no_search_beats_it(chain, lengths, asked, None)
+    poses = targets(chain, np.random.default_rng(5), 5)
+    assert_no_search_beats_it(chain, lengths, poses, None)
 
 
 @pytest.mark.parametrize("branch", BRANCHES, ids=str)
 def test_no_search_on_its_branch_beats_it(
     chain: Chain, lengths: FloatArray, branch: Branch
 ) -> None:
-    asked = targets(chain, np.random.default_rng(6), 1)
-    assert_no_search_beats_it(chain, lengths, asked, branch)
+    poses = targets(chain, np.random.default_rng(6), 1)
+    assert_no_search_beats_it(chain, lengths, poses, branch)
 
 
-# Limits so narrow that axis 1 cannot face every target, the wrist not straighten, or the tool only
-# fold back over the arm.
+# Limits so narrow that axis 1 cannot face every target, or the wrist cannot straighten, or the tool
+# can only fold back over the arm.
 NARROW = (
     ([-0.5, -2.6, -0.9, 0.5, -1.0], [0.6, 0.1, 1.2, 1.8, 1.0]),
     ([-2.0, -2.6, -0.4, 2.0, -1.0], [2.0, 0.1, 0.3, 3.3, 1.0]),
@@ -68,5 +68,5 @@ def test_no_search_within_narrow_limits_beats_it(
     branch: Branch | None,
 ) -> None:
     narrow = dataclasses.replace(chain, lower=np.array(lower), upper=np.array(upper))
-    asked = targets(narrow, np.random.default_rng(7), 2)
-    assert_no_search_beats_it(narrow, lengths, asked, branch)
+    poses = targets(narrow, np.random.default_rng(7), 2)
+    assert_no_search_beats_it(narrow, lengths, poses, branch)

@@ -30,7 +30,7 @@ def turn(omega: FloatArray, r: FloatArray, theta: float, p: FloatArray) -> Float
 
 
 def circle(omega: FloatArray, r: FloatArray, p: FloatArray) -> FloatArray:
-    """The points (7201, 3) that p passes when turned once."""
+    """Return the points (7201, 3) that p passes in one turn."""
     u = p - r
     along = (omega @ u) * omega
     c, s = np.cos(SCAN)[:, None], np.sin(SCAN)[:, None]

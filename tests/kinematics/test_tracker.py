@@ -1,4 +1,4 @@
-"""Following a drag: the nearest pose where that goes on, and no leap where it does not."""
+"""Following a drag: the nearest pose where it is continuous, and no leap where it is not."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ class Split(NamedTuple):
     leap: float
 
     def target(self, along: float) -> ToolTarget:
-        """`along` [m] past the point."""
+        """Return the target `along` [m] past the point."""
         (x, z), (dx, dz) = self.point, self.way
         return ToolTarget(np.array([x + along * dx, 0.0, z + along * dz]), self.pitch, 0.0)
 
 
-# Found by searching straight drags for the nearest pose to leap by more than 1.2 rad within 1 mm
-# with the tool point in place on both sides: the limits of axes 2, 3 and 4 leave two ranges of
-# pitch there, and the nearer ends or falls behind.
+# Found by searching straight drags for leaps of the nearest pose by more than 1.2 rad within 1 mm,
+# with the tool point in place on both sides. The limits of axes 2, 3 and 4 leave two ranges of
+# pitch there, and the nearer range ends or becomes the farther one.
 SPLITS = [
     Split("front-up", (0.2413, 0.3683), -0.601, (-0.798, -0.603), 1.72),
     Split("front-up", (0.1042, 0.4239), -1.536, (0.076, -0.997), 1.33),
@@ -54,13 +54,13 @@ SPLITS = [
 ]
 
 STEP = 5e-4
-"""[m] of each move of these slow drags."""
+"""Length [m] of each move of these slow drags."""
 
 
 def dragged(
     chain: Chain, split: Split, q: FloatArray, stops: FloatArray
 ) -> Iterator[tuple[ToolTarget, Tracked]]:
-    """Each target of a drag, and what became of it."""
+    """Yield each target of a drag, and its result."""
     branch = Branch.parse(split.branch)
     since = ToolTarget.at(chain, q)
     for along in stops:
@@ -73,7 +73,7 @@ def dragged(
 def arrived(
     chain: Chain, q: FloatArray, target: ToolTarget, since: ToolTarget, priority: Priority
 ) -> Tracked:
-    """Where the calls of so many ticks lead in the end."""
+    """Return the final result of repeated calls, as in successive ticks."""
     tracked = track(chain, q, target, branch=FRONT_UP, priority=priority, since=since)
     for _ in range(40):
         if tracked.since is None:
@@ -101,7 +101,7 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
 
     goals = list(dragged(chain, split, start, stops))
     steps = np.abs(np.diff([tracked.best.q for _, tracked in goals], axis=0)).max(axis=1)
-    # In front of the leap nothing differs; behind it the goal goes on by what the hand does.
+    # Before the leap nothing differs; after it the goal moves on as the target does.
     assert all(np.allclose(goals[i][1].best.q, plain[i].q, atol=1e-9) for i in range(at))
     assert steps.max() < HOP
     end = goals[-1][1]
@@ -119,7 +119,7 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
 
 
 def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> None:
-    """It stays at the limit it came to, however far the hand goes on, and comes back with it."""
+    """The goal stays at the limit for any further drag, and returns with it."""
     q, held = READY, 0
     since = ToolTarget.at(chain, q)
     radius, height = float(np.hypot(*since.position[:2])), float(since.position[2])
@@ -134,7 +134,7 @@ def test_round_the_base_the_goal_stops_at_the_gap_of_axis_1(chain: Chain) -> Non
             assert tracked.best.q[0] == pytest.approx(chain.upper[0], abs=1e-12)
             held += tracked.status is TrackingStatus.GAP
         q, since = tracked.best.q, target
-    # Beyond the gap the place is reachable, but only the long way round.
+    # Beyond the gap the place can be reached, but only the long way round.
     assert held > 20
     assert tracked.beyond_gap is not None
     assert tracked.beyond_gap.position_error < 1e-9
@@ -161,7 +161,7 @@ def test_over_axis_1_the_arm_does_not_turn_round_by_itself(chain: Chain) -> None
 
 
 def test_beside_axis_1_the_arm_turns_with_the_hand(chain: Chain) -> None:
-    """The same drag 6 cm to the side goes through: the goal turns half round on the way."""
+    """The same drag 6 cm to the side continues: the goal turns half round on the path."""
     q = np.radians([0.0, -110.0, 100.0, -60.0, 0.0])
     since = ToolTarget.at(chain, q)
     height = float(since.position[2])
@@ -177,14 +177,14 @@ def test_beside_axis_1_the_arm_turns_with_the_hand(chain: Chain) -> None:
 def test_a_fast_drag_ends_where_the_slow_one_does(
     chain: Chain, priority: Priority, rng: np.random.Generator
 ) -> None:
-    """A leap of the target of up to 0.3 m inside the workspace."""
+    """The target leaps by up to 0.3 m inside the workspace."""
     agreed = 0
     for _ in range(12):
         q = READY + rng.normal(scale=0.1, size=5)
         since = ToolTarget.at(chain, q)
-        way = rng.normal(size=3)
-        way *= rng.uniform(0.05, 0.3) / np.linalg.norm(way)
-        target = ToolTarget(since.position + way, since.pitch, since.roll)
+        shift = rng.normal(size=3)
+        shift *= rng.uniform(0.05, 0.3) / np.linalg.norm(shift)
+        target = ToolTarget(since.position + shift, since.pitch, since.roll)
         fast = arrived(chain, q, target, since, priority)
         slow, last = q, since
         for fraction in np.linspace(0.025, 1.0, 40):
@@ -195,7 +195,7 @@ def test_a_fast_drag_ends_where_the_slow_one_does(
     assert agreed >= 11
 
 
-def test_what_is_reached_is_reached_exactly(chain: Chain, rng: np.random.Generator) -> None:
+def test_reachable_target_is_reached_exactly(chain: Chain, rng: np.random.Generator) -> None:
     for _ in range(50):
         q = rng.uniform(chain.lower + 0.1, chain.upper - 0.1)
         desired = ToolTarget.at(chain, q + rng.normal(scale=0.02, size=5))
@@ -211,7 +211,7 @@ def test_what_is_reached_is_reached_exactly(chain: Chain, rng: np.random.Generat
 def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
     chain: Chain, turn: float, rng: np.random.Generator
 ) -> None:
-    """Also with the back to the target, where theta1 is not its direction."""
+    """Also test the back shoulder, where theta1 is not the direction of the target."""
     seen = set()
     for q in rng.uniform(chain.lower + 0.1, chain.upper - 0.1, size=(40, 5)):
         q[0] *= 0.75
@@ -225,7 +225,7 @@ def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
 
 
 @pytest.mark.parametrize("priority", Priority)
-def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, priority: Priority) -> None:
+def test_very_far_target_has_an_answer(chain: Chain, priority: Priority) -> None:
     for position in ([9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [-3.0, 0.0, -3.0]):
         target = ToolTarget(np.array(position), 40.0, -40.0)
         tracked = track(chain, READY, target, branch=FRONT_UP, priority=priority)
@@ -233,8 +233,8 @@ def test_a_target_at_the_end_of_the_world_has_an_answer(chain: Chain, priority: 
         assert chain.within_limits(tracked.best.q)
 
 
-def test_a_drag_too_long_for_one_call_goes_on_with_the_next(chain: Chain) -> None:
-    """Half round the base at once: a call has time for so many hops, the next has more."""
+def test_long_drag_continues_in_the_next_call(chain: Chain) -> None:
+    """The target leaps half round the base: one call takes limited hops, the next continues."""
     since = ToolTarget.at(chain, READY)
     target = ToolTarget(np.array([-0.3, 0.3, 0.2]), since.pitch, since.roll)
     first = track(chain, READY, target, branch=FRONT_UP, since=since)
@@ -246,10 +246,10 @@ def test_a_drag_too_long_for_one_call_goes_on_with_the_next(chain: Chain) -> Non
 
 
 @pytest.mark.parametrize("priority", Priority)
-def test_a_call_looks_for_a_bounded_number_of_poses(
+def test_one_call_searches_a_bounded_number_of_poses(
     chain: Chain, priority: Priority, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """However far and however blocked the way is."""
+    """The bound holds for any distance and any obstacle."""
     sought = 0
 
     def counted(*args: Any) -> NearestPosture:
@@ -259,19 +259,19 @@ def test_a_call_looks_for_a_bounded_number_of_poses(
 
     monkeypatch.setattr(tracker, "nearest_posture", counted)
     rng = np.random.default_rng(3)
-    most = 0
+    maximum = 0
     for q in rng.uniform(chain.lower, chain.upper, size=(40, 5)):
         since = ToolTarget.at(chain, q)
         target = ToolTarget(rng.normal(size=3), since.pitch + 3.0 * rng.normal(), 0.0)
         before = sought
         track(chain, q, target, branch=branch_of(chain, q), priority=priority, since=since)
-        most = max(most, sought - before)
-    assert MAX_POSES // 2 < most <= MAX_POSES + 1
+        maximum = max(maximum, sought - before)
+    assert MAX_POSES // 2 < maximum <= MAX_POSES + 1
 
 
 @pytest.mark.parametrize("priority", Priority)
 @pytest.mark.parametrize("far", [1e3, 1e9, 1e300])
-def test_a_drag_without_measure_has_an_end(chain: Chain, priority: Priority, far: float) -> None:
+def test_very_long_drag_ends(chain: Chain, priority: Priority, far: float) -> None:
     since = ToolTarget.at(chain, READY)
     target = ToolTarget(far * np.array([0.4, 0.8, 0.4]), since.pitch, since.roll)
     best = arrived(chain, READY, target, since, priority).best
@@ -279,8 +279,8 @@ def test_a_drag_without_measure_has_an_end(chain: Chain, priority: Priority, far
     assert math.atan2(best.T[1, 3], best.T[0, 3]) == pytest.approx(math.atan2(0.8, 0.4), abs=1e-3)
 
 
-def test_out_of_reach_no_turn_is_worth_a_step_away() -> None:
-    """Beside the roll axis a hop may turn the tool and lose a little of the place."""
+def test_out_of_reach_the_tool_does_not_move_away() -> None:
+    """Beside the roll axis a hop may turn the tool and lose a little of the position."""
     rng = np.random.default_rng(2)
     chain, _ = random_member(rng)
     middle, half = rng.uniform(-0.5, 0.5, 5), rng.uniform(1.0, 2.6, 5)
@@ -288,13 +288,13 @@ def test_out_of_reach_no_turn_is_worth_a_step_away() -> None:
     chain = chain.with_tool(chain.M @ random_pose(rng, 0.03))
     q = rng.uniform(chain.lower, chain.upper)
     branch, since = branch_of(chain, q), ToolTarget.at(chain, q)
-    way = rng.normal(size=3)
-    way *= 10.0 ** rng.uniform(-4.0, -1.6) / np.linalg.norm(way)
+    shift = rng.normal(size=3)
+    shift *= 10.0 ** rng.uniform(-4.0, -1.6) / np.linalg.norm(shift)
     since = dataclasses.replace(since, position=3.0 * since.position)
     for k in range(12):
         pitch, roll = 0.3 * rng.normal(size=2) if k % 3 == 0 else (0.0, 0.0)
         target = ToolTarget(
-            since.position + (way if k < 6 else -way), since.pitch + pitch, since.roll + roll
+            since.position + (shift if k < 6 else -shift), since.pitch + pitch, since.roll + roll
         )
         was = math.dist(forward(chain, q)[:3, 3], target.position)
         tracked = track(chain, q, target, branch=branch, since=since)
@@ -304,8 +304,8 @@ def test_out_of_reach_no_turn_is_worth_a_step_away() -> None:
         q, since = tracked.best.q, target
 
 
-def test_a_pitch_that_no_hop_leads_to_turns_nothing_away(chain: Chain) -> None:
-    """With axes 2, 3 and 4 at their ends the pitch ends too, whatever the place would gain."""
+def test_unreachable_pitch_moves_nothing_away(chain: Chain) -> None:
+    """With axes 2, 3 and 4 at their limits the pitch ends too, whatever the position would gain."""
     rng = np.random.default_rng(8)
     for number in range(300):
         side = number % 2

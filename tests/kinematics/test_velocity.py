@@ -35,7 +35,7 @@ H = 1e-6
 
 
 def finite_twist(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
-    """(omega, v) of the tool in axes of {S}, v of the tool point, by central differences."""
+    """Return the twist of the tool point in the axes of {S} by central differences."""
     ahead, behind = forward(chain, q + H * qd), forward(chain, q - H * qd)
     omega = so3.log(ahead[:3, :3] @ behind[:3, :3].T) / (2.0 * H)
     return np.concatenate((omega, (ahead[:3, 3] - behind[:3, 3]) / (2.0 * H)))
@@ -45,7 +45,7 @@ def postures(chain: Chain, rng: np.random.Generator, number: int) -> FloatArray:
     return rng.uniform(chain.lower, chain.upper, size=(number, 5))
 
 
-def test_the_characteristic_length_is_in_the_arms_own_measure(chain: Chain) -> None:
+def test_characteristic_length_is_the_root_mean_square_of_the_distances(chain: Chain) -> None:
     arms = [0.6318, 0.6318, 0.4418, 0.3028, 0.0]
     assert characteristic_length(chain) == pytest.approx(math.sqrt(np.mean(np.square(arms))))
 
@@ -70,9 +70,7 @@ def test_singular_values_against_finite_differences(chain: Chain, rng: np.random
     ],
     ids=["stretched", "elbow straight"],
 )
-def test_in_a_singularity_the_smallest_singular_value_is_nought(
-    chain: Chain, q: FloatArray
-) -> None:
+def test_in_a_singularity_the_smallest_singular_value_is_zero(chain: Chain, q: FloatArray) -> None:
     assert singular_values(chain, q)[-1] < 1e-12
     assert manipulability(chain, q) < 1e-12
     assert condition_number(chain, q) > 1e12
@@ -109,7 +107,7 @@ def test_limit_distances(chain: Chain) -> None:
 def test_jog_follows_its_direction_and_keeps_pitch_and_roll(
     chain: Chain, frame: JogFrame, rng: np.random.Generator
 ) -> None:
-    """Well inside, slowly: the tool point exactly, and the two rotations the arm is free to do."""
+    """A slow jog well inside follows the tool point and the two feasible rotations exactly."""
     checked = 0
     for q in postures(chain, rng, 100):
         R, p = forward(chain, q)[:3, :3], forward(chain, q)[:3, 3]
@@ -129,7 +127,7 @@ def test_jog_follows_its_direction_and_keeps_pitch_and_roll(
     assert checked > 10
 
 
-def test_too_fast_a_jog_is_slowed_as_a_whole(chain: Chain) -> None:
+def test_fast_jog_is_slowed_in_all_joints(chain: Chain) -> None:
     V = np.array([0.0, 0.0, 0.0, 0.0, 0.05, 0.02])
     slow = jog(chain, READY, V, JogFrame.BASE, DT)
     fast = jog(chain, READY, 100.0 * V, JogFrame.BASE, DT)
@@ -137,7 +135,7 @@ def test_too_fast_a_jog_is_slowed_as_a_whole(chain: Chain) -> None:
     assert np.allclose(fast / np.linalg.norm(fast), slow / np.linalg.norm(slow), atol=1e-9)
 
 
-def test_at_a_limit_the_other_joints_go_on(chain: Chain) -> None:
+def test_at_a_limit_the_other_joints_continue(chain: Chain) -> None:
     q = np.array(READY)
     q[4] = chain.upper[4]
     V = np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.05])
@@ -150,7 +148,7 @@ def test_at_a_limit_the_other_joints_go_on(chain: Chain) -> None:
 def test_jogging_for_long_stays_inside_limits_and_speeds(
     chain: Chain, rng: np.random.Generator
 ) -> None:
-    """From everywhere in every direction until something stops it: singularities are on the way."""
+    """Jog from everywhere in every direction until something stops it, also past singularities."""
     singular = 0
     for q in postures(chain, rng, 12):
         V = np.concatenate((rng.normal(size=3), rng.normal(scale=0.5, size=3)))
@@ -171,12 +169,12 @@ def test_in_a_singularity_a_jog_is_bounded(chain: Chain, V: FloatArray) -> None:
         qd = jog(chain, q, V, JogFrame.TOOL, DT)
         assert np.isfinite(qd).all()
         assert (np.abs(qd) <= chain.speed * (1 + 1e-12)).all()
-    # Along the lost direction nothing happens, and nothing is thrown about for it.
+    # There is no motion along the lost direction, and no large rates in other joints.
     assert np.allclose(jog(chain, np.zeros(5), np.eye(6)[3], JogFrame.BASE, DT), 0.0, atol=1e-9)
 
 
 def test_damping_bounds_the_rates_of_a_small_target(chain: Chain) -> None:
-    """Towards the stretched arm, without limits of speed in the way."""
+    """Move towards the stretched arm, without speed limits."""
     V = np.array([0.0, 0.0, 0.0, 1e-4, 0.0, 0.0])
     bound = 1.21 / WELL_CONDITIONED * 1e-4 / characteristic_length(chain)
     for bend in np.geomspace(1e-12, 0.3, 40):
@@ -192,7 +190,7 @@ def test_a_joint_beyond_its_limit_may_only_come_back(chain: Chain) -> None:
 
 
 @pytest.mark.parametrize(
-    ("q", "V", "dt", "said"),
+    ("q", "V", "dt", "message"),
     [
         (READY, np.zeros(5), DT, "twist"),
         (READY, np.full(6, math.nan), DT, "twist"),
@@ -202,9 +200,9 @@ def test_a_joint_beyond_its_limit_may_only_come_back(chain: Chain) -> None:
     ],
 )
 def test_invalid_jog_is_refused(
-    chain: Chain, q: FloatArray, V: FloatArray, dt: float, said: str
+    chain: Chain, q: FloatArray, V: FloatArray, dt: float, message: str
 ) -> None:
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=message):
         jog(chain, q, V, JogFrame.BASE, dt)
 
 
@@ -220,18 +218,18 @@ def test_branch_metrics_give_the_cost_of_a_branch(chain: Chain) -> None:
         assert np.allclose(forward(chain, metrics.q), T, atol=1e-9)
         assert metrics.position_error < 1e-9
         assert metrics.within_limits == chain.within_limits(metrics.q)
-        way = np.abs(metrics.q - READY)
-        assert metrics.distance == way.max()
-        assert metrics.time == pytest.approx((way / chain.speed).max())
+        turns = np.abs(metrics.q - READY)
+        assert metrics.distance == turns.max()
+        assert metrics.time == pytest.approx((turns / chain.speed).max())
         assert metrics.time >= metrics.distance / chain.speed.max()
         assert metrics.smallest_singular_value == singular_values(chain, metrics.q)[-1]
-    # The other elbow takes a way of its own, the other shoulder half a turn of axis 1.
+    # The other elbow needs a motion of its own, the other shoulder half a turn of axis 1.
     assert all_metrics[2].distance >= math.pi - 1e-9
     assert 0.1 < all_metrics[1].distance < math.pi
 
 
 def test_twists_are_of_the_tool_point(chain: Chain) -> None:
-    """A turn in tool axes leaves the point where it is."""
+    """A turn in tool axes leaves the point in place."""
     qd = jog(chain, READY, np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]), JogFrame.TOOL, DT)
     moved = forward(chain, READY + 1e-4 * qd)
     still = forward(chain, READY)
@@ -245,17 +243,17 @@ def test_the_tool_speed_is_that_of_the_jacobian(rng: np.random.Generator) -> Non
         chain, _ = random_member(rng)
         q, qd = rng.uniform(-2.5, 2.5, 5), rng.normal(size=5)
         exact = float(np.linalg.norm(jacobian_body(chain, q)[3:] @ qd))
-        told = tool_speed(chain, q, qd)
-        assert told >= exact - 1e-12
+        speed = tool_speed(chain, q, qd)
+        assert speed >= exact - 1e-12
         off = arm_of(chain).off_axis
-        assert told <= exact + 2.0 * off * np.abs(qd).sum() + 1e-12
+        assert speed <= exact + 2.0 * off * np.abs(qd).sum() + 1e-12
         on_axis = chain.with_tool(_on_roll_axis(chain))
         exact = float(np.linalg.norm(jacobian_body(on_axis, q)[3:] @ qd))
         assert tool_speed(on_axis, q, qd) == pytest.approx(exact, abs=1e-12)
 
 
 def _on_roll_axis(chain: Chain) -> FloatArray:
-    """The tool frame moved to the foot of its point on the roll axis."""
+    """Return the tool frame moved to the foot of its point on the roll axis."""
     M = np.array(chain.M)
     axis, point = chain.S[:3, 4], screws.point_on(chain.S[:, 4])
     M[:3, 3] = point + axis * (axis @ (M[:3, 3] - point))

@@ -1,4 +1,4 @@
-"""Setpoints inside position, speed, acceleration and jerk, whatever is asked and whenever."""
+"""Setpoints keep the limits of position, speed, acceleration and jerk for any goals at any time."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def inside(rng: np.random.Generator) -> FloatArray:
 
 
 def check(before: JointMotion, after: JointMotion, dt: float = DT) -> None:
-    """One step keeps to every limit, and is a step of a motion and not a leap."""
+    """Check that one step keeps every limit and is continuous."""
     assert (after.q >= LIMITS.lower - 1e-9).all()
     assert (after.q <= LIMITS.upper + 1e-9).all()
     assert (np.abs(after.qd) <= LIMITS.speed * (1 + 1e-9)).all()
@@ -47,22 +47,22 @@ def test_a_move_ends_at_rest_exactly_at_its_goal(limiter: Limiter) -> None:
         for _ in range(2000):
             after = limiter.towards(motion, goal, DT)
             check(motion, after)
-            # On the straight line between the two, from rest.
-            way = goal - start
-            fraction = (after.q - start) @ way / (way @ way)
-            assert np.abs(after.q - start - fraction * way).max() < 1e-6
+            # From rest, on the straight line between the two.
+            line = goal - start
+            fraction = (after.q - start) @ line / (line @ line)
+            assert np.abs(after.q - start - fraction * line).max() < 1e-6
             motion = after
             if motion.at_rest:
                 break
         assert np.array_equal(motion.q, goal)
 
 
-def test_goals_that_change_at_any_tick_break_no_limit(limiter: Limiter) -> None:
+def test_goals_that_change_at_any_tick_keep_the_limits(limiter: Limiter) -> None:
     rng = np.random.default_rng(2)
     motion, goal, fraction = JointMotion.rest(inside(rng)), inside(rng), 1.0
     for tick in range(8000):
         if rng.random() < 0.15:
-            # Limits are goals more often than chance would have it.
+            # Limits are chosen as goals more often than chance would choose them.
             goal = inside(rng)
             ends = rng.random(5) < 0.3
             goal[ends] = np.where(rng.random(5) < 0.5, LIMITS.lower, LIMITS.upper)[ends]
@@ -76,15 +76,15 @@ def test_goals_that_change_at_any_tick_break_no_limit(limiter: Limiter) -> None:
         motion = after
 
 
-def test_a_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
+def test_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
     rng = np.random.default_rng(3)
     for _ in range(30):
         motion, goal = JointMotion.rest(inside(rng)), inside(rng)
         for _ in range(int(rng.integers(5, 120))):
             motion = limiter.towards(motion, goal, DT)
         stopping_point, time = limiter.stopping_point(motion), limiter.stopping_time(motion)
-        # No jerk-limited stop is faster than at full braking, nor slower than that after the
-        # jerk it takes to get there and away from there.
+        # No jerk-limited stop is faster than one at full braking, or slower than full braking after
+        # the jerk that it takes to get there and back.
         bang = (np.abs(motion.qd) / LIMITS.acceleration).max()
         assert bang <= time + 1e-9
         assert time <= bang + 3.0 * (LIMITS.acceleration / LIMITS.jerk).max()
@@ -97,7 +97,7 @@ def test_a_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
         assert np.abs(motion.q - stopping_point).max() < 1e-6
 
 
-def test_a_share_of_the_speed_is_kept(limiter: Limiter) -> None:
+def test_fraction_of_the_speed_is_kept(limiter: Limiter) -> None:
     motion, goal = JointMotion.rest(np.zeros(5)), LIMITS.lower
     fastest = np.zeros(5)
     for _ in range(3000):
@@ -131,9 +131,9 @@ def test_jog_stops_close_before_the_limit(limiter: Limiter) -> None:
         q = ends + np.where(ends == LIMITS.lower, room, -room)
         q = np.clip(q, LIMITS.lower + 1e-4, LIMITS.upper - 1e-4)
         for rates, end in zip(limiter.stoppable(q), (LIMITS.lower, LIMITS.upper), strict=True):
-            way = (limiter.stopping_point(JointMotion(q, rates, np.zeros(5))) - q) / (end - q)
-            assert (way > 0.5).all()
-            assert (way < 1.0).all()
+            ratio = (limiter.stopping_point(JointMotion(q, rates, np.zeros(5))) - q) / (end - q)
+            assert (ratio > 0.5).all()
+            assert (ratio < 1.0).all()
 
 
 def test_nothing_moves_without_time_or_reason(limiter: Limiter) -> None:
@@ -154,7 +154,7 @@ def test_nothing_moves_without_time_or_reason(limiter: Limiter) -> None:
         ("lower", [0.0] * 4),
     ],
 )
-def test_limits_that_are_none_are_refused(name: str, value: list[float]) -> None:
+def test_invalid_limits_are_refused(name: str, value: list[float]) -> None:
     values = {key: getattr(LIMITS, key) for key in ("lower", "upper", "speed", "acceleration")}
     with pytest.raises(InputError):
         Limits(**{**values, "jerk": LIMITS.jerk, name: np.array(value)})

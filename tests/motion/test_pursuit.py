@@ -1,4 +1,4 @@
-"""Whatever is followed: limits and bounds hold in every step, and jitter is no noise."""
+"""Following a motion: limits and bounds hold in every step, and jitter adds no noise."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LIMITS = Limits(
 )
 
 
-def test_where_joints_come_to_rest_is_what_the_limiter_says() -> None:
+def test_braked_agrees_with_the_limiter() -> None:
     rng, limiter = np.random.default_rng(1), Limiter(LIMITS)
     for _ in range(300):
         q, qd, qdd = (
@@ -36,7 +36,7 @@ def test_where_joints_come_to_rest_is_what_the_limiter_says() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_limits_hold_for_any_stream(seed: int) -> None:
-    """Also with ticks of uneven length."""
+    """Also test ticks of uneven length."""
     rng, limiter = np.random.default_rng(seed), Limiter(LIMITS)
     now, bounds = JointMotion.rest(np.zeros(3)), (np.full(3, -0.4), np.full(3, 0.3))
     for number in range(3000):
@@ -62,8 +62,8 @@ def test_a_speed_scale_that_falls_slows_down() -> None:
     assert (np.abs(now.qd) <= 0.1 * LIMITS.speed + 1e-9).all()
 
 
-def test_uneven_arrival_is_no_noise_of_the_rates() -> None:
-    """Differences of neighbours are off by all of the rate here; the parabola is not."""
+def test_uneven_arrival_adds_no_noise_to_the_rates() -> None:
+    """Differences of neighbours have errors as large as the rate here; the parabola has not."""
     rng, arrived = np.random.default_rng(4), 0.0
     stream, off = None, []
     for number in range(400):

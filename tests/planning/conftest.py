@@ -1,4 +1,4 @@
-"""Paths that several tests look at."""
+"""Paths that several tests use."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def ready() -> FloatArray:
 
 @pytest.fixture(scope="session")
 def circle() -> ToolArc:
-    """The paper's: y^2 + (z + 110)^2 = 100^2, x = 150 mm, from its top; at a pitch of 99 deg."""
+    """The paper's circle: y^2 + (z + 110)^2 = 100^2, x = 150 mm, from its top, pitch 99 deg."""
     pitch, roll = Linear(math.radians(99.0), math.radians(99.0)), Linear(0.0, 0.0)
     top, centre, axis = np.array([[0.15, 0.0, -0.01], [0.15, 0.0, -0.11], [1.0, 0.0, 0.0]])
     return ToolArc(top, centre, axis, math.tau, pitch, roll)
 
 
 def lines(at: ToolTarget) -> ToolLines:
-    """Round three sides of a frame beside `at`, and a turn on the spot."""
+    """Return lines round three sides of a frame beside `at`, and a turn on the spot."""
     steps = ((0.0, 0.0, 0.0), (0.0, -0.15, 0.0), (-0.05, -0.15, -0.1), (-0.05, 0.05, -0.1))
     vias = [ToolTarget(at.position + step, at.pitch, at.roll) for step in steps]
     last = vias[-1]
@@ -44,7 +44,7 @@ def lines(at: ToolTarget) -> ToolLines:
 
 @pytest.fixture(scope="session")
 def paths(arm: ArmModel, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
-    """One of each kind, by name."""
+    """One path of each kind, by name."""
     chain = arm.chain
     at = ToolTarget.at(chain, ready)
     aside = at.position + np.array([-0.1, -0.2, -0.15])

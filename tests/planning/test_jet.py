@@ -52,7 +52,7 @@ def test_derivatives_are_those_of_the_textbook() -> None:
     assert (t * t * t).derivatives() == pytest.approx((0.343, 1.47, 4.2, 6.0))
 
 
-def test_many_places_are_the_places_one_by_one() -> None:
+def test_many_places_equal_single_places() -> None:
     at = np.linspace(0.1, 0.9, 7)
 
     def f(t: Jet) -> Jet:

@@ -1,4 +1,4 @@
-"""Paths of the joints: straight legs, smooth corners, nothing outside the vias."""
+"""Joint paths: straight legs, smooth corners, nothing outside the vias."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_a_smaller_blend_passes_its_via_nearer(arm: ArmModel) -> None:
         assert less < more
 
 
-def test_vias_that_make_no_path_are_refused(arm: ArmModel, ready: FloatArray) -> None:
+def test_invalid_vias_are_refused(arm: ArmModel, ready: FloatArray) -> None:
     there = ready + 0.1
     none = np.empty(0)
     for vias, blend in (

@@ -1,4 +1,4 @@
-"""Plans: clear on their whole way, or refused with what is in it and where."""
+"""Plans: clear on their whole path, or refused with the obstacle and the place."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def bounds(arm: ArmModel) -> Bounds:
 
 @pytest.fixture(scope="module")
 def bare(robot: Robot) -> CollisionWorld:
-    """The arm without anything round it."""
+    """The arm without an environment."""
     found, _ = world_of(robot)
     assert found is not None
     return found
@@ -41,31 +41,31 @@ def bare(robot: Robot) -> CollisionWorld:
 
 @pytest.fixture(scope="module")
 def world(bare: CollisionWorld) -> CollisionWorld:
-    """The arm on its table, a wall as thin as a sheet beside it."""
+    """The arm on its table, with a wall as thin as a sheet beside it."""
     wall_at = se3.from_rotation_translation(np.eye(3), (0.35, 0.0, 0.16))
     wall = obstacle("wall", wall_at, box((0.30, 0.001, 0.32)))
     return bare.with_obstacles([obstacle("table", np.eye(4), half_space()), wall])
 
 
 def brute_force(path: Path, world: CollisionWorld, places: int = 400) -> float:
-    """[m] the least clearance seen at many places."""
+    """Return the minimum clearance [m] over many places."""
     sweep = Sweep(path)
     found = (world.nearest(sweep.at(s, 0.0)) for s in np.linspace(0.0, 1.0, places).tolist())
     return min(contact.distance for contact in found if contact is not None)
 
 
 def across(arm: ArmModel, lift: float) -> JointPath:
-    """From one side of the wall to the other, in one leg."""
+    """Return a path from one side of the wall to the other, in one leg."""
     q = np.radians([[50.0, -60.0, 80.0, 10.0, 0.0], [-50.0, -60.0, 80.0, 10.0, 0.0]])
     return JointPath(arm.chain, q + np.array([0.0, lift, 0.0, 0.0, 0.0]))
 
 
 def test_a_wall_thinner_than_any_step_is_not_passed(arm: ArmModel, world: CollisionWorld) -> None:
     path = across(arm, 0.0)
-    with pytest.raises(BlockedError, match=r"wall would be .* mm are kept") as told:
+    with pytest.raises(BlockedError, match=r"wall would .* mm are required") as raised:
         check_clear(path, world, 0.0)
     fraction, *point = map(
-        float, re.findall(r"blocked (\d+) % .*\((-?\d+), (-?\d+), (-?\d+)\)", str(told.value))[0]
+        float, re.findall(r"blocked (\d+) % .*\((-?\d+), (-?\d+), (-?\d+)\)", str(raised.value))[0]
     )
     sweep = Sweep(path)
     places = [sweep.at(0.01 * (fraction + off), 0.0) for off in np.linspace(-0.6, 0.6, 41)]
@@ -98,7 +98,9 @@ def test_the_nearest_clearance_is_that_of_brute_force(arm: ArmModel, world: Coll
     assert near > 0
 
 
-def test_a_way_round_is_clear_and_the_same_again(arm: ArmModel, world: CollisionWorld) -> None:
+def test_path_around_the_wall_is_clear_and_deterministic(
+    arm: ArmModel, world: CollisionWorld
+) -> None:
     blocked = across(arm, 0.0)
     path = collision_free_path(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
     assert brute_force(path, world) >= MARGIN - 1e-4
@@ -109,14 +111,14 @@ def test_a_way_round_is_clear_and_the_same_again(arm: ArmModel, world: Collision
 
 def test_an_end_in_the_wall_is_refused(arm: ArmModel, world: CollisionWorld) -> None:
     clear, inside = across(arm, 0.0).start, np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
-    with pytest.raises(BlockedError, match=r"At the end .* too near"):
+    with pytest.raises(BlockedError, match=r"At the end, .* too small"):
         collision_free_path(arm.chain, clear, inside, world, 0.0, 0)
 
 
 def test_unsuccessful_search_ends(
     arm: ArmModel, bare: CollisionWorld, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Past a wall without end the arm would have to reach over itself."""
+    """Past an infinite wall the arm would have to reach over itself."""
     wall_at = se3.from_rotation_translation(np.eye(3), (1.15, 0.0, 0.0))
     endless = bare.with_obstacles([obstacle("wall", wall_at, box((2.0, 0.01, 6.0)))])
     monkeypatch.setattr("katana450.maths.planning.sampling.MAX_POSTURES", 5)
@@ -125,10 +127,10 @@ def test_unsuccessful_search_ends(
         collision_free_path(arm.chain, path.start, path.end, endless, 0.0, 0)
 
 
-def test_a_way_out_of_a_contact_is_allowed_and_deeper_is_not(
+def test_path_out_of_a_contact_is_allowed_and_deeper_is_not(
     arm: ArmModel, world: CollisionWorld
 ) -> None:
-    """As when an object is put where the arm already is."""
+    """Test an object that is put where the arm already is."""
     touching = np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
     contact = world.nearest(np.append(touching, 0.0))
     assert contact is not None
@@ -144,7 +146,7 @@ def test_paths_that_do_not_meet_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=r"Path 2 begins .* deg from where path 1 ends"):
         plan([paths["line"], paths["joints"]], bounds)
-    with pytest.raises(InputError, match="a path at least"):
+    with pytest.raises(InputError, match="at least one path"):
         plan([], bounds)
     there = JointPath(arm.chain, np.array([ready, ready + 0.1]))
     back = JointPath(arm.chain, np.array([ready + 0.1, ready]))

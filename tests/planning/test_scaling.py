@@ -1,4 +1,4 @@
-"""Time along a path: every limit holds for whatever is made of it, and not much is given away."""
+"""Time along a path: every limit holds for any allowed tau(t), and little time is lost."""
 
 from __future__ import annotations
 
@@ -34,9 +34,10 @@ def scalings(paths: dict[str, Path], bounds: Bounds) -> dict[str, Scaling]:
 
 
 def loads(path: Path, scaling: Scaling, bounds: Bounds) -> np.ndarray:
-    """(5,) of speed, acceleration, jerk, tool speed and tool acceleration, the most, to its limit.
+    """Return the maximum ratios (5,) of the loads to their limits.
 
-    The most that any tau(t) within its bounds can make of them, at places that nobody looked at.
+    The loads are speed, acceleration, jerk, tool speed and tool acceleration: the maximum for any
+    tau(t) within its bounds, at places that the search did not check.
     """
     taus = np.random.default_rng(1).uniform(0.0, scaling.span, 4000)
     paces = [scaling.pace(tau) for tau in np.append(taus, (0.0, scaling.span)).tolist()]
@@ -61,7 +62,7 @@ def loads(path: Path, scaling: Scaling, bounds: Bounds) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_limit_is_passed_however_tau_runs(
+def test_limits_hold_for_any_tau(
     paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
 ) -> None:
     found = loads(paths[name], scalings[name], bounds)
@@ -69,7 +70,7 @@ def test_no_limit_is_passed_however_tau_runs(
     assert found.max() > 0.98
 
 
-def test_nor_where_a_corner_is_small(bounds: Bounds, paths: dict[str, Path]) -> None:
+def test_limits_hold_at_a_small_corner(bounds: Bounds, paths: dict[str, Path]) -> None:
     lines = paths["lines"]
     assert isinstance(lines, ToolPath)
     assert isinstance(lines.curve, ToolLines)
@@ -79,23 +80,23 @@ def test_nor_where_a_corner_is_small(bounds: Bounds, paths: dict[str, Path]) -> 
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_takes_not_much_longer_than_it_has_to(
+def test_duration_is_near_the_optimum(
     paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
 ) -> None:
     least = least_time(paths[name], bounds)
-    # The one slowness of a path cannot dwell in several small corners as the optimum does.
+    # The single slowness of a path cannot adapt to several small corners as the optimum does.
     most = 1.75 if name == "lines" else 1.5
     assert least < scalings[name].duration < most * least
 
 
-def test_a_straight_line_alone_is_at_its_limits(arm: ArmModel, paths: dict[str, Path]) -> None:
-    """With nothing but the joints to mind, the optimum is known: one joint's own."""
+def test_straight_line_reaches_its_limits(arm: ArmModel, paths: dict[str, Path]) -> None:
+    """With limits of the joints only, the optimum is known: that of one joint."""
     bounds = Bounds(arm.limits, 50.0)
     scaling = fastest(paths["joints"], bounds)
-    way, limits = np.abs(paths["joints"].end - paths["joints"].start), arm.limits
-    turning = way > 0.0
+    distance, limits = np.abs(paths["joints"].end - paths["joints"].start), arm.limits
+    turning = distance > 0.0
     v, a, j = (
-        float((limit[turning] / way[turning]).min())
+        float((limit[turning] / distance[turning]).min())
         for limit in (limits.speed, limits.acceleration, limits.jerk)
     )
     best = rest_to_rest(1.0 / v, a / v, j / v)
@@ -131,25 +132,26 @@ def test_pace_is_the_inverse_of_tau_with_its_derivatives(
 
 
 @given(st.floats(1e-4, 20.0), st.floats(0.05, 30.0), st.floats(0.05, 200.0))
-def test_the_time_from_rest_to_rest_is_that_of_ruckig(way: float, a: float, j: float) -> None:
+def test_the_time_from_rest_to_rest_is_that_of_ruckig(distance: float, a: float, j: float) -> None:
     wanted = InputParameter(1)
-    wanted.target_position = [way]
+    wanted.target_position = [distance]
     wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = [1.0], [a], [j]
     trajectory = Trajectory(1)
     Ruckig(1).calculate(wanted, trajectory)
-    assert rest_to_rest(way, a, j) == pytest.approx(trajectory.duration, rel=1e-6)
+    assert rest_to_rest(distance, a, j) == pytest.approx(trajectory.duration, rel=1e-6)
     for t in np.linspace(0.0, trajectory.duration, 21).tolist():
         (there,), (speed,), (acceleration,) = trajectory.at_time(t)
-        place, first, second = motion_after(t, way, a, j)
-        assert place == pytest.approx(there, rel=1e-5, abs=1e-6 * way)
-        # Ruckig knows its times to 1e-8 s or so: the slack is that times the next derivative.
+        place, first, second = motion_after(t, distance, a, j)
+        assert place == pytest.approx(there, rel=1e-5, abs=1e-6 * distance)
+        # The times of ruckig are accurate to about 1e-8 s: the slack is that times the next
+        # derivative.
         assert first == pytest.approx(speed, rel=1e-5, abs=1e-6 * (1.0 + a))
         assert second == pytest.approx(acceleration, rel=1e-5, abs=1e-5 * (1.0 + j))
-    assert motion_after(-1.0, way, a, j) == (0.0, 0.0, 0.0)
-    assert motion_after(trajectory.duration + 1.0, way, a, j) == (way, 0.0, 0.0)
+    assert motion_after(-1.0, distance, a, j) == (0.0, 0.0, 0.0)
+    assert motion_after(trajectory.duration + 1.0, distance, a, j) == (distance, 0.0, 0.0)
 
 
-def test_numbers_that_are_none_are_refused(arm: ArmModel) -> None:
+def test_invalid_numbers_are_refused(arm: ArmModel) -> None:
     for speed, acceleration in ((0.0, None), (math.nan, None), (0.5, -1.0), (0.5, math.inf)):
         with pytest.raises(InputError, match="above 0"):
             Bounds(arm.limits, speed, acceleration)

@@ -1,4 +1,4 @@
-"""Tool paths: the tool is on the curve, exactly and everywhere, or the path is refused."""
+"""Tool paths: the tool is exactly on the curve everywhere, or the path is refused."""
 
 from __future__ import annotations
 
@@ -35,9 +35,7 @@ def q_at(path: Path, sigma: float) -> FloatArray:
     return np.array([each.c0 for each in path.joints(Jet.variable(sigma))])
 
 
-def test_the_paper_s_circle_is_a_circle_to_a_trillionth_of_a_millimetre(
-    arm: ArmModel, paths: dict[str, Path]
-) -> None:
+def test_circle_of_the_paper_is_exact(arm: ArmModel, paths: dict[str, Path]) -> None:
     path, chain = paths["circle"], arm.chain_to("flange")
     for number in range(2001):
         angle = math.tau * number / 2000
@@ -47,7 +45,7 @@ def test_the_paper_s_circle_is_a_circle_to_a_trillionth_of_a_millimetre(
         assert abs(math.hypot(y, z + 0.11) - 0.1) < 1e-15
 
 
-def test_its_pitch_stays_and_its_end_is_its_start(arm: ArmModel, paths: dict[str, Path]) -> None:
+def test_circle_keeps_its_pitch_and_closes(arm: ArmModel, paths: dict[str, Path]) -> None:
     path, chain = paths["circle"], arm.chain_to("flange")
     for sigma in np.linspace(0.0, 1.0, 50).tolist():
         target = ToolTarget.at(chain, q_at(path, sigma))
@@ -60,7 +58,7 @@ def test_its_pitch_stays_and_its_end_is_its_start(arm: ArmModel, paths: dict[str
 def test_a_pitch_that_follows_the_circle_leaves_more_room(
     arm: ArmModel, circle: ToolArc, tool: str
 ) -> None:
-    """At a constant pitch only the flange gets round, and by 11.9 deg."""
+    """At a constant pitch only the flange gets round, with a margin of 11.9 deg."""
     chain = arm.chain_to(tool)
     arc = roomiest(chain, FRONT_UP, circle)
     q = joint_derivatives(ToolPath(chain, arc, FRONT_UP, np.zeros(5)), np.linspace(0, 1, 500))[0]
@@ -71,7 +69,7 @@ def test_a_pitch_that_follows_the_circle_leaves_more_room(
             ToolPath(chain, circle, FRONT_UP, np.zeros(5))
 
 
-def test_an_arc_no_pitch_makes_possible_is_refused(arm: ArmModel, circle: ToolArc) -> None:
+def test_arc_without_a_feasible_pitch_is_refused(arm: ArmModel, circle: ToolArc) -> None:
     with pytest.raises(InputError, match="No pitch"):
         roomiest(arm.chain, FRONT_UP, replace(circle, start=np.array([0.15, 0.0, 0.9])))
 
@@ -101,7 +99,7 @@ def test_lines_of_any_member_are_straight_and_keep_their_branch(seed: int) -> No
 
 
 @pytest.mark.parametrize("name", ["circle", "line", "pour", "lines", "joints", "via"])
-def test_derivatives_are_those_of_differences(paths: dict[str, Path], name: str) -> None:
+def test_derivatives_agree_with_differences(paths: dict[str, Path], name: str) -> None:
     path = paths[name]
     joins = (0.0, *path.joins, 1.0)
     for low, high in pairwise(joins):
@@ -139,7 +137,7 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
         target = ToolTarget.at(chain, q_at(path, sigma))
         assert (target.pitch, target.roll) == pytest.approx(tuple(desired[3:]), abs=1e-13)
         away = min(off_leg(T[:3, 3], *leg) for leg in legs)
-        # The farthest from its legs that half of the shorter one with such a blend can be.
+        # The largest distance from its legs that half of the shorter one with such a blend allows.
         assert away < 0.8 * 0.5 * 0.12
         on += away < 1e-12
     assert on > 100
@@ -153,13 +151,13 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
 
 
 def off_leg(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """[m] How far `p` is from the segment from `a` to `b`."""
-    way = b - a
-    fraction = np.clip((p - a) @ way / max(float(way @ way), 1e-30), 0.0, 1.0)
-    return math.dist(p, a + fraction * way)
+    """Return the distance [m] of `p` from the segment from `a` to `b`."""
+    leg = b - a
+    fraction = np.clip((p - a) @ leg / max(float(leg @ leg), 1e-30), 0.0, 1.0)
+    return math.dist(p, a + fraction * leg)
 
 
-def test_lines_that_are_none_are_refused(arm: ArmModel, ready: FloatArray) -> None:
+def test_invalid_lines_are_refused(arm: ArmModel, ready: FloatArray) -> None:
     at = ToolTarget.at(arm.chain, ready)
     there = ToolTarget(at.position + np.array([0.0, 0.05, 0.0]), at.pitch, at.roll)
     beyond = ToolTarget(at.position + np.array([0.6, 0.0, 0.0]), at.pitch, at.roll)
@@ -176,12 +174,12 @@ def test_lines_that_are_none_are_refused(arm: ArmModel, ready: FloatArray) -> No
     ):
         with pytest.raises(InputError):
             ToolLines(vias, blend)
-    with pytest.raises(InputError, match="leaves what the arm reaches"):
+    with pytest.raises(InputError, match="leaves the reach of the arm"):
         ToolPath(arm.chain, ToolLines((at, there, beyond), half), FRONT_UP, ready)
 
 
 @pytest.mark.parametrize("blend", [0.01, 0.1, 1.0])
-def test_a_corner_however_small_is_no_kink(arm: ArmModel, ready: FloatArray, blend: float) -> None:
+def test_small_corner_is_smooth(arm: ArmModel, ready: FloatArray, blend: float) -> None:
     at = ToolTarget.at(arm.chain, ready)
     steps = ((0.0, 0.0, 0.0), (0.0, 0.08, 0.0), (0.0, 0.0, -0.06), (0.0, -0.05, 0.0))
     vias = tuple(ToolTarget(at.position + step, at.pitch, at.roll) for step in steps)
@@ -197,10 +195,10 @@ def straight(chain: Chain, q: FloatArray, step: tuple[float, float, float]) -> T
 
 def test_a_line_out_of_reach_is_refused_where_it_leaves(arm: ArmModel, ready: FloatArray) -> None:
     with pytest.raises(
-        InputError, match=r"leaves what the arm reaches.* (\d+\.\d) % along"
-    ) as told:
+        InputError, match=r"leaves the reach of the arm.* (\d+\.\d) % along"
+    ) as raised:
         straight(arm.chain, ready, (0.6, 0.0, 0.0))
-    fraction = float(str(told.value).split(" % along")[0].split()[-1]) / 100.0
+    fraction = float(str(raised.value).split(" % along")[0].split()[-1]) / 100.0
     straight(arm.chain, ready, (0.6 * (fraction - 0.01), 0.0, 0.0))
     with pytest.raises(InputError, match="reach"):
         straight(arm.chain, ready, (0.6 * (fraction + 0.01), 0.0, 0.0))
@@ -214,7 +212,7 @@ def test_a_line_over_a_limit_names_it(arm: ArmModel, ready: FloatArray) -> None:
 
 
 def test_a_limit_touched_between_two_places_is_found(arm: ArmModel, circle: ToolArc) -> None:
-    """The limit is set just below the peak that axis 2 has somewhere between the places."""
+    """The limit is just below the peak of axis 2 between two checked places."""
     chain = arm.chain_to("flange")
     dense = np.linspace(0.0, 1.0, 50001)
     q = joint_derivatives(ToolPath(chain, circle, FRONT_UP, np.zeros(5)), dense)[0]
@@ -239,13 +237,13 @@ def test_a_line_through_axis_1_is_refused(arm: ArmModel) -> None:
 
 @pytest.mark.parametrize("beyond", [1e-7, -1e-12])
 def test_a_curve_that_only_grazes_the_reach_is_refused(arm: ArmModel, beyond: float) -> None:
-    """Between two of the places that are looked at the arm is stretched, or would have to be."""
+    """The arm is stretched, or would have to be longer, between two checked places."""
     chain, canonical = arm.chain, arm_of(arm.chain)
     radius = canonical.l1 + canonical.l2 + canonical.l3 - 0.1 + beyond
     level, centre = Linear(0.0, 0.0), np.array([0.1, 0.0, 0.0])
     start = centre + radius * np.array([math.cos(0.7), -math.sin(0.7), 0.0])
     arc = ToolArc(start, centre, np.array([0.0, 0.0, 1.0]), 1.4031, level, level)
-    with pytest.raises(InputError, match=r"\(631.8, .*links come in line"):
+    with pytest.raises(InputError, match=r"\(631.8, .*Links come in line"):
         ToolPath(chain, arc, FRONT_UP, np.zeros(5))
     nearer = replace(arc, start=centre + (1.0 - 2e-3) * (start - centre))
     ToolPath(chain, nearer, FRONT_UP, np.zeros(5))
@@ -259,7 +257,7 @@ TWISTS = {
 
 
 @pytest.mark.parametrize("name", TWISTS)
-def test_a_screw_five_axes_can_follow_is_followed_in_all_six(
+def test_feasible_screw_is_followed_in_position_and_orientation(
     arm: ArmModel, ready: FloatArray, name: str
 ) -> None:
     twist = np.array(TWISTS[name])
@@ -271,7 +269,7 @@ def test_a_screw_five_axes_can_follow_is_followed_in_all_six(
         assert forward(arm.chain, q_at(path, sigma)) == pytest.approx(wanted, abs=1e-13)
 
 
-def test_any_screw_keeps_the_point_and_turns_as_near_as_the_arm_can(
+def test_any_screw_keeps_the_point_and_the_nearest_orientation(
     arm: ArmModel, ready: FloatArray
 ) -> None:
     rng, chain, followed = np.random.default_rng(5), arm.chain, 0
@@ -323,7 +321,7 @@ def test_a_tool_beside_the_roll_axis_follows_lines_exactly() -> None:
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_numbers_that_are_none_are_refused(arm: ArmModel, ready: FloatArray, bad: float) -> None:
+def test_invalid_numbers_are_refused(arm: ArmModel, ready: FloatArray, bad: float) -> None:
     at = ToolTarget.at(arm.chain, ready)
     still = Linear(0.0, 0.0)
     for wrong in (

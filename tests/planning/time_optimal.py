@@ -1,4 +1,4 @@
-"""A bound on how quickly a path can be run through, found without anything of the app's pacing."""
+"""A lower bound on the duration of a path, computed without the app's pacing."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from katana450.maths.planning.scaling import Bounds
 
 
 def least_time(path: Path, bounds: Bounds, places: int = 400) -> float:
-    """[s] from rest to rest under speed and acceleration alone: with a limit of jerk it is longer.
+    """Return the time [s] from rest to rest under limits of speed and acceleration.
 
-    Bobrow, Dubowsky and Gibson, Time-optimal control of robotic manipulators along specified paths
-    (1985): the greatest square of the rate of sigma that can still be braked, found backwards, then
-    reached forwards.
+    With a limit of jerk it is longer. Method: Bobrow, Dubowsky and Gibson, Time-optimal control of
+    robotic manipulators along specified paths (1985). The maximum square of the rate of sigma that
+    can still be braked is computed backwards, then reached forwards.
     """
     sigma = np.linspace(0.0, 1.0, places + 1)
     _, q1, q2, _ = joint_derivatives(path, sigma)
@@ -25,7 +25,7 @@ def least_time(path: Path, bounds: Bounds, places: int = 400) -> float:
     h, square = 1.0 / places, most**2
 
     def rates(place: int, x: float) -> tuple[float, float]:
-        """The least and the most second derivative of sigma at the squared rate `x`."""
+        """Return the minimum and maximum second derivative of sigma at the squared rate `x`."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.stack((-A - q2[place] * x, A - q2[place] * x)) / q1[place]
         low, high = np.fmin(*ends), np.fmax(*ends)

@@ -190,7 +190,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('<axis xyz="1 0 0"/>', '<axis xyz="0 1 0"/>', "axis 5 must be square to axis 4"),
+        ('<axis xyz="1 0 0"/>', '<axis xyz="0 1 0"/>', "axis 5 must be perpendicular to axis 4"),
         ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.1 0 0"/>', "axis 3 must be parallel"),
         ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="fixed">', "five turn"),
         ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="prismatic">', "five"),
@@ -215,7 +215,11 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
             '<origin xyz="0 inf 0"/>',
             "<origin> of <joint> 'elbow'",
         ),
-        ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.0008 0 0"/>', "write 1.570796 for 1.57"),
+        (
+            '<origin xyz="0.05 0 0.15"/>',
+            '<origin rpy="0.0008 0 0"/>',
+            "write 1.570796 instead of 1.57",
+        ),
     ],
 )
 def test_an_arm_of_another_kind_is_refused_with_the_reason(

@@ -1,4 +1,4 @@
-"""A cup in the hand of the arm itself, swung half round and stopped on the way."""
+"""A cup in the hand of the arm, swung half round and stopped on the path."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from katana450.maths.water.flow import Water, WaterFlow
 
 DT = 0.01
 LEVEL = np.deg2rad((-50.0, -70.0, 100.0, -30.0, 0.0))
-"""[rad] The tool level, half a metre from axis 1."""
+"""Joint angles [rad] with the tool level, half a metre from axis 1."""
 
 
 def swung(arm: MountedArm, stop_after: float) -> tuple[list[FloatArray], FloatArray]:
-    """Poses of an upright cup at the tool, and its accelerations (n, 3), from rest to rest."""
+    """Return poses and accelerations (n, 3) of an upright cup at the tool, from rest to rest."""
     session = Session(arm, LEVEL)
     state = session.begin(LEVEL, 0.0, 0.0)
     poses = []
@@ -43,7 +43,7 @@ def swung(arm: MountedArm, stop_after: float) -> tuple[list[FloatArray], FloatAr
 def carried_by(
     flow: WaterFlow, volume: float, poses: list[FloatArray], accelerations: FloatArray
 ) -> tuple[Water, float]:
-    """The water in the end, and the least margin [m] it had to the rim."""
+    """Return the water at the end, and its minimum margin [m] to the rim."""
     water, least = flow.begin(volume, poses[0]), math.inf
     for T, acceleration in zip(poses, accelerations, strict=True):
         water = flow.step(water, T, acceleration, DT)
@@ -51,7 +51,7 @@ def carried_by(
     return water, least
 
 
-@pytest.mark.parametrize("stop_after", [9.0, 0.6], ids=["whole way", "stopped"])
+@pytest.mark.parametrize("stop_after", [9.0, 0.6], ids=["whole swing", "stopped"])
 def test_at_full_speed_the_arm_keeps_the_water_off_the_rim(
     arm: MountedArm, flow: WaterFlow, stop_after: float
 ) -> None:
@@ -61,7 +61,7 @@ def test_at_full_speed_the_arm_keeps_the_water_off_the_rim(
     water, least = carried_by(flow, 2e-4, poses, accelerations)
     assert least > 5e-3
     assert water.cup == water.total
-    # With as much in it as leaves 6 mm, a stop spills.
+    # With a filling that leaves 6 mm, a stop spills.
     if stop_after < 3.0:
         fuller, least = carried_by(flow, 2.3e-4, poses, accelerations)
         assert least < 0.0 < fuller.spilled

@@ -1,4 +1,4 @@
-"""The volume below a plane, against quadrature and against what must be true of any volume."""
+"""The volume below a plane, against quadrature and against general properties of volumes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def level_at(cylinder: Cylinder, tilt: float, fraction: float) -> float:
 
 
 def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
-    """The volume by columns parallel to the axis, each as far as it is wet."""
+    """Return the volume by columns parallel to the axis, each up to its wet height."""
     r = np.sqrt((np.arange(300) + 0.5) / 300.0) * cylinder.radius
     turn = (np.arange(300) + 0.5) * (math.tau / 300.0)
     below = level - math.sin(tilt) * np.outer(r, np.cos(turn))
@@ -48,13 +48,13 @@ def summed_up(cylinder: Cylinder, tilt: float, level: float) -> float:
 
 @repeatable
 @given(cylinders, st.floats(0.01, math.pi - 0.01), st.floats(0.0, 1.0))
-def test_as_much_as_its_columns_together(cylinder: Cylinder, tilt: float, fraction: float) -> None:
+def test_volume_is_the_sum_of_its_columns(cylinder: Cylinder, tilt: float, fraction: float) -> None:
     level = level_at(cylinder, tilt, fraction)
     expected = summed_up(cylinder, tilt, level)
     assert cylinder.volume(tilt, level) == pytest.approx(expected, abs=5e-4 * cylinder.capacity)
 
 
-def test_points_thrown_at_random_are_below_as_often() -> None:
+def test_volume_agrees_with_random_points() -> None:
     rng = np.random.default_rng(5)
     n = 200_000
     r, turn = np.sqrt(rng.random(n)) * CUP.radius, rng.random(n) * math.tau
@@ -80,13 +80,13 @@ def test_known_volumes() -> None:
 
 @repeatable
 @given(cylinders, tilts, fractions)
-def test_both_sides_make_the_whole(cylinder: Cylinder, tilt: float, fraction: float) -> None:
+def test_volumes_of_both_sides_add_up(cylinder: Cylinder, tilt: float, fraction: float) -> None:
     level = level_at(cylinder, tilt, fraction)
-    # Seen from the other side the plane faces down.
+    # From the other side the plane faces down.
     rest = cylinder.volume(math.pi - tilt, -level)
     up = cylinder.volume(tilt, level)
     assert up + rest == pytest.approx(cylinder.capacity, rel=1e-12)
-    # And the mirror image in height: floor for rim.
+    # The mirror image in height exchanges floor and rim.
     mirrored = cylinder.volume(math.pi - tilt, level - cylinder.depth * math.cos(tilt))
     assert mirrored == pytest.approx(up, rel=1e-9, abs=1e-13 * cylinder.capacity)
 
@@ -97,14 +97,14 @@ def test_a_higher_plane_has_more_below(c: Cylinder, tilt: float, a: float, b: fl
     low, high = sorted((level_at(c, tilt, a), level_at(c, tilt, b)))
     more = c.volume(tilt, high) - c.volume(tilt, low)
     assert more >= -1e-14 * c.capacity
-    # It never grows faster than the largest cut of the cylinder lets it: there are no leaps.
+    # It never grows faster than the largest cut of the cylinder allows: there are no leaps.
     widest = 2.0 * c.radius * math.hypot(2.0 * c.radius, c.depth)
     assert more <= widest * (high - low) + 1e-13 * c.capacity
 
 
 @repeatable
 @given(cylinders, tilts, fractions, st.floats(-1e-9, 1e-9))
-def test_a_hair_of_tilt_changes_a_hair(
+def test_small_tilt_changes_the_volume_little(
     c: Cylinder, tilt: float, fraction: float, by: float
 ) -> None:
     assume(0.0 <= tilt + by <= math.pi)
@@ -128,7 +128,7 @@ def test_the_level_of_a_volume_has_that_volume_below(
 
 @repeatable
 @given(cylinders, st.floats(0.0, math.pi), st.floats(0.05, 0.95))
-def test_the_surface_is_what_the_volume_grows_by(
+def test_surface_is_the_derivative_of_the_volume(
     cylinder: Cylinder, tilt: float, fraction: float
 ) -> None:
     level = level_at(cylinder, tilt, fraction)
@@ -139,11 +139,11 @@ def test_the_surface_is_what_the_volume_grows_by(
     assert grown / (2.0 * step) == pytest.approx(scale, abs=2e-2 * widest)
 
 
-def test_what_it_holds_ends_at_the_lip() -> None:
+def test_capacity_at_a_tilt_ends_at_the_lip() -> None:
     assert CUP.holds(0.0) == CUP.capacity
     assert CUP.holds(0.5 * math.pi) == pytest.approx(0.0, abs=1e-20)
     assert CUP.holds(2.0) == CUP.holds(math.pi) == 0.0
-    # While the floor is covered it is the mean of what the highest and the lowest wall hold.
+    # While the floor is covered, it is the mean of the volumes up to the highest and lowest wall.
     tilt = math.radians(35.0)
     rest = math.pi * CUP.radius**2 * (CUP.depth - CUP.radius * math.tan(tilt))
     assert CUP.holds(tilt) == pytest.approx(rest, rel=1e-13)
@@ -153,7 +153,7 @@ def test_what_it_holds_ends_at_the_lip() -> None:
 
 @repeatable
 @given(cylinders, st.floats(0.001, 0.999))
-def test_it_spills_from_the_tilt_at_which_it_holds_no_more(c: Cylinder, fraction: float) -> None:
+def test_spilling_begins_where_the_capacity_ends(c: Cylinder, fraction: float) -> None:
     volume = fraction * c.capacity
     tilt = c.spills_at(volume)
     assert c.holds(tilt) == pytest.approx(volume, rel=1e-9)
@@ -166,7 +166,7 @@ def test_full_and_empty_cups_spill_at_once_and_never() -> None:
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
-def test_sizes_that_are_none_are_refused(bad: float) -> None:
+def test_invalid_sizes_are_refused(bad: float) -> None:
     with pytest.raises(InputError, match="radius"):
         Cylinder(bad, 0.1)
     with pytest.raises(InputError, match="depth"):

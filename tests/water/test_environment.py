@@ -46,7 +46,7 @@ def test_a_level_is_the_inverse_of_a_volume(basin: Basin, fraction: float) -> No
     assert basin.level(basin.volume(level)) == pytest.approx(level, rel=1e-11, abs=1e-15)
 
 
-def test_a_straight_basin_is_the_limit_of_leaning_ones(environment: WaterEnvironment) -> None:
+def test_straight_basin_is_the_limit_of_conical_ones(environment: WaterEnvironment) -> None:
     straight = replace(environment.basin, rim_radius=environment.basin.floor_radius)
     nearly = replace(straight, rim_radius=straight.floor_radius * (1.0 + 1e-12))
     assert nearly.level(2e-4) == pytest.approx(straight.level(2e-4), rel=1e-10)

@@ -1,4 +1,4 @@
-"""Carrying, spilling, pouring, stopping: no water is lost, and all of it goes where it would."""
+"""Carrying, spilling, pouring and stopping: no water is lost, and it lands in the right places."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.geometry.strategies import points, repeatable, rotation_vectors
 from tests.water.motions import UPRIGHT, carried, over_basin, placed, poured, turned_to
 
 FULL = 2e-4
-"""[m^3]"""
+"""A filling [m^3]."""
 
 Move = tuple[FloatArray, Vector, FloatArray, float]
 """A rotation vector, a place, an acceleration and a time."""
@@ -63,7 +63,7 @@ def test_no_motion_makes_or_loses_water(flow: WaterFlow, volume: float, moves: l
 
 @settings(repeatable, max_examples=25)
 @given(st.floats(0.5, 6.0), st.floats(0.0, math.pi), st.sampled_from([0.01, 0.05]))
-def test_a_cup_over_the_basin_keeps_what_its_tilt_holds_and_the_rest_is_caught(
+def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     flow: WaterFlow, rate: float, final: float, dt: float
 ) -> None:
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
@@ -77,19 +77,19 @@ def test_a_cup_over_the_basin_keeps_what_its_tilt_holds_and_the_rest_is_caught(
     assert water.spilled == 0
 
 
-def test_a_cup_turned_over_is_emptied_into_the_basin_whole(flow: WaterFlow) -> None:
+def test_inverted_cup_is_emptied_into_the_basin(flow: WaterFlow) -> None:
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(math.radians(120.0), 1.0), 4.0, 0.01)
     assert (water.cup, water.basin, water.spilled) == (0, water.total, 0)
 
 
-def test_stopped_in_the_middle_it_flows_down_to_the_lip_and_no_farther(flow: WaterFlow) -> None:
+def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
     tilt = math.radians(65.0)
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     runs = list(poured(flow, water, turned_to(tilt, 1.0), 8.0, 0.01))
     at_stop = round(tilt / 0.01)
     held = counted(flow.water_environment.cup.inside.holds(tilt))
-    # It goes on when the arm stands, ever more slowly, and comes to an end within two seconds.
+    # The flow continues while the arm rests, ever more slowly, and ends within two seconds.
     flowing = [a.cup - b.cup for a, b in pairwise(runs[at_stop:])]
     assert flowing[0] > 0
     assert all(a >= b for a, b in pairwise(flowing[:100]))
@@ -109,9 +109,9 @@ def test_the_size_of_the_steps_hardly_matters(flow: WaterFlow) -> None:
     assert left == pytest.approx([left[0]] * 3, abs=6.0)
 
 
-def carry(flow: WaterFlow, way: float, duration: float) -> tuple[Water, float]:
+def carry(flow: WaterFlow, distance: float, duration: float) -> tuple[Water, float]:
     water, least = flow.begin(FULL, placed(0.2, -0.3, 0.15)), math.inf
-    for T, acceleration in carried(0.2, way, duration, 0.01):
+    for T, acceleration in carried(0.2, distance, duration, 0.01):
         water = flow.step(water, T, acceleration, 0.01)
         least = min(least, flow.margin_to_rim(water))
     for _ in range(200):
@@ -138,7 +138,7 @@ def test_the_steady_acceleration_is_where_spilling_begins(flow: WaterFlow) -> No
     limit = steady_acceleration(flow.water_environment.cup.inside, FULL)
     for fraction, spills in ((0.98, False), (1.02, True)):
         water = flow.begin(FULL, T)
-        # Brought up slowly, over many swings.
+        # The acceleration rises slowly, over many swings.
         for k in range(3000):
             pull = fraction * limit * min(k / 2500.0, 1.0)
             water = flow.step(water, T, (0.0, pull, 0.0), 0.01)
@@ -155,12 +155,12 @@ def test_the_surface_leans_against_the_acceleration(flow: WaterFlow) -> None:
     for _ in range(3000):
         water = flow.step(water, water.T_base_cup, (1.0, 0.0, 0.0), 0.01)
     surface = flow.surface(water)
-    # A cup that is pulled to +x has its water rise on the other side.
+    # In a cup that is pulled to +x, the water rises on the other side.
     assert surface.downhill == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
     assert surface.tilt == pytest.approx(math.atan2(1.0, 9.81), abs=1e-6)
 
 
-def test_water_leaves_with_the_lip_and_flies_on(flow: WaterFlow) -> None:
+def test_water_leaves_with_the_velocity_of_the_lip(flow: WaterFlow) -> None:
     T = placed(0.2, -0.3, 0.3, math.radians(80.0))
     water = flow.begin(1.5e-4, T)
     moved = T.copy()
@@ -201,7 +201,7 @@ def test_a_full_basin_spills_onto_the_table(environment: WaterEnvironment) -> No
         assert math.hypot(puddle.at[0] - x, puddle.at[1] - y) < 0.08
 
 
-def test_in_free_fall_water_stays_and_upside_down_it_does_not(flow: WaterFlow) -> None:
+def test_water_stays_in_free_fall_but_not_upside_down(flow: WaterFlow) -> None:
     T = placed(0.2, -0.3, 0.3)
     water = flow.begin(FULL, T)
     for _ in range(400):
@@ -211,13 +211,13 @@ def test_in_free_fall_water_stays_and_upside_down_it_does_not(flow: WaterFlow) -
     assert (water.cup, water.air) == (0, 0)
 
 
-def test_water_at_rest_rests(flow: WaterFlow) -> None:
+def test_water_at_rest_stays_at_rest(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15, 0.2))
     after = flow.step(water, water.T_base_cup, UPRIGHT, 0.01)
     assert (after.cup, after.parcels, after.slosh) == (water.cup, (), water.slosh)
 
 
-def test_a_step_of_no_time_only_moves_the_cup(flow: WaterFlow) -> None:
+def test_step_of_zero_time_only_moves_the_cup(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15))
     after = flow.step(water, placed(0.3, -0.3, 0.15, 2.0), UPRIGHT, 0.0)
     assert after.cup == water.cup
@@ -234,7 +234,7 @@ def test_the_puddles_stay_few(flow: WaterFlow) -> None:
     assert 4 <= len(water.puddles) <= 8
 
 
-def test_a_cup_cannot_begin_fuller_than_full(flow: WaterFlow) -> None:
+def test_overfull_cup_is_refused(flow: WaterFlow) -> None:
     for volume in (-1e-6, 1e-3, math.nan):
         with pytest.raises(InputError, match="ml"):
             flow.begin(volume, np.eye(4))

@@ -1,4 +1,4 @@
-"""Flight and landing, against flights taken in very small steps."""
+"""Flight and landing, against flights in very small steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ speeds = st.floats(-2.0, 2.0)
 velocities = st.tuples(speeds, speeds, speeds)
 
 
-def test_it_flies_as_a_stone_does() -> None:
+def test_parcel_flies_on_a_parabola() -> None:
     parcel = Parcel(1, (0.0, 0.0, 1.0), (0.5, 0.0, 2.0), 0.0, 0.01)
     up = 2.0 / GRAVITY
     assert parcel.at(up) == pytest.approx((0.5 * up, 0.0, 1.0 + 2.0 / GRAVITY))
@@ -28,7 +28,7 @@ def test_it_flies_as_a_stone_does() -> None:
 
 @repeatable
 @given(st.tuples(st.floats(-0.2, 0.8), st.floats(-0.6, 0.8), st.floats(0.08, 0.6)), velocities)
-def test_it_lands_where_small_steps_lead(
+def test_landing_agrees_with_small_steps(
     environment: WaterEnvironment,
     start: tuple[float, float, float],
     velocity: tuple[float, float, float],
@@ -59,7 +59,7 @@ def test_it_lands_where_small_steps_lead(
         assert end.point == pytest.approx((x, y, z), abs=2e-3)
 
 
-def test_what_leaves_inside_the_basin_stays_there(environment: WaterEnvironment) -> None:
+def test_water_that_leaves_inside_the_basin_stays_there(environment: WaterEnvironment) -> None:
     x, y, _ = environment.basin.at
     dipped = Parcel(1, (x, y, 0.03), (0.1, 0.0, 0.0), 0.0, 0.01)
     assert landing(dipped, environment, 0.01).ground is Ground.BASIN
@@ -67,12 +67,12 @@ def test_what_leaves_inside_the_basin_stays_there(environment: WaterEnvironment)
     assert landing(beside, environment, 0.01).ground is Ground.TABLE
 
 
-def test_beside_the_table_there_is_the_floor(environment: WaterEnvironment) -> None:
+def test_water_beside_the_table_lands_on_the_floor(environment: WaterEnvironment) -> None:
     (west, _), floor = environment.table.x, environment.table.floor
     end = landing(Parcel(1, (west - 0.1, 0.0, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01), environment, 0.0)
     assert end.ground is Ground.FLOOR
     assert end.point == pytest.approx((west - 0.1, 0.0, floor))
     assert end.age == pytest.approx(math.sqrt(2.0 * (0.3 - floor) / GRAVITY))
-    # Already lower than all there is.
+    # The start is below all surfaces.
     sunk = Parcel(1, (west - 0.1, 0.0, -0.4), (0.0, 0.0, -1.0), 0.0, 0.01)
     assert landing(sunk, environment, 0.0) == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))

@@ -1,4 +1,4 @@
-"""What a run is worth."""
+"""The score of a pour."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from katana450.maths.water.score import Course, score
 from tests.water.motions import UPRIGHT, over_basin, poured, turned_to
 
 
-def test_a_pour_into_the_basin_counts_whole(flow: WaterFlow) -> None:
+def test_pour_into_the_basin_has_the_full_score(flow: WaterFlow) -> None:
     water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     result = score(water, Course())
@@ -30,13 +30,13 @@ def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
     assert result.emptied_percent == pytest.approx(result.in_basin_ml / 2.0)
 
 
-def test_of_no_water_nothing_can_be_emptied(flow: WaterFlow) -> None:
+def test_score_without_water_is_nan(flow: WaterFlow) -> None:
     empty = flow.begin(0.0, over_basin(flow.water_environment, 0.0))
     empty = flow.step(empty, over_basin(flow.water_environment, 2.0), UPRIGHT, 0.01)
     assert math.isnan(score(empty, Course()).emptied_percent)
 
 
-def test_a_course_knows_its_time_and_its_greatest_jerk(flow: WaterFlow) -> None:
+def test_course_measures_duration_and_peak_jerk(flow: WaterFlow) -> None:
     course = Course()
     for k in range(201):
         t = 0.01 * k

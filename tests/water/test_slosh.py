@@ -1,4 +1,4 @@
-"""The swing of the surface, against its equation taken in very small steps."""
+"""The swing of the surface, against its equation in very small steps."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_one_long_step_is_many_short_ones(
     assert np.allclose(whole.rate, v, atol=2e-3 * omega)
 
 
-def test_it_swings_to_nearly_twice_the_lean_and_comes_to_rest() -> None:
+def test_surface_swings_to_nearly_twice_the_lean_and_comes_to_rest() -> None:
     omega = frequency(CUP, 2e-4)
     slosh, leans = Slosh(), []
     for _ in range(4000):
@@ -67,21 +67,21 @@ def test_it_swings_to_nearly_twice_the_lean_and_comes_to_rest() -> None:
     assert slosh == Slosh((2.0 / GRAVITY, 0.0))
 
 
-def test_weight_is_felt_at_once() -> None:
+def test_vertical_acceleration_acts_at_once() -> None:
     slosh = Slosh().after((0.0, 0.0, -GRAVITY), 24.0, 0.01)
     assert slosh == Slosh(weight=0.0)
     assert Slosh().after((0.0, 0.0, 3.0), 24.0, 0.01).up == (0.0, 0.0, 1.0 + 3.0 / GRAVITY)
 
 
 @pytest.mark.parametrize("dt", [1e-6, 0.05, 10.0, 1e4])
-def test_it_is_stable_in_any_step(dt: float) -> None:
+def test_slosh_is_stable_for_any_step(dt: float) -> None:
     slosh = Slosh((1.0, -0.5), (3.0, 0.0))
     for _ in range(50):
         slosh = slosh.after((0.0, 0.0, 0.0), 24.0, dt)
         assert math.hypot(*slosh.up, *slosh.rate) < 40.0
 
 
-def test_the_frequency_is_that_of_the_book() -> None:
+def test_frequency_agrees_with_the_literature() -> None:
     k = FIRST_MODE / CUP.radius
     deep = math.sqrt(GRAVITY * k)
     assert frequency(CUP, CUP.capacity) == pytest.approx(deep, rel=1e-4)
@@ -103,6 +103,6 @@ def test_a_steady_acceleration_lifts_the_surface_to_the_rim() -> None:
         lean = math.atan2(steady_acceleration(CUP, volume), GRAVITY)
         level = CUP.level(lean, volume)
         assert CUP.margin(lean, level) == pytest.approx(0.0, abs=1e-9)
-    # More than half full: g times what is free of the wall to the radius.
+    # More than half full: g times the ratio of the free height of the wall to the radius.
     free = CUP.depth - 2e-4 / (math.pi * CUP.radius**2)
     assert steady_acceleration(CUP, 2e-4) == pytest.approx(GRAVITY * free / CUP.radius)

@@ -1,4 +1,4 @@
-"""The meshes are closed, seen from outside, and hold the water they stand for."""
+"""The meshes are closed, seen from outside, and contain the right amount of water."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from tests.water.motions import over_basin, poured, turned_to
 
 CUP = Cylinder(0.03, 0.087)
 NOTHING = 1e-12
-"""[m]"""
+"""Tolerance [m] for coincident corners."""
 
 
 def closed(corners: FloatArray, faces: Faces) -> trimesh.Trimesh:
-    """The mesh with corners that meet made one, and faces of no area left out."""
+    """Return the mesh with coincident corners merged, and without faces of zero area."""
     mesh = trimesh.Trimesh(corners, faces, process=False)
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces(height=1e-9))
@@ -48,14 +48,14 @@ def closed(corners: FloatArray, faces: Faces) -> trimesh.Trimesh:
     st.floats(0.02, 0.98),
     st.floats(0.0, math.tau),
 )
-def test_the_body_holds_the_water(tilt: float, fraction: float, turn: float) -> None:
+def test_body_has_the_volume_of_the_water(tilt: float, fraction: float, turn: float) -> None:
     volume = fraction * CUP.capacity
     surface = WaterSurface(tilt, CUP.level(tilt, volume), (math.cos(turn), math.sin(turn), 0.0))
     corners = body(CUP, surface)
     mesh = trimesh.Trimesh(corners, BODY_FACES, process=False)
-    # Twenty chords for half an arc: up to half a percent less than the round.
+    # Twenty chords for half an arc: up to half a percent less than the circle.
     assert mesh.volume == pytest.approx(volume, rel=0.012, abs=2e-3 * CUP.capacity)
-    # All of it in the cup and under the plane.
+    # All of it is in the cup and under the plane.
     normal = np.array((*(-math.sin(tilt) * np.array(surface.downhill[:2])), math.cos(tilt)))
     assert (corners @ normal).max() <= surface.level + 1e-9
     assert np.hypot(corners[:, 0], corners[:, 1]).max() <= CUP.radius + 1e-12
@@ -92,7 +92,7 @@ def test_the_stream_runs_from_the_lip_to_the_water(flow: WaterFlow) -> None:
     assert 0.5 * water.air * 1e-18 < mesh.volume < 1.1 * water.air * 1e-18
 
 
-def test_a_stream_that_was_interrupted_is_a_thread_there() -> None:
+def test_interrupted_stream_has_zero_width_there() -> None:
     def parcel(age: float) -> Parcel:
         return Parcel(10**12, (0.0, 0.0, 1.0), (0.3, 0.0, 0.0), age, 0.01)
 
@@ -105,12 +105,12 @@ def test_a_stream_that_was_interrupted_is_a_thread_there() -> None:
     assert (spread[1:-1][(age[1:-1] < 0.1) | (age[1:-1] > 0.21)] > 0.0).all()
 
 
-def test_one_drop_that_falls_straight_is_drawn() -> None:
+def test_single_falling_drop_is_drawn() -> None:
     drop = Parcel(10**11, (0.1, 0.2, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01)
     assert np.isfinite(stream([drop], 0.03, 0.2)).all()
 
 
-def test_disc_and_blob_are_as_large_as_they_say() -> None:
+def test_disc_and_blob_have_their_stated_size() -> None:
     assert trimesh.Trimesh(*disc(), process=False).area == pytest.approx(math.pi, rel=0.005)
     corners, faces = blob()
     mesh = trimesh.Trimesh(corners, faces, process=False)

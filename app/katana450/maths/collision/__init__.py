@@ -1,1 +1,1 @@
-"""How near the arm is to itself and to what stands around it, and how far it may go. Pure."""
+"""Clearance of the arm from itself and its environment, and how far it may move. Pure."""

@@ -11,15 +11,15 @@ from katana450.maths.collision.engine import Witness
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 SIGNED = coal.DistanceRequest()
-"""Also asks for the depth of bodies that are in each other, as a distance below zero."""
+"""A request that also measures the depth of overlapping bodies, as a negative distance."""
 
-# Of 12,742 distances of the arm 98 are off by 1 to 99 um with coal's own 1e-6, and none by more
-# than 8 nm with this, in the same time.
+# Of 12,742 distances of the arm, 98 are off by 1 to 99 um with coal's default of 1e-6. With this
+# value none is off by more than 8 nm, in the same time.
 SIGNED.gjk_tolerance = 1e-8
 
 
 class CoalEngine:
-    """The engine wherever coal has wheels."""
+    """The engine on platforms with coal wheels."""
 
     def hull(self, corners: FloatArray) -> Any:
         """Return the convex hull of ``corners`` (n, 3) [m]."""
@@ -38,15 +38,15 @@ class CoalEngine:
         return coal.Sphere(radius)
 
     def half_space(self) -> Any:
-        """Return everything with z <= 0."""
+        """Return the half-space z <= 0."""
         return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
 
     def transform(self, T: FloatArray) -> Any:
-        """Return the pose ``T`` (4, 4) [m] as coal's."""
+        """Return the pose ``T`` (4, 4) [m] as a transform of coal."""
         return coal.Transform3s(T[:3, :3], T[:3, 3])
 
     def distance(self, one: Any, T_one: Any, other: Any, T_other: Any) -> float:
-        """Return the distance between two geometries [m]; negative is their depth."""
+        """Return the distance between two geometries [m]; a negative value is their depth."""
         found: float = coal.distance(one, T_one, other, T_other, SIGNED, coal.DistanceResult())
         return found
 

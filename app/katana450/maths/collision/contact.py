@@ -1,4 +1,4 @@
-"""Where two parts come nearest to each other."""
+"""The nearest points of two parts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ class Contact:
     """The nearest points of two parts.
 
     Attributes:
-        parts: their names.
-        distance: between them [m]; negative is how deep they are in each other.
-        points: (2, 3) the nearest point of each, in the base frame [m].
-        normal: (3,) unit direction from the first part to the second, in the base frame.
+        parts: the names of the parts.
+        distance: distance between them [m]; a negative value is their depth.
+        points: the nearest point of each, (2, 3) in the base frame [m].
+        normal: unit direction (3,) from the first part to the second, in the base frame.
     """
 
     parts: tuple[str, str]

@@ -1,4 +1,4 @@
-"""A few corners round many points: what a mesh counts as where contacts are looked for."""
+"""A convex body with few corners round many points, which stands for a mesh in collision checks."""
 
 from __future__ import annotations
 
@@ -12,30 +12,31 @@ from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 MAX_CORNERS = 64
-"""Corners: distances to so few are measured as quickly as to any link's."""
+"""Maximum number of corners: such a body is measured as quickly as any link."""
 
 MIN_THICKNESS_FRACTION = 0.005
-"""[1] Of its length: what is flatter counts as so thick, that it has an inside."""
+"""Minimum thickness [1] relative to the length; a flatter body is thickened to have an inside."""
 
 EXACT = 1e-6
-"""[1] Of its length: points that are out by less are in."""
+"""Tolerance [1] relative to the length: points that are outside by less count as inside."""
 
 SEARCHED_CORNERS = 200
-"""Corners of the true hull that are looked for; of more of them the planes are, that hold all."""
+"""Number of corners of the true hull at which the search ends; its planes still contain all points.
+"""
 
 BLOCK = 200_000
-"""Numbers worked on at once: what a processor's cache holds."""
+"""Number of values per block, which fit a processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
 class ConvexBody:
-    """A convex body that holds all points.
+    """A convex body that contains all points of a mesh.
 
     Attributes:
-        corners: (k, 3) [m], k <= MOST.
-        off: at most how far it reaches over the planes of the true convex hull [m].
-        thickened: whether the points had no volume to speak of.
-        volume: of the true hull [m^3].
+        corners: corners (k, 3) [m], k <= MAX_CORNERS.
+        off: maximum distance by which it exceeds the planes of the true convex hull [m].
+        thickened: True if the points had no volume.
+        volume: volume of the true hull [m^3].
     """
 
     corners: FloatArray
@@ -45,22 +46,25 @@ class ConvexBody:
 
 
 def convex_body(points: npt.ArrayLike) -> ConvexBody:
-    """Round ``points`` (n, 3) [m], some apart. Raises InputError for points all in one place.
+    """Return a convex body round ``points`` (n, 3) [m], which must not all be in one place.
 
-    The convex hull itself where that has few corners. Else what reaches over it less of two: a box
-    along the axes, from which planes of the hull cut off what stands out farthest, which suits what
-    has edges; and the hull of a few of the points, grown about a middle, which suits what is round.
+    The result is the convex hull itself if that has few corners. Otherwise it is one of two bodies,
+    the one that exceeds the hull less. The first is a box along the axes, from which planes of the
+    hull cut off what stands out farthest; it suits shapes with edges. The second is the hull of a
+    few of the points, scaled up about a middle; it suits round shapes.
+
+    Raises InputError for no points, and for points all in one place.
     """
     points = np.asarray(points, dtype=np.float64)
     points = finite_array(points, (len(points), 3), "The points of a mesh")
     if not len(points):
-        raise InputError("A mesh without points makes no body.")
+        raise InputError("The mesh has no points.")
     low, high = points.min(axis=0), points.max(axis=0)
     length = float((high - low).max())
     if length <= 0.0:
-        raise InputError("A mesh all in one place makes no body.")
+        raise InputError("The mesh has no size: all its points are in one place.")
     middle = 0.5 * (low + high)
-    # About the origin and of length 1, so that one tolerance does for all.
+    # Centred and scaled to length 1, so that one tolerance fits all.
     scaled, thickened = _with_volume((points - middle) / length)
     low, high = scaled.min(axis=0), scaled.max(axis=0)
     corners, planes, spanning = _hull(scaled)
@@ -77,7 +81,7 @@ def convex_body(points: npt.ArrayLike) -> ConvexBody:
 
 
 def _with_volume(points: FloatArray) -> tuple[FloatArray, bool]:
-    """The same, drawn apart across where they are flat."""
+    """Return the points, doubled across flat directions, and True if there were any."""
     centred = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(centred.T @ centred)
     flat = [axis for axis in axes.T if np.ptp(points @ axis) < MIN_THICKNESS_FRACTION]
@@ -92,11 +96,11 @@ def _with_volume(points: FloatArray) -> tuple[FloatArray, bool]:
 
 
 def _hull(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Corners (k, 3) of the hull, its planes (m, 4), and the points (l, 3) that span what they do.
+    """Return the hull's corners (k, 3), its planes (m, 4), and points (l, 3) with the same hull.
 
-    A plane is n (3,) and the h of n @ x <= h. The search begins with four corners and adds what is
-    farthest over each face (Barber et al., The Quickhull algorithm for convex hulls, 1996), of all
-    faces at once. Points inside what is found are not looked at again.
+    A plane is n (3,) and the h of n @ x <= h. The search begins with four corners and adds the
+    farthest point over each face (Barber et al., The Quickhull algorithm for convex hulls, 1996),
+    for all faces at once. Points inside the present hull are dropped.
     """
     corners = points[_simplex(points)]
     while True:
@@ -107,7 +111,7 @@ def _hull(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         if not out.any() or len(corners) > SEARCHED_CORNERS:
             break
         corners = np.unique(np.concatenate((corners, farthest[out])), axis=0)
-    # What is left out of a very round body is out by a hair; the planes hold it even so.
+    # Points left out of a very round body are outside by a tiny amount; the planes include them.
     planes = np.column_stack((normals, np.maximum(over, heights)))
     used = _used(corners)
     return corners[used], _distinct(planes), np.concatenate((corners, points))
@@ -116,10 +120,10 @@ def _hull(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _over(
     points: FloatArray, normals: FloatArray, heights: FloatArray
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
-    """Return the farthest point (m, 3) over each face, its height, and which points are outside.
+    """Return the farthest point (m, 3) over each face, its height, and a mask of points outside.
 
-    Points within EXACT of a face count as inside. One pass over the points, in blocks that stay
-    in the processor's cache.
+    Points within EXACT of a face count as inside. One pass over the points, in blocks that stay in
+    the processor's cache.
     """
     best = np.full(len(normals), -np.inf)
     farthest = np.zeros((len(normals), 3))
@@ -133,7 +137,7 @@ def _over(
         maximum = along[np.arange(len(normals)), number]
         better = maximum > best
         best[better], farthest[better] = maximum[better], block[number[better]]
-        # Only where a face has something over it any point of the block can be outside.
+        # Only where a face has a point above it can a point of the block be outside.
         rows = maximum > limit[:, 0]
         if rows.any():
             outside[at : at + step] = (along[rows] > limit[rows]).any(axis=0)
@@ -141,7 +145,10 @@ def _over(
 
 
 def _simplex(points: FloatArray) -> list[int]:
-    """Four that are in no plane: the first far from the middle, each next far from those before."""
+    """Return the indices of four points that span a volume.
+
+    The first is far from the middle, and each next one is far from those before.
+    """
     chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())]
     left = points - points[chosen[0]]
     for _ in range(3):
@@ -155,7 +162,7 @@ def _simplex(points: FloatArray) -> list[int]:
 def _farthest(
     points: FloatArray, directions: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Of each direction (m, 3) the point that is farthest along it, and how far."""
+    """Return the index and the height of the farthest point along each direction (m, 3)."""
     number = np.zeros(len(directions), dtype=np.int64)
     along = np.full(len(directions), -np.inf)
     rows = np.arange(len(directions))
@@ -170,7 +177,7 @@ def _farthest(
 
 
 def _faces(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Normals outwards (m, 3), heights (m,) and areas (m,) of the faces of the hull of a few."""
+    """Return outward normals (m, 3), heights (m,) and areas (m,) of the faces of a small hull."""
     a, b, c = engine().triangles(points).transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     sizes = np.linalg.norm(normals, axis=1)
@@ -184,7 +191,7 @@ def _faces(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _used(points: FloatArray) -> npt.NDArray[np.bool_]:
-    """Which are corners of their own hull, and not in a face or an edge of it."""
+    """Return True for corners of the hull, and False for points in a face or an edge of it."""
     normals, heights, _ = _faces(points)
     touching = np.abs(points @ normals.T - heights) <= EXACT
     used = np.zeros(len(points), dtype=bool)
@@ -194,13 +201,13 @@ def _used(points: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def _distinct(planes: FloatArray) -> FloatArray:
-    """Without those that are the same to rounding."""
+    """Return the planes without duplicates, to rounding."""
     _, first = np.unique(np.round(planes, 5) + 0.0, axis=0, return_index=True)
     return planes[np.sort(first)]
 
 
 def _volume(corners: FloatArray) -> float:
-    """Of their hull: pyramids from the origin onto its faces."""
+    """Return the volume of the hull of ``corners``: pyramids from the origin onto its faces."""
     _, heights, areas = _faces(corners)
     return float(heights @ areas) / 3.0
 
@@ -208,9 +215,9 @@ def _volume(corners: FloatArray) -> float:
 def _cut(
     planes: FloatArray, low: FloatArray, high: FloatArray, inside: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Corners (k, 3) round the body of ``planes``, and by how much they are over these.
+    """Return corners (k, 3) round the body of ``planes``, and by how much they exceed these.
 
-    low, high: (3,) its ends along the axes. inside: (3,) a point in it.
+    ``low``, ``high`` (3,) are its ends along the axes, ``inside`` (3,) is a point in it.
     """
     kept = np.concatenate((np.column_stack((np.eye(3), high)), np.column_stack((-np.eye(3), -low))))
     corners = _corners(kept, inside)
@@ -230,7 +237,10 @@ def _cut(
 def _grown(
     points: FloatArray, corners: FloatArray, planes: FloatArray, inside: FloatArray
 ) -> tuple[FloatArray, float]:
-    """As ``_cut``: MOST of the ``corners``, always the one that is farthest out, grown over all."""
+    """Return a body like ``_cut``, from MAX_CORNERS of the ``corners``, scaled up to contain all.
+
+    Each chosen corner is the one farthest outside the corners before.
+    """
     chosen = _simplex(corners)
     while len(chosen) < MAX_CORNERS:
         normals, heights, _ = _faces(corners[chosen])
@@ -247,8 +257,10 @@ def _grown(
 
 
 def _corners(planes: FloatArray, inside: FloatArray) -> FloatArray:
-    """Of what is under all ``planes``, by the hull of the dual points n / h (Preparata and Shamos,
-    Computational Geometry, 1985, ch. 7).
+    """Return the corners of the body under all ``planes``.
+
+    They follow from the hull of the dual points n / h (Preparata and Shamos, Computational
+    Geometry, 1985, ch. 7).
     """
     normals, heights = planes[:, :3], planes[:, 3] - planes[:, :3] @ inside
     dual, far, _ = _faces(normals / heights[:, None])

@@ -13,9 +13,9 @@ class Witness(NamedTuple):
     """The nearest points of two bodies.
 
     Attributes:
-        distance: between them [m]; negative is how deep they are in each other.
-        points: (2, 3) the nearest point of each [m].
-        normal: (3,) unit direction from the first body to the second.
+        distance: distance between them [m]; a negative value is their depth.
+        points: the nearest point of each, (2, 3) [m].
+        normal: unit direction (3,) from the first body to the second.
     """
 
     distance: float
@@ -26,8 +26,7 @@ class Witness(NamedTuple):
 class Engine(Protocol):
     """Convex geometries and the distances between them.
 
-    Geometries and transforms of one engine are opaque to everybody else, and are not understood by
-    another engine.
+    Geometries and transforms are opaque and valid only for the engine that made them.
     """
 
     def hull(self, corners: FloatArray) -> Any:
@@ -43,13 +42,13 @@ class Engine(Protocol):
         """Return a sphere about its middle [m]."""
 
     def half_space(self) -> Any:
-        """Return everything with z <= 0."""
+        """Return the half-space z <= 0."""
 
     def transform(self, T: FloatArray) -> Any:
-        """Return the pose ``T`` (4, 4) [m] in the form that the engine takes."""
+        """Return the pose ``T`` (4, 4) [m] in the form of the engine."""
 
     def distance(self, one: Any, T_one: Any, other: Any, T_other: Any) -> float:
-        """Return the distance between two geometries [m]; negative is their depth."""
+        """Return the distance between two geometries [m]; a negative value is their depth."""
 
     def witness(self, one: Any, T_one: Any, other: Any, T_other: Any) -> Witness:
         """Return the nearest points of two geometries."""

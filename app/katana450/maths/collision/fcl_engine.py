@@ -1,8 +1,8 @@
-"""Distances by FCL, each checked by a lower bound and repaired where FCL ends its search early.
+"""Distances by FCL; each is checked by a lower bound and recomputed where FCL ends early.
 
 FCL (python-fcl) has wheels for Windows, where coal has none. Some of its distances are wrong by
-millimetres, so none is believed: along the direction between the nearest points, the supports of
-both bodies bound the true distance from below.
+millimetres, so every distance is checked: along the direction between the nearest points, the
+supports of both bodies bound the true distance from below.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from katana450.maths.collision.nearest_points import Support, deepest, nearest_p
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 SCALE = 1e3
-"""[1/m] Lengths are given to FCL in millimetres: it ends its search at 1e-6 of its unit."""
+"""Lengths are passed to FCL in millimetres [1/m]: it ends its search at 1e-6 of its unit."""
 
 CERTAIN = 1e-7
-"""[m] How far a distance of FCL may be from its bound."""
+"""Maximum difference [m] between an accepted distance of FCL and its bound."""
 
 NEAR = 1e-6
-"""[m] Nearest points closer than this give no direction."""
+"""Nearest points closer than this [m] give no direction."""
 
 SIGNED = fcl.DistanceRequest(enable_nearest_points=True, enable_signed_distance=True)
 
@@ -35,12 +35,12 @@ AXES = np.concatenate((np.eye(3), -np.eye(3)))
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """A convex body as FCL has it, and its support mapping.
+    """A convex body of FCL, and its support mapping.
 
     Attributes:
-        shape: FCL's, in millimetres; None for the half-space, which FCL does not measure.
-        support: in the frame of the body [m].
-        normals: (m, 3) unit directions in which the body may be left.
+        shape: FCL's shape, in millimetres; None for the half-space, which FCL does not measure.
+        support: the support mapping in the frame of the body [m].
+        normals: unit directions (m, 3) along which the body may be left.
     """
 
     shape: Any
@@ -49,7 +49,7 @@ class Geometry:
 
 
 class ScaledPose(NamedTuple):
-    """Rotation (3, 3), translation (3,) [m], and both as FCL has them."""
+    """Rotation (3, 3), translation (3,) [m], and both as a transform of FCL."""
 
     R: FloatArray
     t: FloatArray
@@ -91,7 +91,7 @@ class FclEngine:
         return Geometry(fcl.Ellipsoid(*size), lambda n: radius * n / np.linalg.norm(n), AXES)
 
     def half_space(self) -> Geometry:
-        """Return everything with z <= 0."""
+        """Return the half-space z <= 0."""
         return Geometry(None, lambda _: np.zeros(3), AXES[2:3])
 
     def transform(self, T: FloatArray) -> ScaledPose:
@@ -102,7 +102,7 @@ class FclEngine:
     def distance(
         self, one: Geometry, T_one: ScaledPose, other: Geometry, T_other: ScaledPose
     ) -> float:
-        """Return the distance between two geometries [m]; negative is their depth."""
+        """Return the distance between two geometries [m]; a negative value is their depth."""
         return self.witness(one, T_one, other, T_other).distance
 
     def witness(
@@ -123,13 +123,13 @@ class FclEngine:
         try:
             distance = fcl.distance(*placed, SIGNED, result) / SCALE
         except RuntimeError:
-            # FCL raises this where its search for a depth meets a degenerate triangle.
+            # FCL raises this when its search for a depth meets a degenerate triangle.
             return _searched(first, second, _directions(one, T_one, other, T_other))
         points = np.array(result.nearest_points) / SCALE
-        way = points[1] - points[0]
-        length = float(np.linalg.norm(way))
+        gap = points[1] - points[0]
+        length = float(np.linalg.norm(gap))
         if length > NEAR and abs(length - abs(distance)) <= CERTAIN:
-            normal = way / np.copysign(length, distance)
+            normal = gap / np.copysign(length, distance)
             if abs(distance + overlap(first, second, normal)) <= CERTAIN:
                 return Witness(distance, frozen(points), frozen(normal))
         return _searched(first, second, _directions(one, T_one, other, T_other))
@@ -149,6 +149,7 @@ def _oriented(hull: ConvexHull) -> Any:
 
 
 def _placed(geometry: Geometry, pose: ScaledPose) -> Support:
+    """Return the support mapping of a geometry at a pose, in the base frame."""
     R, t, support = pose.R, pose.t, geometry.support
     return lambda n: R @ support(n @ R) + t
 
@@ -178,6 +179,6 @@ def _searched(one: Support, other: Support, directions: Iterator[FloatArray]) ->
     points = nearest_points(one, other, start)
     if points is None:
         return deepest(one, other, (start, *directions))
-    way = points[1] - points[0]
-    distance = float(np.linalg.norm(way))
-    return Witness(distance, frozen(points), frozen(way / distance))
+    gap = points[1] - points[0]
+    distance = float(np.linalg.norm(gap))
+    return Witness(distance, frozen(points), frozen(gap / distance))

@@ -1,4 +1,4 @@
-"""The moving pieces of an arm as a tree of turning and sliding joints, and where each is."""
+"""The moving groups of an arm as a tree of turning and sliding joints, and their poses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
 GROUND = 0
-"""Index of the piece that stands still: the root link and all that is fixed to it."""
+"""Index of the group that stands still: the root link and all that is fixed to it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,12 +19,12 @@ class RigidGroup:
     """Bodies that move as one piece about one joint.
 
     Attributes:
-        parent: index of the piece it hangs on, smaller than its own.
-        T_parent_mover: (4, 4) where it is while its joint is at zero [m].
-        axis: (3,) unit direction of the joint in its own frame, through its origin.
-        variable: index in x of what drives the joint.
+        parent: index of the parent group, smaller than its own.
+        T_parent_mover: pose (4, 4) while its joint is at zero [m].
+        axis: unit direction (3,) of the joint in its own frame, through its origin.
+        variable: index in x of the variable that drives the joint.
         factor, offset: the joint's value is factor * x[variable] + offset [rad or m].
-        slides: whether it moves along the axis instead of turning about it.
+        slides: True if the group moves along the axis instead of turning about it.
     """
 
     parent: int
@@ -37,12 +37,12 @@ class RigidGroup:
 
 
 class Linkage:
-    """Movers numbered from 1, parents first; x (k,) [rad, or m for what slides] drives them.
+    """Rigid groups numbered from 1, parents first, driven by x (k,) [rad; m for sliding joints].
 
     Attributes:
-        sliding: (s,) indices of the pieces that slide.
-        parent: (m,) of each piece; the ground is its own.
-        carries: (m, m) bool, whether the joint of the second moves the first.
+        sliding: indices (s,) of the groups that slide.
+        parent: parent (m,) of each group; the ground is its own.
+        carries: (m, m) bool, True where the joint of the second group moves the first.
     """
 
     def __init__(self, movers: Sequence[RigidGroup]) -> None:
@@ -58,8 +58,8 @@ class Linkage:
         self._chained = [
             (number, p) for number, p in enumerate(self.parent.tolist()) if p != GROUND
         ]
-        # T_parent_mover @ exp(hat(axis) angle) = A + sin angle * B + cos angle * C, and of what
-        # slides A + value * B.
+        # For turning joints T_parent_mover @ exp(hat(axis) angle) = A + sin angle * B + cos angle *
+        # C, for sliding joints A + value * B.
         A = np.array([np.eye(4), *(mover.T_parent_mover for mover in movers)])
         hats = np.zeros((m, 4, 4))
         for number, mover in enumerate(movers, 1):
@@ -74,7 +74,7 @@ class Linkage:
         self._terms = np.stack((A - C, B, C), axis=1).reshape(m, 3, 16)
 
     def poses(self, x: FloatArray) -> FloatArray:
-        """T_base_mover (m, 4, 4) of every piece at ``x`` (k,)."""
+        """Return the poses T_base_mover (m, 4, 4) of all groups at ``x`` (k,)."""
         angles = self.factor * x[self.variable] + self._offset
         fractions = np.ones((self.count, 1, 3))
         np.sin(angles, out=fractions[:, 0, 1])
@@ -87,6 +87,6 @@ class Linkage:
         return np.array(T)
 
     def variables_between(self, a: int, b: int) -> frozenset[int]:
-        """Which entries of x change where ``b`` is, seen from ``a``."""
+        """Return the indices of x that change the pose of group ``b`` relative to group ``a``."""
         joints = self.carries[a] ^ self.carries[b]
         return frozenset(int(variable) for variable in self.variable[joints])

@@ -16,29 +16,30 @@ from katana450.maths.collision.engine import Witness
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 Support = Callable[[FloatArray], FloatArray]
-"""From a direction (3,) of any length to the point (3,) farthest along it [m]."""
+"""A map from a direction (3,) of any length to the point (3,) farthest along it [m]."""
 
 EXACT = 1e-9
-"""[m] Distance from the lower bound at which a search ends."""
+"""Distance from the lower bound [m] at which a search ends."""
 
 STEPS = 300
-"""Steps of one search. A hull takes fewer than 20; round bodies take the most."""
+"""Maximum number of steps of a search. A hull takes fewer than 20; round bodies take the most."""
 
 TOUCHING = 1e-9
-"""[m] Bodies nearer than this count as touching."""
+"""Bodies nearer than this [m] count as touching."""
 
 ASIDE = 0.01
-"""[m] How far overlapping bodies are moved apart beyond their contact to find its normal."""
+"""Distance [m] by which overlapping bodies are moved apart beyond their contact to find its normal.
+"""
 
 TURNS = 30
-"""Directions that are tried for an overlap."""
+"""Number of directions that are tried for an overlap."""
 
 ROUNDING = 1e-13
-"""[1] Weights and lengths below this are zero."""
+"""Weights and lengths [1] below this are zero."""
 
 
 def overlap(one: Support, other: Support, direction: FloatArray) -> float:
-    """Return how far ``other`` must move along the unit ``direction`` to leave ``one`` [m].
+    """Return the motion [m] of ``other`` along the unit ``direction`` that leaves ``one``.
 
     A negative value is a lower bound of the distance between them.
     """
@@ -48,26 +49,26 @@ def overlap(one: Support, other: Support, direction: FloatArray) -> float:
 def nearest_points(one: Support, other: Support, towards: FloatArray) -> FloatArray | None:
     """Return the nearest points (2, 3) of two bodies [m]; None where they touch or overlap.
 
-    ``towards``: (3,) a direction from the first to the second, as a start.
+    ``towards`` (3,) is a direction from the first to the second, as a start.
     """
     ends = np.array([[one(towards), other(-towards)]])
     weights = np.ones(1)
     for _ in range(STEPS):
         points = np.einsum("i,ijk->jk", weights, ends)
-        way = points[1] - points[0]
-        length = float(np.linalg.norm(way))
+        gap = points[1] - points[0]
+        length = float(np.linalg.norm(gap))
         if length < TOUCHING:
             return None
-        new = np.array([one(way), other(-way)])
+        new = np.array([one(gap), other(-gap)])
         step = new[1] - new[0]
-        if length - way @ step / length <= EXACT or _known(ends, step):
+        if length - gap @ step / length <= EXACT or _known(ends, step):
             return np.asarray(points)
         ends, weights = _reduced(np.concatenate((ends, new[None])), np.append(weights, 0.0))
     return np.asarray(np.einsum("i,ijk->jk", weights, ends))
 
 
 def deepest(one: Support, other: Support, directions: Iterable[FloatArray]) -> Witness:
-    """Return the shortest way out of an overlap, starting with the best unit ``directions``.
+    """Return the shortest motion out of an overlap, starting with the best unit ``directions``.
 
     The second body is moved out along the direction found so far. The nearest points there give a
     direction that is at least as short.
@@ -79,8 +80,8 @@ def deepest(one: Support, other: Support, directions: Iterable[FloatArray]) -> W
         points = nearest_points(one, lambda n, by=aside: other(n) + by, normal)  # type: ignore[misc]
         if points is None:
             break
-        way = points[1] - points[0]
-        better = way / np.linalg.norm(way)
+        gap = points[1] - points[0]
+        better = gap / np.linalg.norm(gap)
         shorter = overlap(one, other, better)
         if shorter > depth - EXACT:
             break
@@ -94,18 +95,19 @@ def deepest(one: Support, other: Support, directions: Iterable[FloatArray]) -> W
 
 
 def _known(ends: FloatArray, step: FloatArray) -> bool:
+    """Return True if ``step`` is already among the differences of ``ends``."""
     differences = ends[:, 1] - ends[:, 0] - step
     return bool((np.abs(differences).max(axis=1) < ROUNDING).any())
 
 
 def _reduced(ends: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the ends and weights of the point of least norm, without ends of no weight."""
+    """Return the ends and weights of the point of least norm, without ends of zero weight."""
     while True:
         best = _affine_minimum(ends[:, 1] - ends[:, 0])
         negative = best < ROUNDING
         if not negative.any():
             return ends, best
-        # As far as the first weight that becomes zero.
+        # Move up to the first weight that becomes zero.
         ratio = weights[negative] / np.maximum(weights[negative] - best[negative], ROUNDING)
         weights = weights + min(float(ratio.min()), 1.0) * (best - weights)
         kept = weights > ROUNDING

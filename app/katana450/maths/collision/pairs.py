@@ -1,4 +1,4 @@
-"""Which parts of an arm may meet, found out instead of listed."""
+"""The pairs of parts of an arm that may meet, found by sampling postures."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
 
 SAMPLES = 1000
-"""Postures tried."""
+"""Number of sampled postures."""
 
 DESIGN_OVERLAP_SAMPLES = 50
-"""Parts that are in each other in this many postures, the first ones, are so by their design."""
+"""Parts that overlap in this many of the first postures overlap by design."""
 
 MEETING_DISTANCE = 0.01
-"""[m] Parts that never come nearer cannot meet: twice what the arm keeps, for between the samples
-they may be somewhat nearer."""
+"""Parts that never come nearer than this [m] cannot meet. It is twice the distance that the arm
+keeps, because between the samples the parts may be somewhat nearer.
+"""
 
 SEED = 450
 
 OVERDRAW_FRACTION = 0.5
-"""Fraction of a range that postures are drawn beyond each of its ends and brought back: parts often
-come nearest where joints are at their limits, and so each joint is at one in half the postures."""
+"""Fraction of a range by which postures are drawn beyond each of its ends and clipped. Parts often
+come nearest where joints are at their limits, so each joint is at a limit in half the postures.
+"""
 
 
 def pairs_that_meet(
     linkage: Linkage, parts: Sequence[Part], lower: FloatArray, upper: FloatArray
 ) -> list[tuple[int, int]]:
-    """Indices of the parts that may meet between the limits ``lower`` and ``upper`` (k,) [rad].
+    """Return indices of the parts that may meet between ``lower`` and ``upper`` (k,) [rad].
 
-    Left out are neighbours, whose one joint keeps them apart by its limits (as it does two fingers
-    driven together), parts that no posture tried brings near each other, and parts that are in each
-    other in every posture.
+    Three kinds of pairs are excluded: neighbours, whose one joint keeps them apart by its limits
+    (as it does two fingers that are driven together); parts that no sampled posture brings near
+    each other; and parts that overlap in every posture.
     """
     candidates = [
         (a, b)

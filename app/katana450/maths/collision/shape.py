@@ -1,4 +1,4 @@
-"""Convex shapes, and how near two of them are."""
+"""Convex shapes for collision checks."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from katana450.maths.collision.engine import engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 HALF_SPACE_RADIUS = 1e6
-"""[m] Radius of the ball that stands for a half-space where balls are compared: within a metre of
-its pole it is off by less than a micrometre."""
+"""Radius [m] of the ball that stands for a half-space when balls are compared. Within a metre of
+its pole the error is less than a micrometre.
+"""
 
 FLAT = 1e-6
-"""[m] Points that deviate less than this from a plane have no volume."""
+"""Points that deviate less than this [m] from a plane have no volume."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +26,10 @@ class CollisionShape:
     """A convex body in a frame of its own.
 
     Attributes:
-        geometry: as the engine has it.
-        centre, radius: of a ball that holds it, (3,) and scalar [m].
-        low, high: corners (3,) of a box along the axes that holds it [m].
-        mark: what it is made of; that of another shape is another.
+        geometry: the geometry of the engine.
+        centre, radius: a ball (3,), scalar [m] that contains the body.
+        low, high: corners (3,) of a box along the axes that contains the body [m].
+        mark: bytes that identify the shape; other shapes have other marks.
     """
 
     geometry: Any
@@ -40,13 +41,13 @@ class CollisionShape:
 
 
 def hull(points: npt.ArrayLike) -> CollisionShape:
-    """The convex hull of ``points`` (n, 3) [m]; InputError when they lie in one plane."""
+    """Return the convex hull of ``points`` (n, 3) [m]; raise InputError if they lie in a plane."""
     points = np.asarray(points, dtype=np.float64)
     corners = np.unique(finite_array(points, (len(points), 3), "The points of a hull"), axis=0)
-    # The engine ends the whole program when it is given points without a volume.
+    # The engine ends the process when it is given points without a volume.
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
     if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
-        raise InputError(f"{len(corners)} points in one plane make no body.")
+        raise InputError(f"The hull has no volume: its {len(corners)} points lie in one plane.")
     low, high = corners.min(axis=0), corners.max(axis=0)
     geometry = engine().hull(corners)
     centre = 0.5 * (low + high)
@@ -57,7 +58,7 @@ def hull(points: npt.ArrayLike) -> CollisionShape:
 
 
 def box(size: npt.ArrayLike) -> CollisionShape:
-    """A box of ``size`` (3,) [m] about its middle."""
+    """Return a box of ``size`` (3,) [m] about its middle."""
     size = _lengths(size, 3, "The size of a box")
     half = frozen(0.5 * size)
     return CollisionShape(
@@ -71,7 +72,7 @@ def box(size: npt.ArrayLike) -> CollisionShape:
 
 
 def cylinder(radius: float, length: float) -> CollisionShape:
-    """An upright cylinder about its middle [m]."""
+    """Return an upright cylinder about its middle; lengths in m."""
     _lengths((radius, length), 2, "Radius and length of a cylinder")
     half = frozen((radius, radius, 0.5 * length))
     return CollisionShape(
@@ -85,7 +86,7 @@ def cylinder(radius: float, length: float) -> CollisionShape:
 
 
 def sphere(radius: float) -> CollisionShape:
-    """A ball about its middle [m]."""
+    """Return a ball about its middle; radius in m."""
     _lengths((radius,), 1, "The radius of a sphere")
     half = frozen((radius, radius, radius))
     return CollisionShape(
@@ -99,7 +100,7 @@ def sphere(radius: float) -> CollisionShape:
 
 
 def half_space() -> CollisionShape:
-    """Everything with z <= 0."""
+    """Return the half-space z <= 0."""
     far = np.full(3, HALF_SPACE_RADIUS)
     return CollisionShape(
         engine().half_space(),

@@ -1,4 +1,4 @@
-"""The bodies of an arm and of what stands around it, and the pairs that may meet."""
+"""The bodies of an arm and of its environment, and the pairs of them that may meet."""
 
 from __future__ import annotations
 
@@ -20,25 +20,26 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 IndexArray = npt.NDArray[np.int64]
 
 DIRECT_PAIRS = 8
-"""Pairs that are measured as quickly as the boxes round their bodies are compared."""
+"""Number of pairs that are measured as quickly as the boxes round their bodies are compared."""
 
 PATH_LENGTH_FACTOR = 1.2
-"""[1] How much longer than its tangent the way of a point may be: joints that turn by t_i at the
-distances r_i move it by d <= sum t_i (r_i + d), so this holds up to sum t_i = 1 - 1 / LONG_WAY."""
+"""Maximum ratio [1] of the path length of a point to its tangent. Joints that turn by t_i at the
+distances r_i move a point by d <= sum t_i (r_i + d), so this holds up to sum t_i = MAX_PATH_LENGTH.
+"""
 
 MAX_PATH_LENGTH = 1.0 - 1.0 / PATH_LENGTH_FACTOR
-"""[rad] Up to which sum of turns `CollisionWorld.travel` is a bound."""
+"""Sum of turns [rad] up to which `CollisionWorld.travel` is a bound: 1 - 1 / PATH_LENGTH_FACTOR."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One named link, or one thing that stands around the arm.
+    """One named link, or one object of the environment.
 
     Attributes:
-        name: of the link or object.
-        mover: index of the piece it moves with; GROUND stands still.
-        T_mover_shape: where each of its shapes is, (4, 4) in the frame of the piece [m].
-        shapes: convex; together they are the part.
+        name: the name of the link or object.
+        mover: index of the rigid group it moves with; GROUND stands still.
+        T_mover_shape: pose (4, 4) of each of its shapes in the frame of the group [m].
+        shapes: convex shapes; together they are the part.
     """
 
     name: str
@@ -48,36 +49,36 @@ class Part:
 
 
 def obstacle(name: str, T_base_shape: FloatArray, *shapes: CollisionShape) -> Part:
-    """An object that stands still, all its ``shapes`` in one frame."""
+    """Return an object that stands still, with all its ``shapes`` in one frame."""
     return Part(name, GROUND, tuple(frozen(T_base_shape) for _ in shapes), shapes)
 
 
 @dataclass(frozen=True, eq=False)
 class Fingerprint:
-    """The bodies and pairs of a world, as a digest, and where each is, (b, 4, 4)."""
+    """A digest of the bodies and pairs of a world, and the poses (b, 4, 4) of the bodies."""
 
     bodies: bytes
     places: FloatArray
 
     def differs_by(self, other: Fingerprint) -> float:
-        """By how much any body is elsewhere [m or 1]; infinitely when they are other bodies."""
+        """Return the largest difference in place of a body [m or 1]; infinite for other bodies."""
         if self.bodies != other.bodies:
             return np.inf
         return float(np.abs(self.places - other.places).max(initial=0.0))
 
 
 class CollisionWorld:
-    """Convex bodies on the pieces of a linkage, and the pairs of them that may meet.
+    """Convex bodies on the rigid groups of a linkage, and the pairs of them that may meet.
 
     Attributes:
-        parts: of the arm, then the obstacles.
-        first, second: (p,) indices of the bodies of each pair; the second is of a later part.
+        parts: the parts of the arm, then the obstacles.
+        first, second: indices (p,) of the bodies of each pair; the second belongs to a later part.
     """
 
     def __init__(
         self, linkage: Linkage, parts: Sequence[Part], pairs: Sequence[tuple[int, int]]
     ) -> None:
-        """``pairs``: indices of the parts that may meet, the smaller first."""
+        """Build the world; ``pairs`` are indices of parts that may meet, the smaller one first."""
         self.linkage = linkage
         self.engine = engine()
         self.parts = tuple(parts)
@@ -103,12 +104,12 @@ class CollisionWorld:
         R = self.T_mover_body[:, :3, :3]
         at = self.T_mover_body[:, :3, 3]
         centres = np.array([shape.centre for shape in shapes]).reshape(-1, 3, 1)
-        # Centres in the base frame are this (b, 4 m) times the columns of all poses, (4 m, 3).
+        # The centres in the base frame are this (b, 4 m) times the columns of all poses, (4 m, 3).
         spread = np.zeros((count, linkage.count, 4))
         spread[range(count), self.mover_of, :3] = (R @ centres)[:, :, 0] + at
         spread[range(count), self.mover_of, 3] = 1.0
         self.spread = spread.reshape(count, -1)
-        # A box along the axes of the piece round the box along those of the body.
+        # A box along the axes of the group round the box along those of the body.
         middle = np.array([0.5 * (shape.low + shape.high) for shape in shapes]).reshape(-1, 3, 1)
         half = np.array([0.5 * (shape.high - shape.low) for shape in shapes]).reshape(-1, 3, 1)
         self.box_middle = (R @ middle)[:, :, 0] + at
@@ -118,14 +119,15 @@ class CollisionWorld:
         for a, b in self.pairs:
             met[a, b] = True
         self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
-        # What the engine needs for each pair: both geometries, each with the number of its frame.
+        # The arguments of the engine for each pair: both geometries, each with the number of its
+        # frame.
         self.measured = [
             (shapes[a].geometry, frame_of[a], shapes[b].geometry, frame_of[b])
             for a, b in zip(self.first.tolist(), self.second.tolist(), strict=True)
         ]
         self.apart = self.spread[self.second] - self.spread[self.first]
         self.radii = self.radius[self.first] + self.radius[self.second]
-        # Flat indices into (b, m) of a body seen from a piece.
+        # Flat indices into (b, m) of a body relative to a group.
         directions = np.zeros((linkage.count, linkage.count, 4))
         directions[range(linkage.count), range(linkage.count), :3] = linkage.axis
         self.axes = directions.reshape(linkage.count, -1)
@@ -135,25 +137,25 @@ class CollisionWorld:
         self._first_seen = self.first * linkage.count + self.mover_of[self.second]
 
     def at(self, x: FloatArray) -> PlacedWorld:
-        """All bodies where ``x`` (k,) [rad] puts them."""
+        """Return the world with all bodies placed at ``x`` (k,) [rad or m]."""
         return PlacedWorld(self, self.linkage.poses(x))
 
     def travel(self, placed: PlacedWorld, x: FloatArray, towards: FloatArray) -> FloatArray:
-        """At most how far the bodies of each pair move against each other, (p,) [m].
+        """Return a bound on the relative motion (p,) [m] of the bodies of each pair.
 
-        ``placed`` is at ``x`` (k,) [rad or m]; on the way to ``towards`` (k,) the joints turn by no
-        more than LONGEST_WAY together.
+        ``placed`` is the world at ``x`` (k,) [rad or m]. On the path to ``towards`` (k,) the joints
+        together turn by at most MAX_PATH_LENGTH.
         """
         joints = self.linkage
         turns = np.abs(joints.factor * (towards - x)[joints.variable])
-        # (b, m): how far a body is moved by the joints that do not move another piece with it.
+        # (b, m): motion of a body by the joints that do not also move the other group.
         moved = ((placed.reach() * turns * self._carries) @ self._stays).ravel()
         return np.asarray(PATH_LENGTH_FACTOR * (moved[self._second_seen] + moved[self._first_seen]))
 
     def nearest(self, x: FloatArray) -> Contact | None:
-        """The pair of bodies that are nearest to each other at ``x`` (k,) [rad].
+        """Return the contact of the nearest pair of bodies at ``x`` (k,) [rad or m].
 
-        None when no two parts can meet at all.
+        None means that no two parts can meet.
         """
         if not self.measured:
             return None
@@ -171,7 +173,10 @@ class CollisionWorld:
         return placed.contact(found)
 
     def gap(self, x: FloatArray, one: str, other: str) -> float:
-        """How far two parts that may meet are apart at ``x`` (k,) [rad]; else infinitely [m]."""
+        """Return the distance [m] of two parts that may meet, at ``x`` (k,).
+
+        The distance of other parts is infinite.
+        """
         names = [self.parts[number].name for number in self.part_of.tolist()]
         placed, wanted = self.at(x), {one, other}
         pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
@@ -184,18 +189,19 @@ class CollisionWorld:
 
     @cached_property
     def fingerprint(self) -> Fingerprint:
-        """By which another world, of another process too, is known to be the same."""
-        told = hashlib.sha256(repr(self.pairs).encode())
+        """The fingerprint by which an equal world is recognized, also in another process."""
+        hasher = hashlib.sha256(repr(self.pairs).encode())
         for part in self.parts:
-            told.update(f"{part.name} {part.mover}".encode())
+            hasher.update(f"{part.name} {part.mover}".encode())
             for shape in part.shapes:
-                told.update(shape.mark)
-        return Fingerprint(told.digest(), frozen(self.T_mover_body))
+                hasher.update(shape.mark)
+        return Fingerprint(hasher.digest(), frozen(self.T_mover_body))
 
     def with_carried(self, carried: Part) -> CollisionWorld:
-        """This world and what the arm carries, which meets what more than one joint lets meet it.
+        """Return this world with the ``carried`` part of the arm.
 
-        What it is held by turns with it, and the next link turns under it.
+        It may meet every part from which more than one joint separates it. The part that holds it
+        turns with it, and the next link turns under it.
         """
         count = len(self.parts)
         met = [
@@ -206,7 +212,7 @@ class CollisionWorld:
         return CollisionWorld(self.linkage, (*self.parts, carried), (*self.pairs, *met))
 
     def with_obstacles(self, obstacles: Sequence[Part]) -> CollisionWorld:
-        """This world and ``obstacles``, which every part that moves may meet."""
+        """Return this world with ``obstacles``, which every part that moves may meet."""
         count = len(self.parts)
         moving = [number for number, part in enumerate(self.parts) if part.mover != GROUND]
         met = [(number, count + k) for number in moving for k in range(len(obstacles))]
@@ -228,19 +234,19 @@ class PlacedWorld:
 
     @cached_property
     def _centre(self) -> FloatArray:
-        """Of the ball round each body, (b, 3) in the base frame [m]."""
+        """The centre of the ball round each body, (b, 3) in the base frame [m]."""
         return np.asarray(self._world.spread @ self._columns)
 
     @cached_property
     def _apart(self) -> FloatArray:
-        """How far apart the balls round the bodies of each pair are, (p,) [m]."""
+        """The distance between the balls round the bodies of each pair, (p,) [m]."""
         apart = self._world.apart @ self._columns
         return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)) - self._world.radii)
 
     def reach(self) -> FloatArray:
-        """The farthest that each body is from each joint's axis, (b, m) [m].
+        """Return the farthest distance of each body from each joint's axis, (b, m) [m].
 
-        Of joints that slide it is 1: how far they move a body for each metre of their own.
+        For joints that slide it is 1: the motion of a body for each metre of the joint.
         """
         axes = self._world.axes @ self._columns
         origins = self._columns[3::4]
@@ -255,42 +261,42 @@ class PlacedWorld:
         return reach
 
     def likely_nearest(self) -> int:
-        """The pair whose balls are nearest to each other, or farthest in each other."""
+        """Return the pair whose balls are nearest to each other, or deepest in each other."""
         return int(self._apart.argmin())
 
     def nearer_than(self, limit: FloatArray | float) -> tuple[IndexArray, FloatArray]:
-        """The pairs that may be nearer than ``limit``, (p,) or scalar [m].
+        """Return the pairs that may be nearer than ``limit``, (p,) or scalar [m].
 
         Returns:
-            their indices (k,), and (k,) at least how far apart the bodies of each are [m].
+            The indices (k,) of the pairs, and a lower bound (k,) of each distance [m].
         """
         world = self._world
         pairs = np.nonzero(self._apart < limit)[0]
         if len(pairs) <= DIRECT_PAIRS:
             return pairs, self._apart[pairs]
-        # The ball of each against the box of the other, one way and the other.
+        # The ball of each body against the box of the other, in both directions.
         a, b = world.first[pairs], world.second[pairs]
         boxes, balls = np.concatenate((a, b)), np.concatenate((b, a))
         T = self._T[world.mover_of[boxes]]
         seen = np.einsum("ij,ijk->ik", self._centre[balls] - T[:, :3, 3], T[:, :3, :3])
         outside = np.maximum(np.abs(seen - world.box_middle[boxes]) - world.box_half[boxes], 0.0)
         away = np.sqrt(np.einsum("ij,ij->i", outside, outside))
-        # A centre inside the box tells nothing of how deep the ball is in it.
+        # For a centre inside the box the depth of the ball is unknown.
         away = np.where(away > 0.0, away - world.radius[balls], -np.inf)
         bounds = np.maximum(self._apart[pairs], away.reshape(2, -1).max(axis=0))
         near = bounds < (limit[pairs] if isinstance(limit, np.ndarray) else limit)
         return pairs[near], bounds[near]
 
     def distances(self, pairs: IndexArray) -> FloatArray:
-        """Between the bodies of each of ``pairs`` (k,), as ``distance``, (k,) [m]."""
+        """Return the distances (k,) [m] of ``pairs`` (k,), as ``distance``."""
         return np.array([self.distance(pair) for pair in pairs.tolist()])
 
     def distance(self, pair: int) -> float:
-        """Between the bodies of a pair [m]; negative is how deep they are in each other."""
+        """Return the distance between the bodies of a pair [m]; a negative value is their depth."""
         return self._world.engine.distance(*self._placed(pair))
 
     def contact(self, pair: int) -> Contact:
-        """Where the bodies of a pair are nearest."""
+        """Return the nearest points of the bodies of a pair."""
         world, found = self._world, self._world.engine.witness(*self._placed(pair))
         bodies = world.first[pair], world.second[pair]
         one, other = (world.parts[world.part_of[body]].name for body in bodies)

@@ -1,4 +1,4 @@
-"""Checked conversion of what callers hand in to float arrays."""
+"""Checked conversion of input values to float arrays."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ IntArray = npt.NDArray[np.int64]
 
 
 def real_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
-    """A float64 copy of `value`, NaN and infinity included.
+    """Return a float64 copy of `value`; NaN and infinity are allowed.
 
-    `name` says in the error what the value is. Raises InputError when it is not made of real
-    numbers or has another shape.
+    `name` names the value in error messages. Raises InputError when the value does not consist of
+    real numbers or has another shape.
     """
     try:
         array = np.asarray(value)
@@ -31,7 +31,10 @@ def real_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Float
 
 
 def finite_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
-    """A float64 copy of `value`; InputError as `real_array`, and for a NaN or an infinity."""
+    """Return a float64 copy of `value`, made of finite numbers.
+
+    Raises InputError as `real_array`, and for NaN or infinity.
+    """
     result = real_array(value, shape, name)
     if not np.isfinite(result).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
@@ -40,7 +43,7 @@ def finite_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
 
 
 def frozen(values: npt.ArrayLike) -> FloatArray:
-    """A float64 copy of `values` that cannot be written to."""
+    """Return a read-only float64 copy of `values`."""
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array

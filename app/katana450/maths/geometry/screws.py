@@ -17,9 +17,10 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 
 def revolute(direction: npt.ArrayLike, point: npt.ArrayLike) -> FloatArray:
-    """Screw axis of a turning joint along `direction` (3,) (any length) through `point` (3,) [m].
+    """Return the screw axis of a turning joint along `direction` through `point`.
 
-    v = -omega x r. Raises InputError when the direction is zero or anything is not finite.
+    `direction` (3,) has any length; `point` (3,) is in m. The linear part is v = -omega x r. Raises
+    InputError when the direction is zero or a number is not finite.
     """
     omega = finite_array(direction, (3,), "The direction of the axis")
     r = finite_array(point, (3,), "The point on the axis")
@@ -31,15 +32,15 @@ def revolute(direction: npt.ArrayLike, point: npt.ArrayLike) -> FloatArray:
 
 
 def point_on(S: FloatArray) -> FloatArray:
-    """The point (3,) [m] of the axis nearest to the origin: omega x v."""
+    """Return the point (3,) [m] of the axis nearest to the origin: omega x v."""
     return np.cross(S[:3], S[3:])
 
 
 def pitch(S: FloatArray) -> float:
-    """Travel along the axis per radian [m]; 0 for a pure rotation."""
+    """Return the travel along the axis per radian [m]; 0 for a pure rotation."""
     return float(S[:3] @ S[3:])
 
 
 def moved(T: FloatArray, S: FloatArray) -> FloatArray:
-    """The axis `S` (6,) or axes (6, n) given in {b}, seen from {a}, by T_a_b."""
+    """Return the axis `S` (6,) or axes (6, n), given in {b}, in {a}, by the pose T_a_b."""
     return se3.adjoint(T) @ S

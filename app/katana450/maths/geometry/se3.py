@@ -19,9 +19,9 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 Rows = list[list[float]]
-"""A matrix as nested lists of floats, which beat arrays for one pose at a time."""
+"""A matrix as nested lists of floats, which are faster than arrays for one pose at a time."""
 
-# Looked up once, because this stands before every inverse kinematics.
+# Looked up once: every call of the inverse kinematics uses these.
 _ARRAY: Final = np.ndarray
 _FLOAT: Final = np.dtype(np.float64)
 _LAST_ROW: Final = [0.0, 0.0, 0.0, 1.0]
@@ -30,7 +30,7 @@ _FARTHEST: Final = tolerances.FARTHEST
 
 
 def hat(V: npt.ArrayLike) -> FloatArray:
-    """The (4, 4) matrix of the twist V = (omega, v) (6,)."""
+    """Return the (4, 4) matrix of the twist V = (omega, v) (6,)."""
     V = np.asarray(V, dtype=np.float64)
     X = np.zeros((4, 4))
     X[:3, :3] = so3.hat(V[:3])
@@ -39,12 +39,12 @@ def hat(V: npt.ArrayLike) -> FloatArray:
 
 
 def vee(X: FloatArray) -> FloatArray:
-    """Inverse of `hat`: the twist (omega, v) (6,) of a (4, 4) matrix."""
+    """Return the twist (omega, v) (6,) of a (4, 4) matrix: the inverse of `hat`."""
     return np.concatenate((so3.vee(X[:3, :3]), X[:3, 3]))
 
 
 def from_rotation_translation(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
-    """The pose with rotation `R` (3, 3) and position `p` (3,) [m]."""
+    """Return the pose with rotation `R` (3, 3) and position `p` (3,) [m]."""
     T = np.eye(4)
     T[:3, :3] = R
     T[:3, 3] = p
@@ -52,13 +52,13 @@ def from_rotation_translation(R: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
 
 
 def inverse(T: FloatArray) -> FloatArray:
-    """T_b_a of T_a_b."""
+    """Return the pose T_b_a for the pose T_a_b."""
     Rt = T[:3, :3].T
     return from_rotation_translation(Rt, -Rt @ T[:3, 3])
 
 
 def adjoint(T: FloatArray) -> FloatArray:
-    """The (6, 6) matrix that maps twists in {b} to twists in {a}, of T_a_b."""
+    """Return the (6, 6) matrix that maps twists in {b} to twists in {a}, for the pose T_a_b."""
     A = np.zeros((6, 6))
     A[:3, :3] = A[3:, 3:] = T[:3, :3]
     A[3:, :3] = so3.hat(T[:3, 3]) @ T[:3, :3]
@@ -66,10 +66,10 @@ def adjoint(T: FloatArray) -> FloatArray:
 
 
 def exp(V: npt.ArrayLike) -> FloatArray:
-    """The motion along the twist V = (omega, v) (6,) for unit time; with a screw axis S, exp(S q).
+    """Return the motion along the twist V = (omega, v) (6,) for unit time.
 
-    The coefficient of hat(omega)^2 loses digits near 0 only as fast as hat(omega)^2 itself
-    vanishes, so no series is needed.
+    For a screw axis S, exp(S q) is the motion by the angle q. The coefficient of hat(omega)^2 loses
+    digits near 0 only as fast as hat(omega)^2 itself vanishes, so no series is needed.
     """
     V = np.asarray(V, dtype=np.float64)
     w, v = V[:3], V[3:]
@@ -84,7 +84,7 @@ def exp(V: npt.ArrayLike) -> FloatArray:
 
 
 def log(T: FloatArray) -> FloatArray:
-    """The twist (omega, v) (6,) with exp(V) == T and |omega| <= pi."""
+    """Return the twist (omega, v) (6,) with exp(V) == T and |omega| <= pi."""
     w = so3.log(T[:3, :3])
     p = T[:3, 3]
     theta = math.hypot(*w)
@@ -108,7 +108,7 @@ def validated(
 
 
 def printed(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
-    """Return the pose that `T` (4, 4) means when it was printed with four decimals or more.
+    """Return the pose that was printed as `T` (4, 4) with four decimals or more.
 
     Its rotation is the one nearest to the printed numbers. Raises InputError as `validated`.
     """
@@ -118,7 +118,7 @@ def printed(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
 def validated_rows(
     T: npt.ArrayLike, name: str = "The pose", tolerance: float = tolerances.ROTATION_INPUT
 ) -> Rows:
-    """Return what `validated` does, as nested lists of floats."""
+    """Return the result of `validated` as nested lists of floats."""
     if type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4):
         rows: Rows = T.tolist()
         if _is_clean(rows):
@@ -132,7 +132,7 @@ def validated_rows(
             f"{name} is {np.abs(M[:3, 3]).max():.2g} m away; give positions up to "
             f"{tolerances.FARTHEST:.0e} m."
         )
-    # A name of one letter is a symbol.
+    # A name of one letter is a symbol and keeps its case.
     label = name if len(name) == 1 else name[:1].lower() + name[1:]
     R = so3.validated(M[:3, :3], f"The rotation of {label}", tolerance)
     clean: Rows = from_rotation_translation(R, M[:3, 3]).tolist()
@@ -140,16 +140,16 @@ def validated_rows(
 
 
 def _is_clean(rows: Rows) -> bool:
-    """Whether the rows are those of a pose as well as double precision can write it.
+    """Return True if the rows are a pose to within double precision.
 
-    On plain floats, because this stands before every inverse kinematics. NaN fails every test.
+    Uses plain floats, because every call of the inverse kinematics runs it. NaN fails every test.
     """
     (a, b, c, x), (d, e, f, y), (g, h, i, z), last = rows
     misfits = math.hypot(
         a * a + d * d + g * g - 1.0,
         b * b + e * e + h * h - 1.0,
         a * b + d * e + g * h,
-        # The third axis is right-handed: unit length and squareness follow.
+        # The third axis is right-handed: its unit length and orthogonality follow.
         d * h - g * e - c,
         g * b - a * h - f,
         a * e - d * b - i,

@@ -17,23 +17,26 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 
 def hat(w: npt.ArrayLike) -> FloatArray:
-    """The (3, 3) skew matrix of `w` (3,): hat(w) @ p == cross(w, p)."""
+    """Return the (3, 3) skew matrix W of `w` (3,): W @ p == cross(w, p)."""
     x, y, z = (float(c) for c in np.asarray(w))
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def vee(W: FloatArray) -> FloatArray:
-    """Inverse of `hat`; of a matrix that is not skew, the vector of its skew part."""
+    """Return the vector (3,) of the skew part of `W` (3, 3): the inverse of `hat`."""
     return 0.5 * np.array([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]])
 
 
 def sinc(x: float) -> float:
-    """sin(x) / x, and its limit 1 at 0."""
+    """Return sin(x) / x, and its limit 1 at 0."""
     return math.sin(x) / x if x else 1.0
 
 
 def exp(w: npt.ArrayLike) -> FloatArray:
-    """Rotation by |w| [rad] about w (3,): Rodrigues' formula, exact to rounding also near 0."""
+    """Return the rotation by |w| [rad] about w (3,), exact to rounding also near 0.
+
+    Uses Rodrigues' formula.
+    """
     x, y, z = (float(c) for c in np.asarray(w))
     theta = math.hypot(x, y, z)
     a = sinc(theta)
@@ -51,7 +54,7 @@ def exp(w: npt.ArrayLike) -> FloatArray:
 
 
 def log(R: FloatArray) -> FloatArray:
-    """The rotation vector w (3,) with exp(w) == R and |w| <= pi.
+    """Return the rotation vector w (3,) with exp(w) == R and |w| <= pi.
 
     Computed through the unit quaternion, whose parts stay accurate near 0 and near pi. At exactly
     pi the axis and its opposite are both right; one is returned.
@@ -63,39 +66,39 @@ def log(R: FloatArray) -> FloatArray:
 
 
 def angle(Ra: FloatArray, Rb: FloatArray) -> float:
-    """Angle [rad] in [0, pi] of the rotation between `Ra` and `Rb`, accurate at both ends."""
+    """Return the angle [rad] in [0, pi] between `Ra` and `Rb`, accurate at both ends."""
     R = Ra.T @ Rb
     sine = float(np.linalg.norm(vee(R)))
     return math.atan2(sine, 0.5 * (float(R[0, 0] + R[1, 1] + R[2, 2]) - 1.0))
 
 
 def rotation_x(theta: float) -> FloatArray:
-    """Rotation by `theta` [rad] about x."""
+    """Return the rotation by `theta` [rad] about x."""
     c, s = math.cos(theta), math.sin(theta)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def rotation_y(theta: float) -> FloatArray:
-    """Rotation by `theta` [rad] about y."""
+    """Return the rotation by `theta` [rad] about y."""
     c, s = math.cos(theta), math.sin(theta)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def rotation_z(theta: float) -> FloatArray:
-    """Rotation by `theta` [rad] about z."""
+    """Return the rotation by `theta` [rad] about z."""
     c, s = math.cos(theta), math.sin(theta)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> FloatArray:
-    """Rz(yaw) Ry(pitch) Rx(roll), angles in rad: URDF's fixed-axis roll, pitch, yaw."""
+    """Return Rz(yaw) Ry(pitch) Rx(roll), angles in rad: URDF's fixed-axis roll, pitch, yaw."""
     return rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
 
 
 def to_rpy(R: FloatArray) -> tuple[float, float, float]:
-    """(roll, pitch, yaw) [rad] of `R`, pitch in [-pi/2, pi/2].
+    """Return (roll, pitch, yaw) [rad] of `R`, with pitch in [-pi/2, pi/2].
 
-    With x pointing straight up or down only roll and yaw together are known: yaw is then 0.
+    When x points straight up or down, only a combination of roll and yaw is defined: yaw is then 0.
     """
     cos_pitch = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], cos_pitch)
@@ -106,9 +109,9 @@ def to_rpy(R: FloatArray) -> tuple[float, float, float]:
 
 
 def from_quaternion(wxyz: npt.ArrayLike) -> FloatArray:
-    """Rotation of the quaternion (w, x, y, z) (4,), of any length but zero.
+    """Return the rotation of the quaternion (w, x, y, z) (4,), of any length but zero.
 
-    Raises InputError when it is zero or not finite.
+    Raises InputError when the quaternion is zero or not finite.
     """
     q = finite_array(wxyz, (4,), "The quaternion")
     length = math.hypot(*q)
@@ -125,9 +128,9 @@ def from_quaternion(wxyz: npt.ArrayLike) -> FloatArray:
 
 
 def to_quaternion(R: FloatArray) -> FloatArray:
-    """Unit quaternion (w, x, y, z) (4,) of `R` with w >= 0.
+    """Return the unit quaternion (w, x, y, z) (4,) of `R` with w >= 0.
 
-    Divides by the largest of the four parts, so that none is lost (Shepperd 1978).
+    Divides by the largest of the four parts to keep all digits (Shepperd 1978).
     """
     (a, b, c), (d, e, f), (g, h, i) = R.tolist()
     squares = (1.0 + a + e + i, 1.0 + a - e - i, 1.0 - a + e - i, 1.0 - a - e + i)
@@ -144,7 +147,7 @@ def to_quaternion(R: FloatArray) -> FloatArray:
 
 
 def quaternion_product(p: npt.ArrayLike, q: npt.ArrayLike) -> FloatArray:
-    """(w, x, y, z) (..., 4) of products of quaternions (..., 4): turns as `q`, then as `p`."""
+    """Return products (w, x, y, z) (..., 4) of quaternions (..., 4): `q` turns first, then `p`."""
     a, b, c, d = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
     w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
     return np.stack(

@@ -1,1 +1,1 @@
-"""Forward and inverse kinematics of the arm, and what it can do with an arbitrary pose."""
+"""Forward and inverse kinematics of the arm, and the nearest solution for arbitrary poses."""

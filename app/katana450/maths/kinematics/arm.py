@@ -1,10 +1,11 @@
-"""The family of arms the closed forms cover, and the canonical arm each member is reduced to.
+"""The family of arms that the closed forms cover, and the canonical arm of each member.
 
-A member pans about axis 1, bends about the parallel axes 2, 3 and 4, square to it, and rolls about
-axis 5, square to those. Nothing need cross: the shoulder may stand off the pan axis, the roll axis
-pass beside axes 1 and 4, links have any bearing at q = 0, axes either sign, {S} any place.
+A member pans about axis 1, bends about the parallel axes 2, 3 and 4, which are perpendicular to
+axis 1, and rolls about axis 5, which is perpendicular to axes 2 to 4. The axes need not intersect:
+the shoulder may be offset from the pan axis, and the roll axis may pass beside axes 1 and 4. Links
+have any bearing at q = 0, axes have either sign, and {S} is anywhere.
 
-The canonical arm is stretched along +x at alpha = 0, its axes are z, y, y, y and the roll axis:
+The canonical arm is stretched along +x at alpha = 0. Its axes are z, y, y, y and the roll axis:
 
     {C}  on axis 1 at the height of axis 2, z along axis 1 (upwards in {S}), y along axis 2, x to
          the side on which the arm lies at q = 0
@@ -13,8 +14,8 @@ The canonical arm is stretched along +x at alpha = 0, its axes are z, y, y, y an
     alpha = sign * q + shift,   T_S_tool(q) = T_C_S^-1 T_C_K(alpha) T_K_tool
     T_C_K = Rz(alpha1) [Ry(phi - tilt) Rx(alpha5), (a + l1 cos.. + l2 cos.. + l3 cos phi, d, ...)]
 
-with phi = alpha2 + alpha3 + alpha4 the angle of link 3 below the horizontal. The Katana is the
-member with a = d = tilt = 0, alpha = q, {C} = {S} and {K} the tool itself.
+phi = alpha2 + alpha3 + alpha4 is the angle of link 3 below the horizontal. The Katana is the member
+with a = d = tilt = 0, alpha = q, {C} = {S} and {K} the tool itself.
 """
 
 from __future__ import annotations
@@ -40,13 +41,19 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class FiveAxisArm:
-    """The canonical arm of a chain; see the module's text for the frames.
+    """The canonical arm of a chain; the module's text defines the frames.
 
-    a: shoulder (axis 2) outward from axis 1. d: the arm's plane, which holds the roll axis, along y
-    from axis 1. l1, l2: axis 2 to 3 to 4. l3: axis 4 to {K}; all [m]. tilt: angle [rad] of link 3
-    below the roll axis. signs, shifts [rad]: alpha = sign * q + shift. T_C_S, T_K_tool: (4, 4).
-    off_axis: tool point from roll axis [m]. skew [rad], gap [m]: how far the chain is from the
-    family member it is taken for, both small enough to be rounding in a file.
+    Attributes:
+        a: offset of the shoulder (axis 2) outward from axis 1 [m].
+        d: offset along y from axis 1 of the arm's plane, which holds the roll axis [m].
+        l1, l2: distances from axis 2 to axis 3 and from axis 3 to axis 4 [m].
+        l3: distance from axis 4 to {K} [m].
+        tilt: angle of link 3 below the roll axis [rad].
+        signs, shifts: alpha = sign * q + shift; shifts in rad.
+        T_C_S, T_K_tool: poses (4, 4).
+        off_axis: distance of the tool point from the roll axis [m].
+        skew, gap: difference [rad], [m] between the chain and the family member that stands for it;
+            both are small enough to be rounding in a file.
     """
 
     a: float
@@ -65,51 +72,52 @@ class FiveAxisArm:
 
     @cached_property
     def reach(self) -> float:
-        """No part of the arm is farther than this from the origin of {C} or of {S} [m]."""
+        """An upper bound [m] on the distance of the arm's parts from the origins of {C} and {S}."""
         links = abs(self.a) + abs(self.d) + self.l1 + self.l2 + self.l3 + self.off_axis
         return links + float(np.linalg.norm(self.T_C_S[:3, 3]))
 
     @cached_property
     def T_tool_K(self) -> FloatArray:
-        """(4, 4), the inverse of T_K_tool."""
+        """The inverse (4, 4) of T_K_tool."""
         return frozen(se3.inverse(self.T_K_tool))
 
     @cached_property
     def is_canonical(self) -> bool:
-        """Whether {C} is {S} and {K} the tool, so that poses need no change of frames."""
+        """True if {C} is {S} and {K} is the tool, so that poses need no change of frames."""
         return bool((np.eye(4) == self.T_C_S).all() and (self.T_K_tool == np.eye(4)).all())
 
     @cached_property
     def is_mirrored(self) -> bool:
-        """Whether half a turn about axis 1 takes the arm's plane to its own mirror image."""
+        """True if half a turn about axis 1 maps the arm's plane to its own mirror image."""
         return self.a == self.d == self.tilt == 0.0
 
     def pose(self, T: FloatArray) -> FloatArray:
-        """T_C_K (4, 4) of the pose `T` (4, 4) = T_S_tool."""
+        """Return T_C_K (4, 4) for the pose `T` (4, 4) = T_S_tool."""
         return T if self.is_canonical else self.T_C_S @ T @ self.T_tool_K
 
     def canonical(self, q: npt.ArrayLike) -> FloatArray:
-        """Alpha (..., 5) [rad] of the joint angles `q` (..., 5) [rad]."""
+        """Return the canonical angles (..., 5) [rad] of the joint angles `q` (..., 5) [rad]."""
         return np.asarray(q) * self.signs + self.shifts
 
     def joints(self, alpha: npt.ArrayLike) -> FloatArray:
-        """Q (..., 5) [rad] of the canonical angles `alpha` (..., 5) [rad]."""
-        # + 0.0 leaves no negative zero behind.
+        """Return the joint angles (..., 5) [rad] of the canonical angles `alpha` (..., 5) [rad]."""
+        # Adding 0.0 turns negative zeros into zeros.
         return (np.asarray(alpha) - self.shifts) * self.signs + 0.0
 
     def angles(self, q: FloatArray) -> Five:
-        """`canonical` of one joint vector (5,), as plain floats."""
+        """Return `canonical` of one joint vector (5,) as plain floats."""
         one, two, three, four, five = self.canonical(q).tolist()
         return one, two, three, four, five
 
     def pitch(self, alpha: Five) -> float:
-        """Angle [rad] of the roll axis below the horizontal at the canonical angles `alpha`."""
+        """Return the angle [rad] of the roll axis below the horizontal at `alpha` [rad]."""
         return alpha[1] + alpha[2] + alpha[3] - self.tilt
 
     def beside(self, pitch: float, roll: float) -> Vector:
-        """The tool point [m] from that of {K}, as the arm's plane sees it: outward, sideways, up.
+        """Return the vector [m] from the origin of {K} to the tool point: outward, sideways, up.
 
-        pitch of the roll axis below the horizontal, and roll about it [rad].
+        The components are those in the arm's plane. `pitch` is the angle of the roll axis below the
+        horizontal, `roll` the turn about it [rad].
         """
         if self.off_axis == 0.0:
             return 0.0, 0.0, 0.0
@@ -120,7 +128,7 @@ class FiveAxisArm:
         return c * x + s * z, y, c * z - s * x
 
     def tool_point(self, alpha: Five) -> Vector:
-        """The tool point [m] in {C} at the canonical angles `alpha` [rad]."""
+        """Return the tool point [m] in {C} at the canonical angles `alpha` [rad]."""
         one, two, three, four, five = alpha
         b = two + three
         phi = b + four
@@ -140,10 +148,10 @@ class FiveAxisArm:
 
 @lru_cache(maxsize=64)
 def arm_of(chain: Chain) -> FiveAxisArm:
-    """The canonical arm of `chain`, found once a chain.
+    """Return the canonical arm of `chain`; the result is cached.
 
-    Raises RobotDescriptionError that names every axis which keeps the chain out of the family, by
-    how much, and what it would have to be.
+    Raises RobotDescriptionError when the chain is not in the family. The message names every axis
+    at fault, its deviation and the condition.
     """
     if chain.n != 5:
         raise RobotDescriptionError(
@@ -157,7 +165,7 @@ def arm_of(chain: Chain) -> FiveAxisArm:
     )
     home = T_C_S @ chain.M
     tool = home[:3, 3]
-    # An axis that is off square by rounding is where it should be beside the tool.
+    # Moves an axis that is not perpendicular by a rounding error to its place beside the tool.
     turned = T_C_S[:3, :3] @ omega[4]
     roll = roll + float((tool - roll) @ turned) * turned
 
@@ -210,7 +218,7 @@ def arm_of(chain: Chain) -> FiveAxisArm:
 
 
 def _refuse_skewed(omega: list[FloatArray]) -> float:
-    """The greatest angle [rad] by which an axis is off; raises when that is more than rounding."""
+    """Return the largest deviation [rad] of an axis; raise when it is more than rounding."""
     faults, skew, coarse = [], 0.0, True
     for name, needed, off in _skews(omega):
         skew = max(skew, off)
@@ -220,33 +228,35 @@ def _refuse_skewed(omega: list[FloatArray]) -> float:
     if faults:
         raise RobotDescriptionError(
             f"The closed-form kinematics do not cover this arm: {'; '.join(faults)}."
-            + (" Should they be right angles, write 1.570796 for 1.57." if coarse else "")
+            + (" For right angles write 1.570796 instead of 1.57." if coarse else "")
         )
     return skew
 
 
 def _skews(omega: list[FloatArray]) -> Iterator[tuple[str, str, float]]:
-    """(axis, what it must be, angle [rad] it is off) of every condition on the directions."""
+    """Yield (axis, condition, deviation [rad]) for every condition on the directions."""
     one, two, three, four, five = omega
-    yield "axis 2", "square to axis 1", _from_square(one, two)
+    yield "axis 2", "perpendicular to axis 1", _from_square(one, two)
     yield "axis 3", "parallel to axis 2", _from_parallel(two, three)
     yield "axis 4", "parallel to axis 2", _from_parallel(two, four)
-    yield "axis 5", "square to axis 4", _from_square(four, five)
+    yield "axis 5", "perpendicular to axis 4", _from_square(four, five)
 
 
 def _from_square(a: FloatArray, b: FloatArray) -> float:
+    """Return the deviation [rad] of two unit vectors from a right angle."""
     return abs(math.atan2(float(a @ b), float(np.linalg.norm(np.cross(a, b)))))
 
 
 def _from_parallel(a: FloatArray, b: FloatArray) -> float:
+    """Return the deviation [rad] of two unit vectors from being parallel."""
     return math.atan2(float(np.linalg.norm(np.cross(a, b))), abs(float(a @ b)))
 
 
 def _canonical_frame(chain: Chain) -> FloatArray:
-    """T_C_S (4, 4)."""
+    """Return T_C_S (4, 4)."""
     one, two = chain.S[:3, 0], chain.S[:3, 1]
     z = -one if one[2] < -tolerances.FAMILY_ANGLE else one
-    # What is off square or parallel within rounding is shared out among the three.
+    # Axes 2, 3 and 4 differ by rounding: take their mean direction, perpendicular to axis 1.
     y = two + sum(math.copysign(1.0, two @ other) * other for other in chain.S[:3, 2:4].T)
     y = y - (y @ z) * z
     y = y / np.linalg.norm(y)
@@ -262,15 +272,16 @@ def _canonical_frame(chain: Chain) -> FloatArray:
 
 
 def _link(v: FloatArray) -> tuple[float, float]:
-    """Length [m] of a link and its angle [rad] below the horizontal, in the arm's plane."""
+    """Return a link's length [m] and its angle [rad] below the horizontal, in the arm's plane."""
     return math.hypot(v[0], v[2]), math.atan2(-v[2], v[0])
 
 
 def _tidy(value: float) -> float:
+    """Return `value`, or 0 where it is only rounding."""
     return 0.0 if abs(value) <= tolerances.ROUNDING else float(value)
 
 
 def _tidied(T: FloatArray) -> FloatArray:
-    """`T` without the rounding next to 0 and 1, so that no frame is changed for nothing."""
+    """Return `T` without rounding next to 0 and 1, so that exact frames need no transformation."""
     whole = np.round(T)
     return np.where(np.abs(T - whole) <= tolerances.ROUNDING, whole, T) + 0.0

@@ -1,7 +1,7 @@
-"""Forward and inverse kinematics of many poses at once, in chunks that stay in the cache.
+"""Forward and inverse kinematics of many poses at once, in chunks that fit the cache.
 
-The inverse runs the formulas of maths/kinematics/closed_form.py on arrays; the few poses with the
-tool point next to axis 1, where there are cases to tell apart, go through the scalar `Solver`.
+The inverse runs the formulas of maths/kinematics/closed_form.py on arrays. The few poses with the
+tool point near axis 1, which need case distinctions, use the scalar `Solver`.
 """
 
 from __future__ import annotations
@@ -27,19 +27,21 @@ BoolArray = npt.NDArray[np.bool_]
 _LAST_ROW: Final = np.array([[0.0], [0.0], [0.0], [1.0]])
 
 CHUNK: Final = 4096
-"""Poses at a time: of fewer the calls cost more than the arithmetic, more leave the cache."""
+"""Number of poses per chunk: with fewer the calls dominate, with more the cache overflows."""
 
 _SQUARES_HOLD: Final = 1e-150
-"""Lengths from here on have a square that keeps its digits."""
+"""Minimum length whose square keeps its digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solutions:
-    """What `inverse_batch` found of N poses; the branches are in the order of BRANCHES.
+    """The solutions of `inverse_batch` for N poses; the branches are in the order of BRANCHES.
 
-    q: (N, 4, 5) joint angles [rad]. within_limits: (N, 4) whether they are inside the limits.
-    position_error [m], rotation_error [rad]: (N, 4) what forward kinematics of q misses the asked
-    poses by; None unless asked for.
+    Attributes:
+        q: joint angles (N, 4, 5) [rad].
+        within_limits: True where the joint angles are inside the limits, (N, 4).
+        position_error, rotation_error: errors (N, 4) [m], [rad] of the forward kinematics of q
+            against the target poses; None unless residuals were requested.
     """
 
     q: FloatArray
@@ -49,7 +51,7 @@ class Solutions:
 
 
 def forward_batch(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """T_S_tool (N, 4, 4) at the joint angles `q` (N, n) [rad]; as `forward`, pose by pose.
+    """Return T_S_tool (N, 4, 4) at the joint angles `q` (N, n) [rad], as `forward` for each.
 
     Raises InputError when `q` is not finite or has another shape.
     """
@@ -65,12 +67,12 @@ def forward_batch(chain: Chain, q: npt.ArrayLike) -> FloatArray:
 
 
 def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) -> Solutions:
-    """The four solutions of each pose `T` (N, 4, 4) = T_S_tool [m]; as `inverse`, pose by pose.
+    """Return the four solutions of each pose `T` (N, 4, 4) = T_S_tool [m], as `inverse` for each.
 
-    residuals: measure by forward kinematics what each solution misses its pose by.
+    With `residuals`, the errors of each solution are measured by forward kinematics.
 
-    Raises InputError for the first pose that cannot be used, RobotDescriptionError for an arm of
-    another kind.
+    Raises InputError for the first invalid pose, RobotDescriptionError for an arm outside the
+    family.
     """
     made = _arm(chain)
     T = _numbers(T, (4, 4), "The poses")
@@ -78,9 +80,9 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
     inside = np.empty((len(T), 4), dtype=np.bool_)
     position = np.empty((len(T), 4)) if residuals else None
     rotation = np.empty((len(T), 4)) if residuals else None
-    # In one piece: what malloc once gave in one piece it keeps, and no page is zeroed anew.
+    # One block of memory: malloc reuses a block of the same size, so no page is cleared again.
     work = np.empty(36 * min(len(T), CHUNK))
-    # What is not finite is refused, or left to the scalar solver.
+    # Values that are not finite are rejected, or left to the scalar solver.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for rows in _chunks(len(T)):
             canonical, angles = _arrays(work, rows.stop - rows.start)
@@ -97,17 +99,21 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
 
 
 def _chunks(n: int) -> Iterator[slice]:
+    """Return the slices of at most CHUNK poses."""
     return (slice(start, min(start + CHUNK, n)) for start in range(0, n, CHUNK))
 
 
 def _arrays(work: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Poses (4, 4, count) and angles (2, 2, 5, count) in the memory of `work`."""
+    """Return views for poses (4, 4, count) and angles (2, 2, 5, count) in `work`."""
     canonical, angles = work[: 16 * count], work[16 * count : 36 * count]
     return canonical.reshape(4, 4, count), angles.reshape(2, 2, 5, count)
 
 
 def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatArray:
-    """`value` (N, *shape) as float64, NaN and infinity included; InputError when it is none."""
+    """Return `value` (N, *shape) as float64; NaN and infinity are allowed.
+
+    Raises InputError when `value` has another shape or type.
+    """
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -121,9 +127,9 @@ def _numbers(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> FloatAr
 
 
 def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
-    """Make the poses `T` (4, 4, C), the first the `start`-th, clean, or refuse as one by one.
+    """Make the poses `T` (4, 4, C) clean in place, or raise InputError as for single poses.
 
-    work: (15, C) or more, to write into.
+    `start` is the number of the first pose. `work` (15, C) or larger is scratch memory.
     """
     x, y, z = T[:3, 0], T[:3, 1], T[:3, 2]
     misfit, products = work[:6], work[12:15]
@@ -133,7 +139,7 @@ def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
     misfit[:2] -= 1.0
     np.multiply(x, y, out=products)
     np.add(products[0] + products[1], products[2], out=misfit[2])
-    # The third axis is right-handed: unit length and squareness follow.
+    # The third axis is right-handed: its unit length and orthogonality follow.
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         np.subtract(x[j] * y[k] - x[k] * y[j], z[i], out=misfit[3 + i])
@@ -147,6 +153,7 @@ def _validate(T: FloatArray, start: int, work: FloatArray) -> None:
 
 
 def _clean(T: FloatArray, start: int) -> None:
+    """Replace each rotation in `T` by the nearest one, or raise InputError for an invalid pose."""
     R, p = T[:3, :3].transpose(2, 0, 1), T[:3, 3]
     misfit = np.abs(R.transpose(0, 2, 1) @ R - np.eye(3)).max(axis=(1, 2))
     last_row = np.abs(T[3] - _LAST_ROW).max(axis=0)
@@ -161,7 +168,10 @@ def _clean(T: FloatArray, start: int) -> None:
 
 
 def _forward(chain: Chain, q: FloatArray) -> FloatArray:
-    """T_S_tool (4, 4, C) at q (n, C): each factor exp(hat(S_i) q_i) = I + sin X + (1 - cos) X^2."""
+    """Return T_S_tool (4, 4, C) at q (n, C).
+
+    Each factor is exp(hat(S_i) q_i) = I + sin X + (1 - cos) X^2.
+    """
     T: FloatArray = np.empty((4, 4, q.shape[1]))
     T[:] = chain.M[:, :, None]
     for i in range(chain.n)[::-1]:
@@ -176,7 +186,7 @@ def _forward(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def _angle(Ta: FloatArray, Tb: FloatArray) -> FloatArray:
-    """Angle [rad] between the rotations of two (4, 4, C), accurate at 0 and pi, as `so3.angle`."""
+    """Return the angle [rad] between two rotations (4, 4, C), accurate at 0 and pi."""
     Ra, Rb = Ta[:3, :3], Tb[:3, :3]
 
     def entry(i: int, j: int) -> FloatArray:
@@ -194,7 +204,7 @@ def _root(x: FloatArray) -> FloatArray:
 
 def _direction(y: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     angle, length = np.atan2(y, x), np.sqrt(x * x + y * y)
-    # Sine and cosine cost more than all the rest here.
+    # Computing sine and cosine would dominate the time of this function.
     cosine, sine = x / length, y / length
     if not np.minimum.reduce(length) > _SQUARES_HOLD:
         short = ~(length > _SQUARES_HOLD)
@@ -206,11 +216,14 @@ _ARRAYS: Final = Functions(np.atan2, np.sqrt, _root, _direction)
 
 
 class _Arm(NamedTuple):
-    """What is made once a chain.
+    """Values that are computed once per chain.
 
-    posture: the closed form on arrays. turns: (joint, sign, shift, lower, upper) of the joints with
-    another angle than the canonical arm's, or with limits [rad] beyond half a turn. lower, upper:
-    (5, 1) limits [rad], with the slack.
+    Attributes:
+        solver: the scalar solver.
+        posture: the closed form on arrays.
+        turns: (joint, sign, shift, lower, upper) of the joints whose angle differs from that of the
+            canonical arm, or whose limits [rad] exceed half a turn.
+        lower, upper: limits (5, 1) [rad], with the slack.
     """
 
     solver: Solver
@@ -235,7 +248,10 @@ def _arm(chain: Chain) -> _Arm:
 
 
 def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside: BoolArray) -> None:
-    """Fill q (C, 4, 5), inside (C, 4) for the poses `T` (4, 4, C) by way of angles (2, 2, 5, C)."""
+    """Fill `q` (C, 4, 5) and `inside` (C, 4) for the poses `T` (4, 4, C).
+
+    `angles` (2, 2, 5, C) is scratch memory.
+    """
     solver, arm = made.solver, made.solver.arm
     rows = T
     if not arm.is_canonical:
@@ -244,7 +260,7 @@ def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside:
     x, y = rows[0, 3], rows[1, 3]
     rho = np.sqrt(x * x + y * y)
     r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
-    # Of what overflowed or lies inside the cylinder of radius d neither is true.
+    # Both comparisons are false for an overflow and inside the cylinder of radius d.
     beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
     _canonical(made, rows, rho, r, angles)
     _turn(made, angles)
@@ -258,12 +274,12 @@ def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside:
 def _canonical(
     made: _Arm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
 ) -> None:
-    """Fill alpha (2, 2, 5, C) of shoulder, elbow, joint, in [-pi, pi], well off axis 1."""
+    """Fill `alpha` (2, 2, 5, C) (shoulder, elbow, joint) in [-pi, pi], for poses off axis 1."""
     posture, arm = made.posture, made.solver.arm
     x, y = rows[0, 3], rows[1, 3]
 
-    def stand(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:
-        """Fill one shoulder's `side` (2, 5, C) but for alpha1."""
+    def fill_shoulder(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:
+        """Fill the angles of one shoulder `side` (2, 5, C), except alpha1."""
         up, down = side
         phi, up[1], down[1], up[2], side[:, 4] = posture(c, s, u, rows)
         np.negative(up[2], out=down[2])
@@ -276,26 +292,26 @@ def _canonical(
         for side, u in ((front, r), (back, -r)):
             c, s = (x * u + y * arm.d) * square, (y * u - x * arm.d) * square
             side[:, 0] = np.atan2(s, c)
-            stand(side, c, s, u)
+            fill_shoulder(side, c, s, u)
         return
     c, s, one = x / rho, y / rho, np.atan2(y, x)
     front[:, 0], back[:, 0] = one, _behind(one)
-    stand(front, c, s, rho)
+    fill_shoulder(front, c, s, rho)
     if arm.is_mirrored:
         np.negative(_behind(front[::-1, 1]), out=back[:, 1])
         np.negative(front[::-1, 2:4], out=back[:, 2:4])
         back[:, 4] = _behind(front[0, 4])
     else:
-        stand(back, -c, -s, -rho)
+        fill_shoulder(back, -c, -s, -rho)
 
 
 def _behind(theta: FloatArray) -> FloatArray:
-    """Half a turn on, in [-pi, pi] as `theta` is."""
+    """Return `theta` plus or minus half a turn, in [-pi, pi] if `theta` is."""
     return theta - np.copysign(np.pi, theta)
 
 
 def _wrap(theta: FloatArray) -> None:
-    """Set `theta` into [-pi, pi]."""
+    """Wrap `theta` to [-pi, pi] in place."""
     turns = theta * (0.5 / np.pi)
     np.rint(turns, out=turns)
     turns *= 2.0 * np.pi
@@ -303,7 +319,7 @@ def _wrap(theta: FloatArray) -> None:
 
 
 def _turn(made: _Arm, angles: FloatArray) -> None:
-    """From alpha (2, 2, 5, C) to q, each angle in the turn inside its limits if there is one."""
+    """Convert alpha (2, 2, 5, C) to q in place, each angle in the turn inside its limits if any."""
     for i, sign, shift, lower, upper in made.turns:
         angle = angles[:, :, i]
         if shift:
@@ -313,7 +329,7 @@ def _turn(made: _Arm, angles: FloatArray) -> None:
             np.negative(angle, out=angle)
         if max(-lower, upper) > np.pi + tolerances.LIMIT_SLACK:
             below, above = angle < lower, angle > upper
-            # The first turn past the limit that it misses.
+            # The first turn that is not beyond the violated limit.
             turns = np.where(
                 below,
                 np.ceil((lower - angle) * (0.5 / np.pi)),
@@ -324,7 +340,7 @@ def _turn(made: _Arm, angles: FloatArray) -> None:
 
 
 def _inside(made: _Arm, angles: FloatArray) -> BoolArray:
-    """(2, 2, C) whether the joint angles (2, 2, 5, C) are inside the limits."""
+    """Return True (2, 2, C) where all joint angles (2, 2, 5, C) are inside the limits."""
     inside = angles >= made.lower
     inside &= angles <= made.upper
     one, two, three, four, five = inside.transpose(2, 0, 1, 3)

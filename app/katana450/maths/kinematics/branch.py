@@ -1,4 +1,4 @@
-"""The four ways the arm can stand at one pose, bounded by its singularities."""
+"""The four postures of the arm at one pose, bounded by its singularities."""
 
 from __future__ import annotations
 
@@ -21,11 +21,14 @@ Elbow = Literal["up", "down"]
 class Branch:
     """A region of the joint space that the arm leaves only through a singularity.
 
-    For the canonical arm (see maths/kinematics/arm.py; the Katana is its own): shoulder: "front"
-    when the tool point's radial coordinate in the arm's plane, r = x cos(alpha1) + y sin(alpha1)
-    from axis 1, is >= 0. elbow: "up" when sin(alpha3) >= 0, which puts the elbow above the
-    line from shoulder to wrist while the arm faces front. The regions meet where r = 0
-    or sin(alpha3) = 0.
+    The definitions hold for the canonical arm (see maths/kinematics/arm.py; the Katana is its own).
+    The regions meet where r = 0 or sin(alpha3) = 0.
+
+    Attributes:
+        shoulder: "front" when the tool point's radial coordinate in the arm's plane, r = x
+            cos(alpha1) + y sin(alpha1) from axis 1, is >= 0.
+        elbow: "up" when sin(alpha3) >= 0, which puts the elbow above the line from shoulder to
+            wrist while the arm faces front.
     """
 
     shoulder: Shoulder
@@ -36,7 +39,7 @@ class Branch:
 
     @staticmethod
     def parse(text: str) -> Branch:
-        """The branch written as `str` writes it; InputError on any other text."""
+        """Return the branch named `text`, as `str` formats it; raise InputError on other text."""
         for branch in BRANCHES:
             if text == str(branch):
                 return branch
@@ -53,7 +56,7 @@ BRANCHES: Final[tuple[Branch, ...]] = (
 
 
 def branch_of(chain: Chain, q: npt.ArrayLike) -> Branch:
-    """The branch the joint angles `q` (5,) [rad] stand on."""
+    """Return the branch of the joint angles `q` (5,) [rad]."""
     arm = arm_of(chain)
     q = chain.check_q(q)
     alpha1, _, alpha3, _, _ = arm.canonical(q).tolist()

@@ -1,4 +1,4 @@
-"""The branches as a choice: what each costs to take, and how good it is to stand on."""
+"""The branches as a choice: the cost of changing to each, and its distance from a singularity."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ from katana450.maths.kinematics.velocity import singular_values
 
 @dataclass(frozen=True, eq=False)
 class BranchMetrics:
-    """One way to stand at a pose, and what speaks for and against it.
+    """One branch at a pose, with its cost and its quality.
 
-    q: (n,) the joint angles there [rad]. within_limits: whether the arm can go there.
-    position_error [m], rotation_error [rad]: what it misses the pose by. distance: the farthest any
-    joint has to go [rad]. time: until all are there, each at its own greatest speed [s].
-    smallest_singular_value [1]: 0 in a singularity.
+    Attributes:
+        branch: the branch.
+        q: joint angles (n,) of the branch [rad].
+        within_limits: True if the arm can go there.
+        position_error, rotation_error: difference [m], [rad] from the pose.
+        distance: the largest angle that any joint has to turn [rad].
+        time: duration until all joints are there, each at its own maximum speed [s].
+        smallest_singular_value: 0 in a singularity [1].
     """
 
     branch: Branch
@@ -36,27 +40,27 @@ class BranchMetrics:
 
     @staticmethod
     def of(chain: Chain, found: Solution | Projection, q: npt.ArrayLike) -> BranchMetrics:
-        """That of `found`, seen from `q` (n,) [rad].
+        """Return the metrics of `found`, seen from the joint angles `q` (n,) [rad].
 
-        Between two postures inside the limits the straight way in joint space is inside too, so
-        distance and time are of a way the arm can go.
+        Between two postures inside the limits the straight path in joint space is inside too, so
+        distance and time belong to a path that the arm can follow.
         """
-        way = np.abs(found.q - chain.check_q(q))
+        turns = np.abs(found.q - chain.check_q(q))
         return BranchMetrics(
             branch=found.branch,
             q=found.q,
             within_limits=chain.within_limits(found.q),
             position_error=found.position_error,
             rotation_error=found.rotation_error,
-            distance=float(way.max()),
-            time=float((way / chain.speed).max()),
+            distance=float(turns.max()),
+            time=float((turns / chain.speed).max()),
             smallest_singular_value=float(singular_values(chain, found.q)[-1]),
         )
 
 
 def branches(chain: Chain, T: npt.ArrayLike, q: npt.ArrayLike) -> tuple[BranchMetrics, ...]:
-    """Every branch of the pose `T` (4, 4) = T_S_tool [m] seen from `q` (5,) [rad].
+    """Return every branch of the pose `T` (4, 4) = T_S_tool [m], seen from `q` (5,) [rad].
 
-    In the order of BRANCHES; `T` as for `inverse`, and errors as of it.
+    The branches are in the order of BRANCHES. `T` and the errors are those of `inverse`.
     """
     return tuple(BranchMetrics.of(chain, solution, q) for solution in inverse(chain, T, q_hint=q))

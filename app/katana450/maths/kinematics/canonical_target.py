@@ -1,4 +1,4 @@
-"""What is asked of the canonical arm: a point, and an orientation as the arm's plane sees it."""
+"""A target for the canonical arm: a point, and an orientation relative to the arm's plane."""
 
 from __future__ import annotations
 
@@ -14,13 +14,17 @@ from katana450.maths.kinematics.priority import Priority
 
 
 class CanonicalTarget(NamedTuple):
-    """A wish in {C}; lengths in m, angles in rad.
+    """A target in {C}; lengths in m, angles in rad.
 
-    x, y, z: where the point of {K} is to be, or one that is `beside` it as the plane sees it.
-    tool: where the tool point is to be. along: the roll axis asked for, or None where any plane
-    will do. orientation: of {K} with the plane at theta1 = 0, or in any where any will do.
-    inward: whether the roll axis points towards axis 1; None where the plane at theta1 shows it.
-    Counts only where the yaw does not.
+    Attributes:
+        x, y, z: target of the point of {K}, or of a point that is offset by `beside`.
+        beside: offset of that point in the arm's plane: outward, sideways, up.
+        tool: target of the tool point.
+        along: the target's roll axis, or None if the arm's plane is free.
+        orientation: target of {K} with the plane at theta1 = 0, or in any plane if that is free.
+        priority: the part of the target that is kept.
+        inward: True if the roll axis points towards axis 1; None if the plane at theta1 decides
+            this. Used only if the yaw does not count.
     """
 
     x: float
@@ -35,7 +39,7 @@ class CanonicalTarget(NamedTuple):
 
     @staticmethod
     def pose(T_C_K: FloatArray, tool: Vector, priority: Priority) -> CanonicalTarget:
-        """The pose `T_C_K` (4, 4), with the place of its `tool` point."""
+        """Return the target with the pose `T_C_K` (4, 4) and the place of its `tool` point."""
         (a, _, _, x), (d, _, _, y), (g, _, _, z), _ = T_C_K.tolist()
         orientation = PlaneOrientation.of(T_C_K[:3, :3])
         return CanonicalTarget(x, y, z, (0.0, 0.0, 0.0), tool, (a, d, g), orientation, priority)
@@ -44,13 +48,13 @@ class CanonicalTarget(NamedTuple):
     def five(
         arm: FiveAxisArm, tool: Vector, pitch: float, roll: float, priority: Priority
     ) -> CanonicalTarget:
-        """The five freedoms: the `tool` point, and a pitch and roll in the arm's own plane."""
+        """Return the target of five freedoms: `tool` point, pitch and roll in the arm's plane."""
         orientation = PlaneOrientation.turned(pitch, roll)
         beside = arm.beside(pitch, roll)
         return CanonicalTarget(*tool, beside, tool, None, orientation, priority)
 
     def seen_from(self, theta1: float) -> PlaneOrientation:
-        """The orientation wanted in the plane at `theta1`."""
+        """Return the target orientation in the plane at `theta1`."""
         if self.along is None:
             return self.orientation
         seen = self.orientation.seen_from(theta1)
@@ -58,12 +62,12 @@ class CanonicalTarget(NamedTuple):
             return seen
         pitch = self.pitch(theta1)
         if seen.overlap(pitch) <= tolerances.TOUCHING:
-            # Half a turn away every roll is equally near, so take the one asked for.
+            # Half a turn away every roll is equally near: keep the roll of the target.
             seen = self.orientation.seen_from(theta1 + math.pi)
         return PlaneOrientation.turned(pitch, seen.best_roll(pitch))
 
     def heading(self, theta1: float) -> Vector:
-        """The roll axis asked for, as the plane at `theta1` sees it: outward, sideways and down."""
+        """Return the target's roll axis in the plane at `theta1`: outward, sideways, down."""
         if self.along is None:
             pitch = self.pitch(theta1)
             return math.cos(pitch), 0.0, math.sin(pitch)
@@ -72,9 +76,9 @@ class CanonicalTarget(NamedTuple):
         return c * dx + s * dy, c * dy - s * dx, -dz
 
     def pitch(self, theta1: float) -> float:
-        """Of the roll axis below the horizontal, past the vertical when it points inwards.
+        """Return the pitch of the target's roll axis, past the vertical when it points inwards.
 
-        As the plane at `theta1` sees it, or its true one if only that counts.
+        This is the pitch as seen in the plane at `theta1`, or the true pitch if only that counts.
         """
         if self.along is None:
             return self.orientation.best()[0]
@@ -87,15 +91,15 @@ class CanonicalTarget(NamedTuple):
 
     @property
     def on_axis(self) -> bool:
-        """Whether the point is on axis 1, which leaves theta1 free."""
+        """True if the point is on axis 1, which leaves theta1 free."""
         return math.hypot(self.x, self.y) <= tolerances.ON_AXIS
 
     def aside(self, arm: FiveAxisArm) -> float:
-        """Where the point is to be in the arm's plane, sideways from axis 1 [m]."""
+        """Return the sideways place of the point in the arm's plane, from axis 1 [m]."""
         return arm.d + self.beside[1]
 
     def facing(self, arm: FiveAxisArm, shoulder: Shoulder) -> float | None:
-        """The theta1 of a plane that has the point on the side of `shoulder`; None on axis 1."""
+        """Return the theta1 of a plane with the point on the side of `shoulder`; None on axis 1."""
         if self.on_axis:
             return None
         d, rho = self.aside(arm), math.hypot(self.x, self.y)
@@ -103,19 +107,19 @@ class CanonicalTarget(NamedTuple):
         return self.aligned(arm, u if shoulder == "front" else -u)
 
     def aligned(self, arm: FiveAxisArm, u: float) -> float:
-        """The theta1 that turns a place `u` [m] outward in the plane towards the point."""
+        """Return the theta1 that turns a place `u` [m] outward in the plane towards the point."""
         return math.atan2(self.y, self.x) - math.atan2(self.aside(arm), u)
 
     def pitched(self, arm: FiveAxisArm, pitch: float) -> CanonicalTarget:
-        """The same five freedoms but for the `pitch`."""
+        """Return the same five freedoms with another `pitch`."""
         return CanonicalTarget.five(
             arm, self.tool, pitch, self.orientation.best()[1], self.priority
         )
 
     def faced(self, *, inward: bool) -> CanonicalTarget:
-        """The same with the roll axis pointing towards axis 1, or away from it."""
+        """Return the same target with the roll axis towards axis 1, or away from it."""
         return self._replace(inward=inward)
 
     def moved(self, dx: float, dy: float, dz: float) -> CanonicalTarget:
-        """With another point, and the tool point asked as before."""
+        """Return the target with its point moved by (dx, dy, dz) [m] and the same tool point."""
         return self._replace(x=self.x + dx, y=self.y + dy, z=self.z + dz)

@@ -1,4 +1,4 @@
-"""A serial arm as screw theory sees it: a home pose, its joint axes, their limits."""
+"""A serial arm in screw theory: a home pose, its joint axes and their limits."""
 
 from __future__ import annotations
 
@@ -18,9 +18,15 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
 class Chain:
     """A chain of revolute joints in the fixed frame {S}.
 
-    M: (4, 4) home configuration T_S_tool at q = 0. S: (6, n) screw axes (omega, v) in {S} at q = 0.
-    lower, upper: (n,) joint limits [rad]. speed: (n,) greatest joint speeds [rad/s]. names: n joint
-    names. Arrays are copied and read-only. Raises RobotDescriptionError when they make no chain.
+    Arrays are copied and read-only. Raises RobotDescriptionError when the values do not describe a
+    chain.
+
+    Attributes:
+        M: home configuration T_S_tool (4, 4) at q = 0.
+        S: screw axes (omega, v) (6, n) in {S} at q = 0.
+        lower, upper: joint limits (n,) [rad].
+        speed: maximum joint speeds (n,) [rad/s].
+        names: the n joint names.
     """
 
     M: FloatArray
@@ -41,7 +47,9 @@ class Chain:
             for name in ("lower", "upper", "speed"):
                 self._set(name, finite_array(getattr(self, name), (n,), f"The array '{name}'"))
         except InputError as error:
-            raise RobotDescriptionError(f"The arm is not described rightly. {error}") from error
+            raise RobotDescriptionError(
+                f"The description of the arm is invalid. {error}"
+            ) from error
         if n == 0:
             raise RobotDescriptionError("The arm has no joints; name at least one.")
         object.__setattr__(self, "names", tuple(self.names))
@@ -79,15 +87,15 @@ class Chain:
 
     @property
     def n(self) -> int:
-        """Number of joints."""
+        """The number of joints."""
         return len(self.names)
 
     def with_tool(self, M: npt.ArrayLike) -> Chain:
-        """The same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""
+        """Return the same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""
         return dataclasses.replace(self, M=np.asarray(M))
 
     def check_q(self, q: npt.ArrayLike) -> FloatArray:
-        """A float copy (n,) of the joint vector `q` [rad]; InputError names the axis at fault."""
+        """Return a float copy (n,) of `q` [rad]; raise InputError that names the axis at fault."""
         result = real_array(q, (self.n,), "The joint vector")
         if not np.isfinite(result).all():
             for label, angle in zip(self._labels(), result, strict=True):
@@ -98,10 +106,10 @@ class Chain:
         return result
 
     def within_limits(self, q: npt.ArrayLike, slack: float = tolerances.LIMIT_SLACK) -> bool:
-        """Whether every angle of `q` (n,) [rad] is inside its limits, or over by <= `slack`."""
+        """Return True if `q` (n,) [rad] is inside its limits, or over by at most `slack` [rad]."""
         q = self.check_q(q)
         return bool(((q >= self.lower - slack) & (q <= self.upper + slack)).all())
 
     def clamp(self, q: npt.ArrayLike) -> FloatArray:
-        """`q` (n,) [rad] with every angle set to the nearest one inside its limits."""
+        """Return `q` (n,) [rad] with every angle set to the nearest one inside its limits."""
         return np.minimum(np.maximum(self.check_q(q), self.lower), self.upper)

@@ -1,4 +1,4 @@
-"""The exact member of the family next to a chain from a file with rounded numbers."""
+"""The exact member of the family nearest to a chain from a file with rounded numbers."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 
 STEPS = 5
-"""Angles of each axis at which what the exact arm changes is measured."""
+"""Angles of each axis at which the change by the exact arm is measured."""
 
 
 def exact_member(chain: Chain, up: FloatArray) -> tuple[Chain, list[str]]:
-    """The exact arm that ``chain`` is meant to be, and a sentence for a person on what that moves.
+    """Return the exact arm for ``chain``, and notes that tell a person what the change moves.
 
-    Axes within FAMILY_ANGLE of square, parallel or upright become so, and a tool point within
-    FAMILY_LENGTH of axis 5 lies on it. A chain that is exact within FAMILY_EXACT is returned as it
-    is, without a sentence.
+    Axes within FAMILY_ANGLE of perpendicular, parallel or upright become so, and a tool point
+    within FAMILY_LENGTH of axis 5 is put on it. A chain that is exact within FAMILY_EXACT is
+    returned unchanged, without a note.
 
     Args:
-        up: (3,) unit vector that points upwards, in {S}.
+        chain: the arm from the file.
+        up: unit vector (3,) that points upwards, in {S}.
 
     Raises:
-        RobotDescriptionError: the chain is not of the family; names the axes at fault.
+        RobotDescriptionError: the chain is outside the family; the message names the axes at fault.
     """
     arm = arm_of(chain)
     z = arm.T_C_S[2, :3]
@@ -49,15 +50,16 @@ def exact_member(chain: Chain, up: FloatArray) -> tuple[Chain, list[str]]:
         else ""
     )
     note = (
-        f"Axes are off square, parallel or upright by up to {math.degrees(off):.2g} deg{beside}. "
-        "This is taken for rounding: the exact arm is used, whose tool is elsewhere by about "
-        f"{1e3 * moved:.1g} mm and {math.degrees(turned):.1g} deg at most."
+        "Axes deviate from perpendicular, parallel or upright by up to "
+        f"{math.degrees(off):.2g} deg{beside}. This is treated as rounding: the exact arm is used, "
+        f"whose tool differs by at most about {1e3 * moved:.1g} mm and "
+        f"{math.degrees(turned):.1g} deg."
     )
     return exact, [note]
 
 
 def _exact(chain: Chain, arm: FiveAxisArm, T_S_C: FloatArray) -> Chain:
-    """The canonical arm as a chain in {S}; ``T_S_C``: (4, 4) where it stands."""
+    """Return the canonical arm as a chain in {S}; ``T_S_C`` (4, 4) is the pose of {C}."""
     bearings = np.cumsum(arm.shifts[1:4])
     links = np.array((arm.l1, arm.l2, arm.l3))
     steps = np.column_stack((np.cos(bearings), np.zeros(3), -np.sin(bearings))) * links[:, None]
@@ -80,7 +82,7 @@ def _exact(chain: Chain, arm: FiveAxisArm, T_S_C: FloatArray) -> Chain:
 
 
 def _turn(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The least rotation (3, 3) that brings direction ``a`` (3,) to ``b`` (3,)."""
+    """Return the smallest rotation (3, 3) that brings direction ``a`` (3,) to ``b`` (3,)."""
     across = np.cross(a, b)
     sine = float(np.linalg.norm(across))
     if sine == 0.0:
@@ -89,11 +91,11 @@ def _turn(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _change(chain: Chain, exact: Chain) -> tuple[float, float]:
-    """How far apart the tools are at most [m], [rad], in postures all over the limits."""
+    """Return the maximum differences [m], [rad] of the tools over a grid within the limits."""
     ranges = np.linspace(chain.lower, chain.upper, STEPS).T
     q = np.stack(np.meshgrid(*ranges), axis=-1).reshape(-1, chain.n)
     one, other = forward_batch(chain, q), forward_batch(exact, q)
     moved = np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=1)
-    # Of so small a turn the norm of the difference is root 2 times the angle.
+    # For so small a turn, the norm of the difference is root 2 times the angle.
     turned = np.linalg.norm(one[:, :3, :3] - other[:, :3, :3], axis=(1, 2)) / math.sqrt(2.0)
     return float(moved.max()), float(turned.max())

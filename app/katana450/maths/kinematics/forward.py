@@ -16,9 +16,9 @@ _IDENTITY = np.eye(4)
 
 
 def _exponentials(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """exp(hat(S_i) q_i) of every joint, (n, 4, 4)."""
+    """Return exp(hat(S_i) q_i) of every joint, (n, 4, 4)."""
     q = chain.check_q(q)[:, None, None]
-    # 1 - cos q written so that it keeps its digits near 0.
+    # This form of 1 - cos q keeps its digits near 0.
     versine = 2.0 * np.sin(0.5 * q) ** 2
     E: FloatArray = np.sin(q) * chain.generators + versine * chain.generators_squared
     E += _IDENTITY
@@ -26,7 +26,7 @@ def _exponentials(chain: Chain, q: npt.ArrayLike) -> FloatArray:
 
 
 def forward(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """T_S_tool (4, 4) at the joint angles `q` (n,) [rad]: exp(S1 q1) ... exp(Sn qn) M."""
+    """Return T_S_tool (4, 4) at the joint angles `q` (n,) [rad]: exp(S1 q1) ... exp(Sn qn) M."""
     T = chain.M
     for E in _exponentials(chain, q)[::-1]:
         T = E @ T
@@ -34,7 +34,7 @@ def forward(chain: Chain, q: npt.ArrayLike) -> FloatArray:
 
 
 def joint_frames(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """exp(S1 q1) ... exp(Si qi) for i = 1 ... n, (n, 4, 4): how each link moved from home."""
+    """Return exp(S1 q1) ... exp(Si qi) for i = 1 ... n, (n, 4, 4): each link's motion from home."""
     products = _exponentials(chain, q)
     for i in range(1, chain.n):
         products[i] = products[i - 1] @ products[i]
@@ -42,7 +42,7 @@ def joint_frames(chain: Chain, q: npt.ArrayLike) -> FloatArray:
 
 
 def jacobian_space(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """(6, n) Jacobian: the tool's twist (omega, v) in {S} is J_space @ qd."""
+    """Return the (6, n) Jacobian: the tool's twist (omega, v) in {S} is J_space @ qd."""
     before = joint_frames(chain, q)
     J = np.array(chain.S)
     for i in range(1, chain.n):
@@ -51,5 +51,5 @@ def jacobian_space(chain: Chain, q: npt.ArrayLike) -> FloatArray:
 
 
 def jacobian_body(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """(6, n) Jacobian: the tool's twist (omega, v) in the tool frame is J_body @ qd."""
+    """Return the (6, n) Jacobian: the tool's twist (omega, v) in the tool frame is J_body @ qd."""
     return se3.adjoint(se3.inverse(forward(chain, q))) @ jacobian_space(chain, q)

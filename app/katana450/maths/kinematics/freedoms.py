@@ -1,7 +1,7 @@
-"""The five freedoms of the tool as a person names them: its point, its pitch and its roll.
+"""The five freedoms of the tool in an operator's terms: its point, its pitch and its roll.
 
-Pitch is the angle of the roll axis below the horizontal of the canonical arm, roll the turn about
-it: for the Katana theta2 + theta3 + theta4 and theta5. Angles in rad.
+Pitch is the angle of the roll axis below the horizontal of the canonical arm. Roll is the turn
+about the roll axis. For the Katana they are theta2 + theta3 + theta4 and theta5. Angles in rad.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from katana450.maths.kinematics.chain import Chain
 
 
 def pitch_and_roll(chain: Chain, q: npt.ArrayLike) -> tuple[float, float]:
-    """Pitch and roll at the joint angles `q` (5,)."""
+    """Return pitch and roll [rad] at the joint angles `q` (5,) [rad]."""
     arm = arm_of(chain)
     alpha = arm.angles(chain.check_q(q))
     return arm.pitch(alpha), alpha[4]
 
 
 def pitched_frame(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """Rotation (3, 3) in {S} of the frame that pan and pitch have turned but roll has not.
+    """Return the rotation (3, 3) in {S} of the frame that follows pan and pitch but not roll.
 
-    Its x axis is the roll axis, its y axis that of the pitch.
+    Its x axis is the roll axis and its y axis is the pitch axis. `q` (5,) are joint angles [rad].
     """
     arm = arm_of(chain)
     pitch, _ = pitch_and_roll(chain, q)

@@ -1,4 +1,4 @@
-"""What the arm does in its plane with theta1 set: a posture of axes 2 to 4, and a roll."""
+"""The arm in its plane with theta1 set: a posture of axes 2 to 4, and a roll."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from katana450.maths.kinematics.priority import Priority
 
 
 class PlanarTarget(NamedTuple):
-    """The orientation wanted in the plane, the roll allowed, and the roll [rad] now, if known."""
+    """A target in the arm's plane.
+
+    Attributes:
+        orientation: the target orientation.
+        roll: the allowed range of the roll [rad].
+        roll_hint: the present roll [rad], if known.
+        priority: the part of the target that is kept.
+    """
 
     orientation: PlaneOrientation
     roll: Interval
@@ -21,7 +28,15 @@ class PlanarTarget(NamedTuple):
 
 
 class InPlane(NamedTuple):
-    """A posture of the planar arm with a roll, and what kept either from the best orientation."""
+    """A posture of the planar arm with a roll, and the constraints that bind.
+
+    Attributes:
+        posture: the angles of axes 2 to 4.
+        psi: the roll [rad].
+        rotation_error: angle [rad] from the target orientation.
+        posture_bound, roll_bound: True if the posture or the roll keeps the arm from the best
+            orientation.
+    """
 
     posture: Posture
     psi: float
@@ -31,9 +46,10 @@ class InPlane(NamedTuple):
 
 
 def reaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InPlane | None:
-    """With the tool point at (u, v), or None.
+    """Return the best solution with the tool point at (u, v), or None.
 
-    Behind axis 1, where the branch has no points, the nearest is straight across from (u, v) on it.
+    Behind axis 1, where the branch has no points, (u, v) is replaced by the point straight across
+    on the axis.
     """
     u = planar.axis if planar.behind(u) > 0.0 else u
     if target.priority is not Priority.PITCH:
@@ -43,9 +59,9 @@ def reaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InP
 
 
 def approaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InPlane | None:
-    """With the tool point as near to (u, v) as it comes, when it cannot come there.
+    """Return the solution nearest to (u, v) for a point that cannot be reached.
 
-    None where no posture has the pitch that is held.
+    None means that no posture has the pitch that is kept.
     """
     if target.priority is Priority.PITCH:
         posture = nearest_at_pitch(planar, u, v, target.orientation.best()[0])
@@ -55,8 +71,8 @@ def approaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> 
     pu, pv = planar.tool(nearest)
     if abs(planar.behind(pu)) > tolerances.ON_AXIS:
         return held
-    # On axis 1 the orientation is free to improve; at the edge of the workspace the same posture
-    # comes back, off by the root of rounding.
+    # On axis 1 the orientation is free to improve. At the edge of the workspace the same posture is
+    # found again, with an error of the root of rounding.
     other = _best_at(planar, pu, pv, target)
     if other is None or other.rotation_error > held.rotation_error - tolerances.TOUCHING:
         return held
@@ -64,10 +80,11 @@ def approaching(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> 
 
 
 def _best_at(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InPlane | None:
-    """The best orientation with the tool point at (u, v); None when no posture has it there.
+    """Return the best orientation with the tool point at (u, v), or None if there is no posture.
 
-    Either pitch and roll are both free and best; or the roll is at an end and the pitch best for
-    it; or a joint is at an end and the roll best for that, or at its own end.
+    There are three cases. Pitch and roll are both free and best; or the roll is at a limit and the
+    pitch is the best for it; or a joint is at a limit and the roll is the best for that, or at its
+    own limit.
     """
     wanted, roll, hint, _ = target
     phi, psi = wanted.best()
@@ -86,11 +103,12 @@ def _best_at(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InP
 
 
 def _with_roll(posture: Posture, target: PlanarTarget, *, bound: bool) -> InPlane:
+    """Return `posture` with the best roll, and among equal rolls the one nearest to the hint."""
     return _chosen(_rolled(posture, target, bound=bound), target.roll_hint)
 
 
 def _rolled(posture: Posture, target: PlanarTarget, *, bound: bool) -> list[InPlane]:
-    """`posture` with the roll best for its pitch, or with each end of the roll."""
+    """Return `posture` with the roll best for its pitch, or with each end of the roll."""
     wanted, roll = target.orientation, target.roll
     best = roll.fit(wanted.best_roll(posture.phi))
     rolls = roll.ends if best is None else (best,)
@@ -100,6 +118,7 @@ def _rolled(posture: Posture, target: PlanarTarget, *, bound: bool) -> list[InPl
 
 
 def _chosen(found: list[InPlane], roll_hint: float | None) -> InPlane:
+    """Return the solution with the smallest error, and of equal ones that nearest to the hint."""
     minimum = min(each.rotation_error for each in found) + tolerances.SAME_ROTATION
     equal = [each for each in found if each.rotation_error <= minimum]
     return equal[0] if roll_hint is None else min(equal, key=lambda e: abs(e.psi - roll_hint))

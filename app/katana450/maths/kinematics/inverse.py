@@ -1,7 +1,7 @@
 """Inverse kinematics in closed form: every joint vector that puts the tool at a pose.
 
-The paper's eq. (12) to (29) with both shoulders and both elbows followed; the steps, each with its
-subproblem and number of solutions, stand in maths/kinematics/closed_form.py.
+The paper's eq. (12) to (29), followed for both shoulders and both elbows. The module
+maths/kinematics/closed_form.py lists the steps, each with its subproblem and number of solutions.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from katana450.maths.kinematics.turns import nearest_turn
 
 
 class Solution:
-    """One answer of `inverse`; what is not asked of it is not computed."""
+    """One solution of `inverse`; its properties are computed when they are first read."""
 
     __slots__ = ("_chain", "_errors", "_q", "_rows", "angles", "branch")
 
     angles: Five
     """The joint angles [rad] as plain floats."""
     branch: Branch
-    """How the arm stands."""
+    """The branch of the solution."""
 
     def __init__(self, chain: Chain, rows: Rows, angles: Five, branch: Branch) -> None:
         self._chain = chain
@@ -52,22 +52,22 @@ class Solution:
 
     @property
     def within_limits(self) -> bool:
-        """Whether q is inside the chain's limits."""
+        """True if the joint angles are inside the chain's limits."""
         return Solver.of(self._chain).inside(self.angles)
 
     @property
     def position_error(self) -> float:
-        """Distance [m] between the asked pose and that which forward kinematics gives of q."""
+        """The distance [m] between the target pose and the pose of the forward kinematics."""
         return self._measured()[0]
 
     @property
     def rotation_error(self) -> float:
-        """Angle [rad] between the same two."""
+        """The angle [rad] between the target pose and the pose of the forward kinematics."""
         return self._measured()[1]
 
     @property
     def exact(self) -> bool:
-        """Whether the arm takes the asked pose there, to rounding, that of its file included."""
+        """True if the arm takes the target pose, to within rounding, also that of its file."""
         length, turn = _rounding(Solver.of(self._chain).arm, self._rows)
         return (
             self.position_error <= tolerances.SAME_POSITION + length
@@ -88,11 +88,12 @@ class Solution:
 
 
 def _rounding(arm: FiveAxisArm, rows: Rows) -> tuple[float, float]:
-    """How much [m], [rad] a pose is missed by for what is rounding in the file of the arm.
+    """Return the errors [m], [rad] of a pose that rounding in the arm's file explains.
 
-    Each of four axes may be off by `skew`, and what hangs on them by a `length`. theta1 is told by
-    a place sqrt(rho^2 - d^2) outward of axis 1, which turns it by that length to this distance;
-    nearer than the length it is not known. A tool point beside the roll axis turns with it.
+    Each of four axes may be off by `skew`, and so displaces the parts on it by a `length`. theta1
+    follows from a point sqrt(rho^2 - d^2) outward of axis 1. A displacement by the length turns
+    theta1 by its ratio to this distance; nearer than the length theta1 is undetermined. A tool
+    point beside the roll axis turns with it.
     """
     length = 4.0 * (arm.skew * arm.reach + arm.gap)
     if length == 0.0:
@@ -105,7 +106,7 @@ def _rounding(arm: FiveAxisArm, rows: Rows) -> tuple[float, float]:
 
 
 class FourSolutions(Sequence[Solution]):
-    """The answers of `inverse` in the order of BRANCHES; each is made when first asked for."""
+    """The solutions of `inverse` in the order of BRANCHES, created on first access."""
 
     __slots__ = ("_angles", "_chain", "_made", "_rows")
 
@@ -145,19 +146,22 @@ class FourSolutions(Sequence[Solution]):
 def inverse(
     chain: Chain, T: npt.ArrayLike, *, q_hint: npt.ArrayLike | None = None
 ) -> FourSolutions:
-    """The four solutions for the pose `T` (4, 4) = T_S_tool [m], in the order of BRANCHES.
+    """Return the four solutions for the pose `T` (4, 4) = T_S_tool [m], in the order of BRANCHES.
 
-    Two coincide where their branches meet (arm stretched or folded, tool point on axis 1). `T`
-    should be a pose the five axes can do; of any other come back the angles that hold the tool
-    point, else come nearest to it along each link, with the tool's roll axis nearest in the plane,
-    and the errors say by how much they miss. Where the arm's plane passes beside axis 1 one
-    shoulder alone can do a pose: the other's two solutions miss its yaw. Angles are in the turn
-    that fits the limits when one does, else in [-pi, pi]; limits wider than a turn leave a choice,
-    which falls on the turn nearest to `q_hint` (5,) [rad]. With tool point and tool both along axis
-    1 theta1 is free: it is then that of the hint, or 0.
+    Two solutions coincide where their branches meet (arm stretched or folded, tool point on axis
+    1).
 
-    Raises InputError for a `T` or `q_hint` that cannot be used, RobotDescriptionError for an arm of
-    another kind. Source: the paper's eq. (12)-(29). For loops without checks: `Solver`.
+    `T` should be a pose that five axes can take. For any other pose the solutions hold the tool
+    point, or come nearest to it along each link, with the tool's roll axis nearest in the plane.
+    Their errors give the difference. Where the arm's plane passes beside axis 1, only one shoulder
+    can take a pose: the two solutions of the other shoulder miss its yaw.
+
+    Each angle is in the turn that fits the limits if there is one, else in [-pi, pi]. Limits wider
+    than a turn leave a choice: the turn nearest to `q_hint` (5,) [rad]. With tool point and roll
+    axis both on axis 1, theta1 is free: it is then that of the hint, or 0.
+
+    Raises InputError for an invalid `T` or `q_hint`, RobotDescriptionError for an arm outside the
+    family. Source: the paper's eq. (12)-(29). For loops without checks: `Solver`.
     """
     solver = Solver.of(chain)
     rows = se3.validated_rows(T)

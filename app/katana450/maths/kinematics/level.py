@@ -1,4 +1,4 @@
-"""The planar arm with its pitch held: where its tool point can be, and how near to a wished one."""
+"""The planar arm at a fixed pitch: the posture whose tool point is nearest to a target point."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from katana450 import tolerances
 from katana450.maths.kinematics.planar import PlanarArm, Posture
 
 _Angles = tuple[float, float]
-"""theta2 and theta3; theta4 is what is left of the pitch."""
+"""The angles theta2 and theta3; theta4 is the remainder of the pitch."""
 
 
 def nearest_at_pitch(planar: PlanarArm, u: float, v: float, phi: float) -> Posture | None:
-    """The posture with pitch `phi` whose tool point is nearest to (u, v); None when none has it.
+    """Return the posture with pitch `phi` whose tool point is nearest to (u, v), or None.
 
-    Holding the pitch leaves the wrist to axes 2 and 3, and makes the limits of axis 4 bounds on
-    theta2 + theta3. What the limits leave of that is a convex piece of the (theta2, theta3) plane,
-    so the nearest point is reached exactly, or lies on an edge straight towards (u, v), or in a
-    corner; with the tool point behind axis 1, on the axis instead.
+    None means that no posture has this pitch. A fixed pitch leaves the wrist to axes 2 and 3, and
+    turns the limits of axis 4 into bounds on theta2 + theta3. The limits leave a convex region of
+    the (theta2, theta3) plane. The nearest point is therefore reached exactly, or lies on an edge
+    straight towards (u, v), or in a corner. A tool point behind axis 1 is replaced by the nearest
+    one on the axis.
     """
     reached = planar.at(planar.axis if planar.behind(u) > 0.0 else u, v, phi)
     if reached is not None:
@@ -37,7 +38,7 @@ def nearest_at_pitch(planar: PlanarArm, u: float, v: float, phi: float) -> Postu
 
 
 def _straight(planar: PlanarArm, phi: float, wrist: tuple[float, float]) -> Iterator[_Angles]:
-    """With a joint at an end the wrist keeps to a circle: the points of it that may be nearest."""
+    """Yield the candidates on the edges: with one joint at a limit, the wrist moves on a circle."""
     l1, l2 = planar.l1, planar.l2
     on_axis = planar.axis - planar.l3 * math.cos(phi)
     for theta3 in planar.theta3.ends:
@@ -59,7 +60,7 @@ def _straight(planar: PlanarArm, phi: float, wrist: tuple[float, float]) -> Iter
 def _directions(
     center: tuple[float, float], radius: float, wrist: tuple[float, float], on_axis: float
 ) -> Iterator[float]:
-    """From `center` towards the wished wrist, and to where the tool point would meet axis 1."""
+    """Yield the direction from `center` to the target wrist, and those with the tool on axis 1."""
     yield math.atan2(wrist[1] - center[1], wrist[0] - center[0])
     along = on_axis - center[0]
     if abs(along) <= radius:
@@ -69,6 +70,7 @@ def _directions(
 
 
 def _corners(planar: PlanarArm, phi: float) -> Iterator[_Angles]:
+    """Yield the angles with two joints at a limit."""
     for theta2 in planar.theta2.ends:
         for theta3 in planar.theta3.ends:
             yield theta2, theta3
@@ -80,6 +82,7 @@ def _corners(planar: PlanarArm, phi: float) -> Iterator[_Angles]:
 
 
 def _fitted(planar: PlanarArm, theta2: float, theta3: float, theta4: float) -> Posture | None:
+    """Return the posture with these angles in the turns inside the limits, or None."""
     a, b, c = planar.theta2.fit(theta2), planar.theta3.fit(theta3), planar.theta4.fit(theta4)
     if a is None or b is None or c is None:
         return None

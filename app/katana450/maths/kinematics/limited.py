@@ -1,4 +1,4 @@
-"""The canonical arm between limits: those of its chain, narrower ones, or none."""
+"""The canonical arm with limits: those of its chain, narrower ones, or none."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Intervals = tuple[Interval, Interval, Interval, Interval, Interval]
 
 @dataclass(frozen=True, eq=False)
 class LimitedArm:
-    """``arm`` with the canonical angles [rad] that each axis may take."""
+    """The canonical arm `arm` with the range of angles [rad] of each axis."""
 
     arm: FiveAxisArm
     limits: Intervals
@@ -26,11 +26,14 @@ class LimitedArm:
 
     @staticmethod
     def of(chain: Chain, *, within_limits: bool = True) -> LimitedArm:
-        """That of `chain`, made once a chain; RobotDescriptionError as `arm_of`."""
+        """Return the arm of `chain`; the result is cached.
+
+        With `within_limits` False the arm has no limits. Raises RobotDescriptionError as `arm_of`.
+        """
         return _limited(chain, within_limits)
 
     def near(self, alpha: Five, reach: float, theta1: Interval) -> LimitedArm:
-        """The same with axes 2 to 5 at most `reach` [rad] from `alpha`, and axis 1 in `theta1`."""
+        """Return the arm with axes 2 to 5 within `reach` [rad] of `alpha`, axis 1 in `theta1`."""
         _, two, three, four, five = (
             Interval(max(lower, angle - reach), min(upper, angle + reach))
             for (lower, upper), angle in zip(self.limits, alpha, strict=True)
@@ -38,7 +41,7 @@ class LimitedArm:
         return LimitedArm(self.arm, (theta1, two, three, four, five))
 
     def turned(self, alpha: Five, hint: Five) -> Five:
-        """`alpha` in those turns inside the limits that are nearest to `hint`."""
+        """Return `alpha` in those turns inside the limits that are nearest to `hint`."""
         one, two, three, four, five = (
             _in_turn(limits, angle, near)
             for limits, angle, near in zip(self.limits, alpha, hint, strict=True)
@@ -46,9 +49,10 @@ class LimitedArm:
         return one, two, three, four, five
 
     def planar(self, branch: Branch | None) -> list[tuple[Branch, PlanarArm]]:
-        """Axes 2 to 4 on `branch`, or on every branch the limits leave, a piece of theta3 each.
+        """Return axes 2 to 4 on `branch`, or on every branch that the limits allow.
 
-        Of an elbow that the limits leave nothing of there is the end nearest to it.
+        There is one arm for each piece of theta3. If the limits exclude the elbow of `branch`, the
+        piece is the limit nearest to it.
         """
         if branch is not None:
             return [(branch, arm) for arm in self._pieces(branch)]
@@ -95,7 +99,7 @@ def _in_turn(limits: Interval, angle: float, hint: float) -> float:
 
 
 def _bends(theta3: Interval, bend: int) -> list[tuple[int, Interval]]:
-    """The parts of `theta3` on one side of the stretched and of the folded arm."""
+    """Return the parts of `theta3` on one side of the stretched and of the folded arm."""
     if theta3 == ANY_ANGLE:
         theta3 = Interval(-math.pi, math.pi)
     half_turns = range(math.floor(theta3.lower / math.pi), math.ceil(theta3.upper / math.pi))
@@ -107,6 +111,6 @@ def _bends(theta3: Interval, bend: int) -> list[tuple[int, Interval]]:
 
 
 def _least_bend(theta3: Interval, bend: int) -> list[tuple[int, Interval]]:
-    """Where the limits leave nothing of the other elbow: the end nearest to it."""
+    """Return the end of `theta3` nearest to an elbow that the limits exclude."""
     end = min(theta3, key=lambda theta: abs(math.sin(theta)))
     return [(bend, Interval(end, end))]

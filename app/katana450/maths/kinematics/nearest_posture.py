@@ -1,9 +1,9 @@
-"""How the arm stands nearest to what is asked: position first, then the orientation.
+"""The posture of the arm nearest to a target: position first, then the orientation.
 
-In closed form on the canonical arm: with theta1 set, the problem is planar, its optimum is either
-free of every limit or has a joint on one, and each such case is a meeting of two circles. Only
-where the plane passes beside axis 1 and the point is out of reach do theta1 and the posture depend
-on each other; they are then found in turns. Lengths in m, angles in rad.
+The solution is in closed form on the canonical arm. With theta1 set, the problem is planar. Its
+optimum is either free of every limit or has a joint on one, and each such case is an intersection
+of two circles. theta1 and the posture depend on each other only where the plane passes beside axis
+1 and the point is out of reach; they are then found alternately. Lengths in m, angles in rad.
 """
 
 from __future__ import annotations
@@ -23,18 +23,25 @@ from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import wrapped
 
 _TURNS: Final = 100
-"""Most steps of the iterations that end by themselves, each step much nearer than the last: all but
-those where the pitch asked for changes sides with theta1."""
+"""Maximum number of iterations. They converge much earlier, except where the pitch of the target
+changes sides with theta1.
+"""
 
 
 _SLOW: Final = 0.9
-"""A step beside the roll axis that leaves so much of the error is on its way to no solution."""
+"""An iteration beside the roll axis that leaves this fraction of the error does not converge."""
 
 
 class NearestPosture(NamedTuple):
-    """The canonical angles `alpha` on `branch`, what they miss, and what holds them there.
+    """The canonical angles `alpha` on `branch`, their errors, and the constraints that bind.
 
-    searches: how many it took to find them.
+    Attributes:
+        alpha: canonical angles [rad].
+        branch: the branch of the posture.
+        position_error, rotation_error: the errors [m], [rad].
+        theta1_bound: True if a limit of axis 1 binds.
+        in_plane: posture and roll in the arm's plane, with their constraints.
+        searches: the number of searches that it took to find them.
     """
 
     alpha: Five
@@ -49,10 +56,10 @@ class NearestPosture(NamedTuple):
 def nearest_posture(
     limited: LimitedArm, canonical: CanonicalTarget, branch: Branch | None, hint: Five | None
 ) -> NearestPosture:
-    """That inside the limits of `limited` which is nearest to `asked`.
+    """Return the posture inside the limits of `limited` that is nearest to `canonical`.
 
-    branch: the one to stay on; None takes the one that comes nearest, and of equals the one nearest
-    to the angles `hint`. A pitch that is held and that no posture has is not held.
+    `branch` is the branch to stay on. None takes the nearest one, and of equal ones the one nearest
+    to the angles `hint`. A target pitch that no posture has is dropped.
     """
     best = _reached(limited, canonical, branch, hint)
     if canonical.priority is Priority.PITCH:
@@ -68,6 +75,7 @@ def nearest_posture(
 def _reached(
     limited: LimitedArm, canonical: CanonicalTarget, branch: Branch | None, hint: Five | None
 ) -> NearestPosture | None:
+    """Return the nearest posture, also for a tool point beside the roll axis, or None."""
     best = _solved(limited, canonical, branch, hint)
     if best is not None and limited.arm.off_axis > 0.0:
         return _shifted(limited, canonical, best, branch, hint)
@@ -77,14 +85,14 @@ def _reached(
 def _faced(
     limited: LimitedArm, canonical: CanonicalTarget, branch: Branch | None, hint: Five | None
 ) -> NearestPosture | None:
-    """The stance with the pitch kept, whichever way round the tool faces; None if there is none.
+    """Return the posture with the pitch kept, with the tool facing either way, or None.
 
-    The yaw does not count, so a roll axis with the asked pitch may point away from axis 1 or
-    towards it. The way that keeps the roll is preferred, since the position is to give way.
+    The yaw does not count, so a roll axis with the target pitch may point away from axis 1 or
+    towards it. The direction that keeps the roll is preferred, since the position gives way.
     """
     branches = (branch,) if branch else dict(limited.planar(None))
-    ways = canonical.faced(inward=False), canonical.faced(inward=True)
-    tried = (_reached(limited, way, each, hint) for each in branches for way in ways)
+    facings = canonical.faced(inward=False), canonical.faced(inward=True)
+    tried = (_reached(limited, facing, each, hint) for each in branches for facing in facings)
     found = [found_posture for found_posture in tried if found_posture is not None]
     kept = [
         found_posture
@@ -108,11 +116,12 @@ def _shifted(
     branch: Branch | None,
     hint: Five | None,
 ) -> NearestPosture:
-    """The stance with a tool point beside the roll axis, from that with the point on the axis.
+    """Return the posture for a tool point beside the roll axis.
 
-    The two part by what the orientation misses, so the point on the axis is moved by that and the
-    rest solved again, as long as the tool point comes nearer. It ends on the asked point where the
-    arm reaches it; beyond reach it ends near the nearest one, not always on it.
+    `best` is the posture for the tool point taken on the axis. The two differ by the orientation
+    error. The point on the axis is therefore moved by that difference and the rest is solved again,
+    as long as the tool point comes nearer. The iteration ends on the target point if the arm
+    reaches it. Beyond reach it ends near the nearest point, not always on it.
     """
     reached: NearestPosture | None = best
     minimum, searches = math.inf, 1
@@ -135,6 +144,7 @@ def _shifted(
 def _solved(
     limited: LimitedArm, canonical: CanonicalTarget, branch: Branch | None, hint: Five | None
 ) -> NearestPosture | None:
+    """Return the best of the postures on the allowed branches, or None."""
     planar = limited.planar(branch)
     found: list[NearestPosture] = []
     for approach in (False, True):
@@ -176,7 +186,7 @@ def _nearest_postures(
             pu, pv = planar.tool(found.posture)
             if settled:
                 break
-            # The tool point at pu is nearest to the asked one with theta1 turned to face it so.
+            # The tool point at pu is nearest to the target with theta1 turned to face it.
             turn = _fitted(limits[0], canonical.aligned(arm, pu + a))
             aligned, held = turn
             if (bound and held) or abs(aligned - theta1) <= tolerances.ALIGNED:
@@ -197,11 +207,11 @@ def _nearest_postures(
 def _theta1(
     limited: LimitedArm, canonical: CanonicalTarget, branch: Branch, hint: Five | None
 ) -> Iterator[tuple[float, bool]]:
-    """The theta1 to try, and whether a limit holds it there.
+    """Yield the values of theta1 to try, each with True if a limit binds.
 
-    Off axis 1 the point's direction gives it. On it the plane must hold the tool's direction, which
-    faces either way; with the tool along axis 1 too, nothing is asked of theta1. A roll held at an
-    end is nearest in a plane of its own.
+    Off axis 1 the direction of the point gives theta1. On the axis the plane must hold the tool's
+    direction, which faces either way. With the tool along axis 1 too, theta1 is free. A roll held
+    at a limit is nearest in a plane of its own.
     """
     interval = limited.limits[0]
     facing = canonical.facing(limited.arm, branch.shoulder)
@@ -214,7 +224,7 @@ def _theta1(
             theta1 = min(interval, key=lambda end: abs(end - hint[0]))
         yield theta1, bound
         if bound and hint is None and canonical.aside(limited.arm) != 0.0:
-            # Beside axis 1 the end farther in angle may come nearer.
+            # Beside axis 1 the limit farther in angle may come nearer.
             yield sum(interval) - theta1, True
 
 
@@ -225,7 +235,7 @@ def _facing_on_axis(
         return (0.0 if hint is None else hint[0],)
     facing = math.atan2(canonical.along[1], canonical.along[0])
     if hint is not None:
-        # Both ways put the tool there; turning round would be a motion nobody asked for.
+        # Both directions put the tool there: take the one with the smaller motion.
         return (min((facing, facing + math.pi), key=lambda angle: abs(wrapped(angle - hint[0]))),)
     if branch.shoulder == "back":
         return facing + math.pi, facing
@@ -233,7 +243,7 @@ def _facing_on_axis(
 
 
 def _fitted(interval: Interval, theta: float) -> tuple[float, bool]:
-    """`theta` if the interval holds it, else its nearer end, and whether it had to be."""
+    """Return `theta` if the interval holds it, else the nearer end, and True if it was moved."""
     fitted = interval.fit(theta)
     if fitted is not None:
         return fitted, False
@@ -243,6 +253,7 @@ def _fitted(interval: Interval, theta: float) -> tuple[float, bool]:
 def _nearest(
     limited: LimitedArm, canonical: CanonicalTarget, found: list[NearestPosture], hint: Five | None
 ) -> NearestPosture:
+    """Return the posture with the smallest errors, in the order of the priority."""
     found = _minimum(
         found, [found_posture.position_error for found_posture in found], tolerances.SAME_POSITION
     )
@@ -258,6 +269,7 @@ def _nearest(
 
 
 def _minimum(found: list[NearestPosture], errors: list[float], same: float) -> list[NearestPosture]:
+    """Return the postures whose error is the smallest, to within `same`."""
     minimum = min(errors) + same
     return [
         found_posture

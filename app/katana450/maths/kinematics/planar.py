@@ -1,8 +1,9 @@
-"""Axes 2, 3 and 4 as a limited planar 3R arm: where its tool point can be, and at which pitch.
+"""Axes 2, 3 and 4 as a planar 3R arm with limits: its tool points and their pitches.
 
-The plane is that of the canonical arm: its origin the shoulder, u outward from axis 1, v along it
-downward, so that theta2, theta3, theta4 (here the canonical angles) turn u towards v. phi = theta2
-+ theta3 + theta4 is the angle of the last link below the horizontal. Lengths in m, angles in rad.
+The plane is that of the canonical arm. Its origin is the shoulder; u points outward from axis 1 and
+v downward along it, so that theta2, theta3, theta4 (here the canonical angles) turn u towards v.
+phi = theta2 + theta3 + theta4 is the angle of the last link below the horizontal. Lengths in m,
+angles in rad.
 """
 
 from __future__ import annotations
@@ -17,13 +18,16 @@ from katana450.maths.kinematics.turns import wrapped
 
 
 class Interval(NamedTuple):
-    """The angles a joint may take; infinite ends mean any angle."""
+    """The range of angles of a joint; infinite ends mean any angle."""
 
     lower: float
     upper: float
 
     def fit(self, theta: float) -> float | None:
-        """`theta` in the turn inside the interval, set onto an end it misses by rounding."""
+        """Return `theta` in the turn inside the interval, or None if there is none.
+
+        An angle that is outside by rounding is set to the end.
+        """
         lower, upper = self
         if lower <= theta <= upper:
             return theta if lower > -math.inf else wrapped(theta)
@@ -36,6 +40,7 @@ class Interval(NamedTuple):
 
     @property
     def ends(self) -> tuple[float, ...]:
+        """The two limits; empty when every angle is allowed."""
         return () if self.lower == -math.inf else (self.lower, self.upper)
 
 
@@ -43,7 +48,10 @@ ANY_ANGLE = Interval(-math.inf, math.inf)
 
 
 class Posture(NamedTuple):
-    """Angles of the planar arm. stretched: links in one line, not only limits, hold it there."""
+    """The angles of the planar arm.
+
+    `stretched` is True if links in one line, not only limits, keep it from coming nearer.
+    """
 
     theta2: float
     theta3: float
@@ -52,17 +60,19 @@ class Posture(NamedTuple):
 
     @property
     def phi(self) -> float:
+        """The pitch: the angle of the last link below the horizontal."""
         return self.theta2 + self.theta3 + self.theta4
 
 
 class _Shape(NamedTuple):
-    """Links beyond a joint as one rigid link: its length, and its angle to the first of them."""
+    """The links beyond a joint as one rigid link: length, and angle to the first of them."""
 
     length: float
     bearing: float
 
 
 def _joined(first: float, second: float, bend: float) -> _Shape:
+    """Return two links at the angle `bend` as one rigid link."""
     x, y = first + second * math.cos(bend), second * math.sin(bend)
     return _Shape(math.hypot(x, y), math.atan2(y, x))
 
@@ -70,7 +80,10 @@ def _joined(first: float, second: float, bend: float) -> _Shape:
 def _meeting(
     center1: tuple[float, float], radius1: float, center2: tuple[float, float], radius2: float
 ) -> tuple[tuple[float, float], ...]:
-    """Where two circles meet: two points (they may coincide), or none; concentric ones: none."""
+    """Return the two intersections of two circles (they may coincide), or none.
+
+    Concentric circles have none.
+    """
     dx, dy = center2[0] - center1[0], center2[1] - center1[1]
     d = math.hypot(dx, dy)
     if d == 0.0:
@@ -92,10 +105,14 @@ def _meeting(
 class PlanarArm:
     """A planar 3R arm on one branch.
 
-    l1, l2, l3: link lengths [m]. theta2, theta4: their limits. theta3: its limits cut to one side
-    of the stretched and of the folded arm; an end there is that singularity, not a limit. bend: +1
-    where that side is the elbow up, -1 where it is down. axis: u of axis 1 [m]. side: +1 where the
-    tool point must keep u >= axis, -1 where u <= axis.
+    Attributes:
+        l1, l2, l3: link lengths [m].
+        theta2, theta4: the limits of these joints.
+        theta3: its limits, cut to one side of the stretched and of the folded arm. An end there is
+            that singularity, not a limit.
+        bend: +1 where that side is the elbow up, -1 where it is down.
+        axis: u of axis 1 [m].
+        side: +1 where the tool point must keep u >= axis, -1 where u <= axis.
     """
 
     l1: float
@@ -109,11 +126,11 @@ class PlanarArm:
     side: int
 
     def behind(self, u: float) -> float:
-        """How far [m] a point lies across axis 1 from the arm's side; negative on its side."""
+        """Return the distance [m] of a point beyond axis 1; negative on the arm's side."""
         return (self.axis - u) * self.side
 
     def tool(self, posture: Posture) -> tuple[float, float]:
-        """(u, v) [m] of the tool point."""
+        """Return (u, v) [m] of the tool point."""
         a = posture.theta2
         b = a + posture.theta3
         c = b + posture.theta4
@@ -123,10 +140,11 @@ class PlanarArm:
         )
 
     def at(self, u: float, v: float, phi: float) -> Posture | None:
-        """The posture with the tool point at (u, v) and pitch `phi`, if the limits allow it.
+        """Return the posture with the tool point at (u, v) and pitch `phi`, or None.
 
-        The wrist follows from the pitch; theta3 brings it to its distance from the shoulder
-        (subproblem 3, of whose two answers the branch is one), theta2 into place (subproblem 1).
+        The pitch gives the wrist. theta3 brings the wrist to its distance from the shoulder
+        (subproblem 3; the branch chooses one of its two solutions), and theta2 brings it into place
+        (subproblem 1). None means that the limits or the links do not allow it.
         """
         wu, wv = u - self.l3 * math.cos(phi), v - self.l3 * math.sin(phi)
         rho = math.hypot(wu, wv)
@@ -140,7 +158,7 @@ class PlanarArm:
         return self._posture(theta2, theta3, phi - theta2 - theta3)
 
     def pitch_ends(self, u: float, v: float) -> Iterator[Posture]:
-        """The postures at (u, v) with a joint at an end: between them the pitch is free to vary.
+        """Yield the postures at (u, v) with a joint at an end: between them the pitch can vary.
 
         Each end fixes one joint, which leaves two circles that meet in the elbow or the wrist.
         """
@@ -165,13 +183,13 @@ class PlanarArm:
                 yield from self._if_fits(theta2, theta3, theta4)
 
     def nearest(self, u: float, v: float) -> Posture:
-        """The posture with the tool point nearest to a point (u, v) that has none of its own.
+        """Return the posture with the tool point nearest to (u, v), which is out of reach.
 
         The nearest point of the joint box meets the Karush-Kuhn-Tucker conditions: each joint is at
-        an end, or on one line with tool point and target. All such postures are listed and the
-        nearest that the limits allow is taken. Where that lies across axis 1 the tool point may
-        also be on the axis instead. Limits that keep it off the arm's side altogether make that
-        side void.
+        an end, or on one line with tool point and target. All such postures are listed, and the
+        nearest one inside the limits is taken. If that lies across axis 1, the tool point may also
+        be on the axis. If the limits keep the tool point off the arm's side altogether, that
+        condition is dropped.
         """
 
         def misplaced(posture: Posture) -> tuple[bool, float]:
@@ -185,6 +203,7 @@ class PlanarArm:
         return min(self._stationary(u, v, on_axis=True), key=misplaced)
 
     def _stationary(self, u: float, v: float, *, on_axis: bool) -> Iterator[Posture]:
+        """Yield the postures that meet the Karush-Kuhn-Tucker conditions for (u, v)."""
         for theta3, theta4, stretched in self._shapes_beyond_shoulder():
             if self.theta3.fit(theta3) is None or self.theta4.fit(theta4) is None:
                 continue
@@ -211,7 +230,7 @@ class PlanarArm:
                     yield from self._if_fits(theta2, theta3, theta4, singular)
 
     def _shapes_beyond_shoulder(self) -> Iterator[tuple[float, float, bool]]:
-        """(theta3, theta4, stretched) at which a turn about the shoulder may be nearest."""
+        """Yield (theta3, theta4, stretched) at which a turn about the shoulder may be nearest."""
         for theta3 in self.theta3.ends:
             for theta4 in self.theta4.ends:
                 yield theta3, theta4, self._singular(theta3)
@@ -224,7 +243,7 @@ class PlanarArm:
             yield math.pi - bearing, theta4, True
 
     def _shapes_beyond_elbow(self) -> Iterator[tuple[float, bool]]:
-        """(theta4, stretched) at which a turn about the elbow may be nearest."""
+        """Yield (theta4, stretched) at which a turn about the elbow may be nearest."""
         for theta4 in self.theta4.ends:
             yield theta4, False
         yield 0.0, True
@@ -233,7 +252,7 @@ class PlanarArm:
     def _directions(
         self, center: tuple[float, float], radius: float, u: float, v: float, on_axis: bool
     ) -> tuple[float, ...]:
-        """From `center`: towards (u, v), and if asked to where the circle crosses axis 1."""
+        """Return the direction from `center` to (u, v), and with `on_axis` those to axis 1."""
         towards = math.atan2(v - center[1], u - center[0])
         out = self.axis - center[0]
         if not on_axis or abs(out) > radius:

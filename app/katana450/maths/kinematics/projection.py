@@ -1,8 +1,8 @@
-"""What the arm can do with an arbitrary pose: the nearest one it can take, and what it misses.
+"""Projection of an arbitrary pose: the nearest pose that the arm can take, and its errors.
 
-A pose has six freedoms, the arm five: its roll axis always lies in the plane that turns with axis
-1. Which of the six give way is the reading's to say. As a rule position comes first, exactly when
-it can be reached, else the nearest reachable point; then the orientation, as near as possible.
+A pose has six freedoms, the arm has five: its roll axis always lies in the plane that turns with
+axis 1. The priority chooses which freedom gives way. As a rule position comes first: exact if it
+can be reached, else the nearest reachable point. Then comes the orientation, as near as possible.
 """
 
 from __future__ import annotations
@@ -29,25 +29,32 @@ from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import in_limits_turn, nearest_turn, wrapped
 
 POSITION_WORTH_TELLING: Final = 5e-5
-"""[m] Half of the arm's stated precision of 0.1 mm."""
+"""Smallest position error [m] that is reported: half of the arm's stated precision of 0.1 mm."""
 
 ANGLE_WORTH_TELLING: Final = math.radians(0.05)
-"""[rad] Half of the last digit a person is shown."""
+"""Smallest angle error [rad] that is reported: half of the last displayed digit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """The pose the arm takes in place of an asked one, and what is lost; every figure is measured.
+    """The pose that the arm takes in place of a target pose; every error is measured.
 
-    T: (4, 4) that pose T_S_tool. q: (5,) the joint angles [rad] that take it, on `branch`. Both
-    arrays are read-only. position_error [m] and rotation_error [rad]: between the asked pose and
-    `T`. yaw_error [rad]: between the asked tool's roll axis and the arm's plane, which no five-axis
-    arm can follow. pitch_error [rad]: between the two roll axes within that plane, or the two
-    pitches where the reading has the pitch count and not the yaw. roll_error [rad]: the roll that
-    is missing where the pitch is kept and the yaw does not count, else 0.
-    What keeps the arm from coming nearer: limits: indices (from 0) of the axes whose limit does.
-    axis1: axis 1 is in the way, since the branch has no place across it, or the plane passes beside
-    it. reach: the links do, which reach no farther that way.
+    Arrays are read-only.
+
+    Attributes:
+        T: the pose T_S_tool (4, 4) of the arm.
+        q: the joint angles (5,) [rad] that take it.
+        branch: the branch of `q`.
+        position_error, rotation_error: difference [m], [rad] between the target pose and `T`.
+        yaw_error: angle [rad] between the target's roll axis and the arm's plane, which no
+            five-axis arm can follow.
+        pitch_error: angle [rad] between the two roll axes within that plane, or between the two
+            pitches if the priority keeps the pitch and not the yaw.
+        roll_error: roll [rad] that is missing where the pitch is kept and the yaw does not count,
+            else 0.
+        limits: indices (from 0) of the axes whose limit keeps the arm from coming nearer.
+        axis1: True if axis 1 does so: the branch ends there, or the plane passes beside it.
+        reach: True if the length of the links does so.
     """
 
     T: FloatArray
@@ -72,16 +79,24 @@ def project(
     q_hint: npt.ArrayLike | None = None,
     priority: Priority = Priority.POSE,
 ) -> Projection:
-    """The feasible pose nearest to `T` (4, 4) = T_S_tool [m], as `priority` has it.
+    """Return the feasible pose nearest to `T` (4, 4) = T_S_tool [m], by `priority`.
 
-    branch: the branch to stay on; None takes the one that comes nearest, and of equals the one
-    nearest to `q_hint` (5,) [rad]. The hint also says which limit of axis 1 to wait at,
-    which way to go on facing with the tool point on axis 1, and theta1 where the pose leaves it
-    free. within_limits: keep every axis inside its limits. Every valid `T` has an answer: a pitch
-    that no posture has makes PITCH do as POSITION.
+    Every valid `T` has an answer: for a pitch that no posture has, PITCH acts as POSITION.
 
-    Raises InputError for a `T` or `q_hint` that cannot be used, RobotDescriptionError for an arm of
-    another kind.
+    Args:
+        chain: the arm.
+        T: target pose (4, 4).
+        branch: the branch to stay on. None takes the nearest one, and of equal ones the one nearest
+            to `q_hint`.
+        within_limits: keep every axis inside its limits.
+        q_hint: joint angles (5,) [rad]. They also choose the limit of axis 1 to wait at, the
+            direction to face with the tool point on axis 1, and theta1 where the pose leaves it
+            free.
+        priority: the part of the target that is kept.
+
+    Raises:
+        InputError: `T` or `q_hint` is invalid.
+        RobotDescriptionError: the arm is outside the family.
     """
     hint = None if q_hint is None else chain.check_q(q_hint)
     limited = LimitedArm.of(chain, within_limits=within_limits)
@@ -106,9 +121,9 @@ def measured(
     found_posture: NearestPosture,
     q: FloatArray | None = None,
 ) -> Projection:
-    """What `stance` makes of `T` (4, 4) = T_S_tool [m], which `asked` is.
+    """Return the projection that `found_posture` gives for `T` (4, 4) = T_S_tool [m].
 
-    q: its joint angles (5,) [rad] where limits do not count.
+    `canonical` is the same target. `q` (5,) [rad] are the joint angles if limits do not count.
     """
     arm, in_plane = arm_of(chain), found_posture.in_plane
     limits: tuple[int, ...] = ()
@@ -131,7 +146,7 @@ def measured(
     axis1 = position_error > tolerances.SAME_POSITION and _axis_1_binds(
         arm, canonical, found_posture
     )
-    # A yaw that is given up changes the pitch that is nearest.
+    # A missing yaw changes the pitch that is nearest.
     pitched = canonical.priority is not Priority.POSE or yaw_error <= tolerances.SAME_ROTATION
     missed = max(position_error, pitch_error if pitched else 0.0) > tolerances.SAME_POSITION
     return Projection(
@@ -153,9 +168,10 @@ def measured(
 def _axis_1_binds(
     arm: FiveAxisArm, canonical: CanonicalTarget, found_posture: NearestPosture
 ) -> bool:
-    """Whether the asked point is across axis 1 from where the branch ends, or where it cannot turn.
+    """Return True if axis 1 keeps the tool point from coming nearer to the target point.
 
-    A turn of axis 1 moves a tool point beside it outward or inward alone.
+    Either the branch ends at axis 1 and the target is across it, or turning about axis 1 does not
+    help: it moves a tool point beside the axis only outward or inward.
     """
     x, y, _ = arm.tool_point(found_posture.alpha)
     dx, dy = canonical.tool[0] - x, canonical.tool[1] - y
@@ -169,6 +185,7 @@ def _axis_1_binds(
 
 
 def _binding(chain: Chain, q: FloatArray, found_posture: NearestPosture) -> Iterator[int]:
+    """Yield the indices (from 0) of the axes whose limit binds."""
     held = found_posture.in_plane.posture_bound
     may_bind = (found_posture.theta1_bound, held, held, held, found_posture.in_plane.roll_bound)
     if any(may_bind):

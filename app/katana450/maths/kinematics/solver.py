@@ -1,4 +1,4 @@
-"""The closed form for one pose at a time, on plain floats: microseconds for every branch."""
+"""The closed form for one pose at a time, on plain floats: microseconds for all branches."""
 
 from __future__ import annotations
 
@@ -34,10 +34,13 @@ _FLOATS: Final = Functions(math.atan2, math.sqrt, _root, _direction)
 class Solver(NamedTuple):
     """Inverse kinematics of one chain without checks, for loops over many poses.
 
-    arm: the canonical arm. solve(rows, theta1=0.0): `rows` are those of a pose T_S_tool (4, 4) [m],
-    T.tolist(), its rotation orthonormal; theta1 [rad] is taken where the pose leaves it free. The
-    joint angles [rad] come back in the order of BRANCHES, each in the turn inside its limits if
-    there is one, else in [-pi, pi]. inside(q): whether every angle is inside its limits.
+    Attributes:
+        arm: the canonical arm.
+        solve: solve(rows, theta1=0.0). `rows` is T.tolist() of a pose T_S_tool (4, 4) [m] with
+            orthonormal rotation. `theta1` [rad] is used where the pose leaves it free. Returns
+            joint angles [rad] in the order of BRANCHES, each in the turn inside its limits if there
+            is one, else in [-pi, pi].
+        inside: inside(q) is True if every angle is inside its limits.
     """
 
     arm: FiveAxisArm
@@ -47,7 +50,10 @@ class Solver(NamedTuple):
     @staticmethod
     @lru_cache(maxsize=64)
     def of(chain: Chain) -> Solver:
-        """That of `chain`, made once a chain; RobotDescriptionError as `arm_of`."""
+        """Return the solver of `chain`; the result is cached.
+
+        Raises RobotDescriptionError as `arm_of`.
+        """
         arm = arm_of(chain)
         return Solver(arm, _solve(chain, arm), _inside(chain))
 
@@ -58,12 +64,12 @@ Facing = tuple[float, float, float, float, float, float, float, float]
 def facing_near_axis_1(
     arm: FiveAxisArm, x: float, y: float, r11: float, r21: float, free: float
 ) -> Facing:
-    """(alpha1, cos, sin, u) facing the tool point at (x, y), and with the back to it.
+    """Return (alpha1, cos, sin, u) facing the tool point at (x, y), then facing away from it.
 
-    Sound everywhere, but meant for a tool point near axis 1 (or near the cylinder of radius d about
-    it, which no tool point enters), where its place tells little of alpha1: the direction of the
-    tool's x axis (r11, r21) tells more, where it agrees or is the longer of the two. Neither tells
-    anything with the tool upright on axis 1: alpha1 is then `free`.
+    Valid everywhere, but meant for a tool point near axis 1, or near the cylinder of radius d about
+    it, which no tool point enters. There the place of the tool point determines alpha1 poorly. The
+    direction of the tool's x axis (r11, r21) determines it better, if it agrees or is the longer of
+    the two. With the tool upright on axis 1, neither determines alpha1: it is then `free`.
     """
     d, rounding = arm.d, 2.0 * tolerances.ROUNDING * arm.reach
     rho, flat = math.hypot(x, y), math.hypot(r11, r21)
@@ -93,7 +99,7 @@ def facing_near_axis_1(
 def _opposite(
     d: float, x: float, y: float, rho: float, c: float, s: float, u: float
 ) -> tuple[float, float, float]:
-    """The other plane at the distance d from axis 1 that holds the tool point."""
+    """Return the other plane at the distance d from axis 1 that holds the tool point."""
     if d == 0.0 or rho <= tolerances.ON_AXIS:
         return -c, -s, -u
     c, s = d * y - u * x, -d * x - u * y
@@ -157,7 +163,10 @@ def _solve(chain: Chain, arm: FiveAxisArm) -> Callable[..., FourBranches]:
 
 
 def _turned(chain: Chain, arm: FiveAxisArm) -> Callable[[Five], Five] | None:
-    """From canonical angles within a turn to joint angles in theirs; None where they are equal."""
+    """Return the map from canonical angles within a turn to joint angles.
+
+    None means that the map is the identity.
+    """
     lower, upper = chain.lower.tolist(), chain.upper.tolist()
     limits = tuple(zip(arm.signs, arm.shifts, lower, upper, strict=True))
     if all(limit[:2] == (1.0, 0.0) and max(-limit[2], limit[3]) <= math.pi for limit in limits):

@@ -1,6 +1,6 @@
-"""What the joints of an arm at rest carry: its own weight.
+"""Static joint torques of an arm at rest under its own weight.
 
-By virtual work a joint's torque is how fast the weight's energy rises with its angle.
+By virtual work the torque of a joint is the derivative of the potential energy by its angle.
 Source: Lynch & Park, Modern Robotics (2017), ch. 5.2 (statics) and 8.1.1 (potential energy).
 """
 
@@ -18,12 +18,18 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import jacobian_space, joint_frames
 
 GRAVITY: Final = 9.80665
-"""[m/s^2] Standard; along -z of {S}."""
+"""Standard gravity [m/s^2], along -z of {S}."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkLoad:
-    """A mass [kg] that hangs on the first `axes` joints; its centre is (3,) [m] in {S} at q = 0."""
+    """A mass that moves with the first joints of the arm.
+
+    Attributes:
+        axes: the number of joints that move the mass.
+        mass: the mass [kg].
+        centre: centre of mass (3,) [m] in {S} at q = 0.
+    """
 
     axes: int
     mass: float
@@ -31,7 +37,7 @@ class LinkLoad:
 
 
 def holding_torques(chain: Chain, q: npt.ArrayLike, loads: Iterable[LinkLoad]) -> FloatArray:
-    """(n,) torques [N m] about the joints' axes that hold `loads` still at `q` (n,) [rad]."""
+    """Return the torques (n,) [N m] about the joints' axes that hold `loads` at `q` (n,) [rad]."""
     q = chain.check_q(q)
     moved, J = joint_frames(chain, q), jacobian_space(chain, q)
     torques = np.zeros(chain.n)

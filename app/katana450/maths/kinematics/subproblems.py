@@ -1,11 +1,12 @@
 """The Paden-Kahan subproblems: a rotation about one or two axes, solved by geometry.
 
 Axes are given by a unit direction `omega` and a point `r` [m] on them, of any orientation. Angles
-are in rad, in (-pi, pi]. Where no exact angle exists, the angle of least misfit comes back with
-`exact` False. Every angle is an atan2: an arccos loses half its digits where its argument nears 1.
+are in rad, in (-pi, pi]. If no exact angle exists, the angle of the smallest misfit is returned
+with `exact` False. Every angle is an atan2: an arccos loses half its digits where its argument
+nears 1.
 
 Sources: Paden (1986); Murray, Li & Sastry (1994), ch. 3.2.2 (subproblems 1 to 3). Subproblem 4 is
-what remains of the second for an arm whose first joint is alone in turning its plane.
+the part of the second that remains for an arm whose first joint alone turns its plane.
 """
 
 from __future__ import annotations
@@ -31,8 +32,11 @@ from katana450.maths.kinematics.turns import wrapped
 class Rotations:
     """All angles [rad] that solve a subproblem in one angle.
 
-    exact: the equation holds, to rounding; otherwise the angles are those of least misfit. free:
-    the ill-posed case, every angle serves as well as the one given.
+    Attributes:
+        angles: the solutions.
+        exact: True if the equation holds, to rounding; otherwise the angles have the smallest
+            misfit.
+        free: True in the ill-posed case: every angle is as good as the given one.
     """
 
     angles: tuple[float, ...]
@@ -42,7 +46,10 @@ class Rotations:
 
 @dataclass(frozen=True, slots=True)
 class RotationPairs:
-    """All pairs (theta1, theta2) [rad] that solve a subproblem in two angles; flags as above."""
+    """All pairs (theta1, theta2) [rad] that solve a subproblem in two angles.
+
+    `exact` and `free` are those of `Rotations`.
+    """
 
     pairs: tuple[tuple[float, float], ...]
     exact: bool
@@ -56,9 +63,9 @@ def _sqrt(radicand: float) -> float:
 def subproblem1(omega: Vector, r: Vector, p: Vector, q: Vector) -> Rotations:
     """Turn p onto q:  exp(omega theta) p = q.
 
-    One solution. Without an exact one (p and q at different heights along or distances from the
-    axis) the angle that brings p nearest to q. Ill-posed with p or q on the axis: every angle
-    serves, 0 is given. Murray, Li & Sastry, subproblem 1.
+    One solution. If p and q differ in height along the axis or in distance from it, there is no
+    exact solution, and the angle brings p nearest to q. Ill-posed with p or q on the axis: every
+    angle is a solution, and 0 is returned. Murray, Li & Sastry, subproblem 1.
     """
     u, v = sub(p, r), sub(q, r)
     height = dot(omega, sub(u, v))
@@ -72,12 +79,12 @@ def subproblem1(omega: Vector, r: Vector, p: Vector, q: Vector) -> Rotations:
 
 
 def subproblem2(omega1: Vector, omega2: Vector, r: Vector, p: Vector, q: Vector) -> RotationPairs:
-    """Turn p about axis 2, then about axis 1, onto q; the axes cross in r.
+    """Turn p about axis 2, then about axis 1, onto q; the axes intersect in r.
 
     exp(omega1 theta1) exp(omega2 theta2) p = q. Two solutions, which coincide where the circles of
-    p and q touch. Without an exact one, the single pair that brings p nearest to q. Ill-posed with
-    parallel axes (only the sum counts: theta2 is 0) and with p or q in r or on the axis it turns
-    about first or last (that angle is 0). Murray, Li & Sastry, subproblem 2.
+    p and q touch. Without an exact solution, the single pair that brings p nearest to q. Ill-posed
+    with parallel axes (only the sum counts: theta2 is 0), and with p or q in r or on the axis of
+    its first or last turn (that angle is 0). Murray, Li & Sastry, subproblem 2.
     """
     u, v = sub(p, r), sub(q, r)
     length_u, length_v = norm(u), norm(v)
@@ -91,7 +98,7 @@ def subproblem2(omega1: Vector, omega2: Vector, r: Vector, p: Vector, q: Vector)
         exact = misfit <= tolerances.SUBPROBLEM_EXACT
         return RotationPairs(((0.0, 0.0),), exact, free=True)
 
-    # On the unit sphere the misfit is least for the same angles, whatever the two lengths are.
+    # On the unit sphere the same angles have the smallest misfit, for any two lengths.
     u, v = scale(1.0 / length_u, u), scale(1.0 / length_v, v)
     cosine = dot(omega1, omega2)
     on1, on2 = dot(omega1, v), dot(omega2, u)
@@ -119,10 +126,11 @@ def subproblem3(omega: Vector, r: Vector, p: Vector, q: Vector, delta: float) ->
     """Turn p to the distance `delta` [m] from q:  |q - exp(omega theta) p| = delta.
 
     Two solutions, which coincide where the circle of p touches the sphere round q. Without an exact
-    one, the single angle of the nearest distance. Ill-posed with p or q on the axis: the distance
-    is the same at every angle, 0 is given. Murray, Li & Sastry, subproblem 3; the angle between the
-    two arms u, v of the triangle is  2 atan2(sqrt(delta^2 - (u-v)^2), sqrt((u+v)^2 - delta^2)),
-    its differences of squares factored so that digits survive stretched and folded.
+    solution, the single angle of the nearest distance. Ill-posed with p or q on the axis: the
+    distance is the same at every angle, and 0 is returned. Murray, Li & Sastry, subproblem 3. The
+    angle between the two arms u, v of the triangle is
+    2 atan2(sqrt(delta^2 - (u-v)^2), sqrt((u+v)^2 - delta^2)). Its differences of squares are
+    factored, which keeps the digits when the arm is stretched or folded.
     """
     u, v = sub(p, r), sub(q, r)
     height = dot(omega, sub(u, v))
@@ -146,10 +154,11 @@ def subproblem3(omega: Vector, r: Vector, p: Vector, q: Vector, delta: float) ->
 def subproblem4(omega: Vector, r: Vector, p: Vector, h: Vector, d: float) -> Rotations:
     """Turn p into the plane with unit normal h at the offset d [m]:  h . exp(omega theta) p = d.
 
-    Two solutions, which coincide where the circle of p touches the plane. Without an exact one, the
-    single angle that brings p nearest to the plane. Ill-posed with p on the axis or the plane
-    square to it: the offset is the same at every angle, 0 is given. With u = p - r the condition is
-    a sin(theta) + b cos(theta) = c,  a = h . (omega x u),  b = h . u_perpendicular.
+    Two solutions, which coincide where the circle of p touches the plane. Without an exact
+    solution, the single angle that brings p nearest to the plane. Ill-posed with p on the axis, or
+    with the plane perpendicular to it: the offset is the same at every angle, and 0 is returned.
+    With u = p - r the condition is a sin(theta) + b cos(theta) = c,  a = h . (omega x u),  b = h .
+    u_perpendicular.
     """
     u = sub(p, r)
     c = d - dot(h, r) - dot(omega, u) * dot(omega, h)

@@ -21,9 +21,9 @@ from katana450.maths.kinematics.turns import wrapped
 class ToolTarget:
     """The five freedoms of the arm's tool: ``position`` (3,) [m] in {S}, pitch and roll [rad].
 
-    Pitch is the angle of the roll axis below the horizontal and roll the turn about it: of the
-    Katana theta2 + theta3 + theta4 and theta5. Which way the tool points sideways is the arm's to
-    give: the roll axis lies in the plane that turns with axis 1.
+    Pitch is the angle of the roll axis below the horizontal, and roll the turn about it: for the
+    Katana theta2 + theta3 + theta4 and theta5. The yaw follows from the arm: the roll axis lies in
+    the plane that turns with axis 1.
     """
 
     position: FloatArray
@@ -32,25 +32,25 @@ class ToolTarget:
 
     @staticmethod
     def at(chain: Chain, q: FloatArray) -> ToolTarget:
-        """Where the tool is with the joints at `q` (5,) [rad]."""
+        """Return the target at which the tool is with the joints at `q` (5,) [rad]."""
         return ToolTarget(frozen(forward(chain, q)[:3, 3]), *pitch_and_roll(chain, q))
 
     def canonical(self, arm: FiveAxisArm, priority: Priority) -> CanonicalTarget:
-        """The same of the canonical arm."""
+        """Return the same target for the canonical arm."""
         x, y, z = (arm.T_C_S[:3, :3] @ self.position + arm.T_C_S[:3, 3]).tolist()
         return CanonicalTarget.five(arm, (x, y, z), self.pitch, self.roll, priority)
 
     def facing(self, chain: Chain, branch: Branch, theta1: float) -> float:
-        """The theta1 [rad] in (-pi, pi] at which the arm's plane has the position on `branch`.
+        """Return the theta1 [rad] in (-pi, pi] with the position in the arm's plane, on `branch`.
 
-        Over axis 1, where any has, that where the arm stands, `theta1`.
+        Over axis 1, where every plane has it, the result is the present `theta1`.
         """
         arm = arm_of(chain)
         alpha1 = self.canonical(arm, Priority.POSE).facing(arm, branch.shoulder)
         return theta1 if alpha1 is None else wrapped(arm.signs[0] * alpha1)
 
     def pose(self, chain: Chain, theta1: float) -> FloatArray:
-        """T_S_tool (4, 4) with the arm's plane at `theta1` [rad]."""
+        """Return T_S_tool (4, 4) with the arm's plane at `theta1` [rad]."""
         arm = arm_of(chain)
         alpha1 = arm.signs[0] * theta1
         R_C_K = so3.rotation_z(alpha1) @ so3.rotation_y(self.pitch) @ so3.rotation_x(self.roll)
@@ -58,16 +58,16 @@ class ToolTarget:
         return se3.from_rotation_translation(R, self.position)
 
     def turned_round(self) -> ToolTarget:
-        """The same pose in space as the other shoulder counts it, with axis 1 half a turn on.
+        """Return the same pose in space for the other shoulder, with axis 1 turned by half a turn.
 
-        Of an arm whose plane passes beside axis 1, the same but for its yaw.
+        For an arm whose plane passes beside axis 1, the yaw of the pose differs.
         """
         return ToolTarget(
             self.position, wrapped(math.pi - self.pitch), wrapped(self.roll + math.pi)
         )
 
     def towards(self, other: ToolTarget, fraction: float) -> ToolTarget:
-        """The target that `fraction` (0 to 1) of the straight way to `other` leads to."""
+        """Return the target at `fraction` (0 to 1) of the straight path to `other`."""
         return ToolTarget(
             frozen(self.position + fraction * (other.position - self.position)),
             self.pitch + fraction * (other.pitch - self.pitch),

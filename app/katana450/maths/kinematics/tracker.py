@@ -1,10 +1,10 @@
-"""Following a target that a hand drags: the goal goes on from where it is, or holds.
+"""Following a dragged target: the goal moves on from its present place, or holds.
 
 The nearest feasible pose can leap while the target creeps: the limits split the pitches that reach
-a point in two ranges, axis 1 has a gap, and over axis 1 the arm would have to turn round. So the
-nearest pose is only taken where it is one hop from the goal. Elsewhere it is sought within a hop,
-again and again, each time from the pose found last: that never leads away from the target, slides
-along what is in the way, and stops where only a leap would bring the tool nearer.
+a point into two ranges, axis 1 has a gap, and over axis 1 the arm would have to turn round. The
+nearest pose is therefore taken only if it is one hop from the goal. Elsewhere the tracker searches
+within a hop, repeatedly, each time from the last pose found. This never leads away from the target,
+slides along obstacles, and stops where only a leap would bring the tool nearer.
 """
 
 from __future__ import annotations
@@ -38,39 +38,41 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
 HOP: Final = 0.1
-"""[rad] How far an axis may go at once: what the joints do in a twelfth of a second, so that a
-person sees motion and no leap."""
+"""Maximum step of an axis [rad]: the motion of a joint in a twelfth of a second, so that an
+operator sees motion and no leap.
+"""
 
 DRAG_STRIDE: Final = 0.02
-"""[m] A faster drag is followed along its way in strides: about a hop of the joints."""
+"""Step length [m] along the path of a fast drag: about a hop of the joints."""
 
 MAX_PATH_LENGTH: Final = 32
-"""Strides along one drag; a longer one takes longer strides."""
+"""Maximum number of strides along one drag; a longer drag takes longer strides."""
 
 MAX_DISTANCE_RATIO: Final = 16.0
-"""[1] Of the arm's reach: of a hand that is farther away its direction alone counts on the way, so
-that every way has an end."""
+"""Maximum distance of a target, in reaches of the arm [1]. Of a target farther away only the
+direction counts, which bounds the length of every path.
+"""
 
 MAX_POSES: Final = 18
-"""Nearest poses sought in one call. What is farther is reached in the next: the joints need several
-ticks for a hop, so the goal stays ahead of them."""
+"""Maximum number of searches in one call. The next call continues: the joints need several ticks
+for a hop, so the goal stays ahead of them.
+"""
 
 MAX_POSES_OUT_OF_REACH: Final = 3
-"""Looking for the nearest to what cannot be reached takes that many times as long."""
+"""Effort of a search for a target out of reach, in searches."""
 
 MAX_POSES_PER_STRIDE: Final = 2 * MAX_POSES_OUT_OF_REACH
-"""For the hops of one stride: two are enough unless something is in the way."""
+"""Effort for the hops of one stride: two hops are enough without an obstacle."""
 
 MIN_HOP_GAIN: Final = 1e-6
-"""[m], [rad] Coming nearer by less is rounding."""
+"""Smallest gain [m], [rad] of a hop; less is rounding."""
 
 MIN_LEAP_GAIN: Final = 5e-5
-"""[m], [rad] A leap that brings the tool nearer by less than half of the arm's precision is not
-missed."""
+"""Smallest gain [m], [rad] of a leap that is reported: half of the arm's precision."""
 
 
 class TrackingStatus(Enum):
-    """How the goal stands to the target."""
+    """The relation of the goal to the target."""
 
     OK = "ok"
     LIMITED = "limited"
@@ -79,11 +81,14 @@ class TrackingStatus(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """Where the goal goes, and what it would take a leap to get.
+    """The next pose of the goal, and the pose that only a leap would reach.
 
-    best: the pose to go to. since: how far along its way the target has been followed, when `best`
-    is not yet as near as hops lead; the next call goes on from there. ahead: the better pose beyond
-    a gap, or None when `best` is as near as the arm comes on its branch, or under way.
+    Attributes:
+        best: the pose to move to.
+        beyond_gap: the better pose beyond a gap. None when `best` is as near as the arm comes on
+            its branch, or when the search is not complete.
+        since: the place on the target's path up to which the target has been followed, when hops
+            lead nearer than `best`. The next call continues from there.
     """
 
     best: Projection
@@ -92,7 +97,7 @@ class Tracked:
 
     @property
     def status(self) -> TrackingStatus:
-        """HELD when a better pose lies beyond a gap, OK when nothing worth telling is given up."""
+        """GAP with a better pose beyond a gap, OK without a reportable error, else LIMITED."""
         if self.beyond_gap is not None:
             return TrackingStatus.GAP
         given_up = (
@@ -102,11 +107,14 @@ class Tracked:
         return TrackingStatus.LIMITED if given_up else TrackingStatus.OK
 
     def leap_ahead(self) -> tuple[int, float]:
-        """The axis (from 0) that would leap farthest to the pose ahead, and how far [rad]."""
+        """Return the axis (from 0) that would leap farthest to the pose beyond the gap.
+
+        Also returns the angle of the leap [rad]. Without a gap the result is (0, 0.0).
+        """
         if self.beyond_gap is None:
             return 0, 0.0
-        way = np.abs(self.beyond_gap.q - self.best.q)
-        return int(way.argmax()), float(way.max())
+        turns = np.abs(self.beyond_gap.q - self.best.q)
+        return int(turns.argmax()), float(turns.max())
 
 
 def track(
@@ -118,12 +126,20 @@ def track(
     priority: Priority = Priority.POSE,
     since: ToolTarget | None = None,
 ) -> Tracked:
-    """From the goal `q` (5,) [rad] on `branch`, inside the limits, on towards `target`.
+    """Move the goal from `q` (5,) [rad] on `branch`, inside the limits, towards `target`.
 
-    since: where the target was when the goal became `q`; a drag from there that is longer than a
-    stride is followed along its straight way. The goal never changes branch, and a stride of the
-    target moves the goal by more than a hop an axis only along a way on which each hop brings it
-    nearer. One call takes bounded time: see `Tracked.since`.
+    The goal never changes branch. A stride of the target moves an axis of the goal by more than a
+    hop only along a path on which each hop brings it nearer. One call takes bounded time: see
+    `Tracked.since`.
+
+    Args:
+        chain: the arm.
+        q: joint angles (5,) [rad] of the goal.
+        target: the target.
+        branch: the branch of the goal.
+        priority: the part of the target that is kept.
+        since: the target when the goal became `q`. A drag from there that is longer than a stride
+            is followed along its straight path.
     """
     limited = LimitedArm.of(chain)
     alpha = limited.arm.angles(chain.clamp(q))
@@ -133,9 +149,9 @@ def track(
         return Tracked(
             _projection(chain, target, canonical, _not_away(limited.arm, alpha, canonical, ahead))
         )
-    # One hop at least, so that there is an end.
+    # One hop at least, so that the loop ends.
     effort = max(MAX_POSES - _effort(ahead), 1)
-    for stop in () if since is None else _way(limited.arm, since, target):
+    for stop in () if since is None else _stops(limited.arm, since, target):
         stop_target = stop.canonical(limited.arm, priority)
         pursuit = _Pursuit(
             limited, stop_target, nearest_posture(limited, stop_target, branch, alpha)
@@ -158,9 +174,10 @@ def track(
 def leap(
     chain: Chain, q: FloatArray, target: ToolTarget, branch: Branch, priority: Priority
 ) -> Projection:
-    """The nearest pose to `target` on `branch`, however far from the goal `q` (5,) [rad].
+    """Return the nearest pose to `target` on `branch`, at any distance from the goal.
 
-    Pitch and roll are taken in the plane the arm comes to stand in. Errors as of `project`.
+    `q` (5,) [rad] is the goal. Pitch and roll are taken in the plane in which the arm ends. Errors
+    as for `project`.
     """
     limited = LimitedArm.of(chain)
     canonical = target.canonical(limited.arm, priority)
@@ -173,6 +190,7 @@ def leap(
 def _projection(
     chain: Chain, target: ToolTarget, canonical: CanonicalTarget, found_posture: NearestPosture
 ) -> Projection:
+    """Return the projection of `target` that `found_posture` gives."""
     sign = LimitedArm.of(chain).arm.signs[0]
     return measured(
         chain, target.pose(chain, sign * found_posture.alpha[0]), canonical, found_posture
@@ -180,12 +198,13 @@ def _projection(
 
 
 def _near(arm: FiveAxisArm, target: ToolTarget) -> ToolTarget:
+    """Return `target`, moved towards the origin to the maximum distance if it is beyond."""
     far = math.hypot(*target.position) / (MAX_DISTANCE_RATIO * arm.reach)
     return target if far <= 1.0 else replace(target, position=target.position / far)
 
 
-def _way(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
-    """The stops of the drag, without its ends."""
+def _stops(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
+    """Return the stops on the path of the drag, without its ends."""
     since, target = _near(arm, since), _near(arm, target)
     strides = max(
         math.dist(since.position, target.position) / DRAG_STRIDE,
@@ -197,9 +216,11 @@ def _way(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[To
 
 
 class _Pursuit:
-    """The way in hops to `asked`, of which `best` is the nearest pose.
+    """The search in hops for `canonical`, whose nearest pose is `best`.
 
-    effort: what looking for them took. ended: whether no further one would lead nearer.
+    Attributes:
+        effort: the effort of the hops so far.
+        ended: True if no further hop would lead nearer.
     """
 
     def __init__(
@@ -212,7 +233,10 @@ class _Pursuit:
         self.ended = False
 
     def follow(self, alpha: Five, maximum: int) -> NearestPosture:
-        """`best` if it is a hop away, else where hops from `alpha` of so much effort lead."""
+        """Return `best` if it is a hop away, else the end of the hops from `alpha`.
+
+        `maximum` is the maximum effort of the hops.
+        """
         arm = self.limited.arm
         found, miss = None, _misses(arm, self.canonical, alpha)
         while not self.ended and self.effort < maximum:
@@ -223,18 +247,19 @@ class _Pursuit:
             self.effort += _effort(hop)
             hop_miss = _misses(arm, self.canonical, hop.alpha)
             worthwhile = _nearer(hop_miss, miss, MIN_HOP_GAIN)
-            # Where not the bounds of the hop hold it, another one would lead nowhere.
+            # If the bounds of the hop do not bind, another hop would lead nowhere.
             self.ended = not worthwhile or _within(HOP * (1.0 - MIN_HOP_GAIN), alpha, hop.alpha)
             if worthwhile or (found is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
                 found, alpha, miss = hop, hop.alpha, hop_miss
             else:
-                # It stands, for what holds the hop.
+                # The goal stays, with the constraints that bind the hop.
                 found = hop._replace(alpha=alpha)
         assert found is not None
         return found
 
 
 def _effort(found_posture: NearestPosture) -> int:
+    """Return the effort of a search, larger for a target out of reach."""
     reached = found_posture.position_error <= tolerances.SAME_POSITION
     return found_posture.searches * (1 if reached else MAX_POSES_OUT_OF_REACH)
 
@@ -242,7 +267,7 @@ def _effort(found_posture: NearestPosture) -> int:
 def _not_away(
     arm: FiveAxisArm, alpha: Five, canonical: CanonicalTarget, best: NearestPosture
 ) -> NearestPosture:
-    """`best`, but not where it only ends near the nearest place, farther from it than `alpha`."""
+    """Return `best`, but stay at `alpha` if `best` is an approximation that is farther away."""
     if arm.off_axis == 0.0:
         return best
     miss, miss_best = (_misses(arm, canonical, angles) for angles in (alpha, best.alpha))
@@ -253,11 +278,11 @@ def _not_away(
 def _hop(
     limited: LimitedArm, alpha: Five, canonical: CanonicalTarget, branch: Branch
 ) -> NearestPosture:
-    """The nearest pose with every axis within a hop of `alpha`."""
+    """Return the nearest pose with every axis within a hop of `alpha`."""
     arm = limited.arm
     theta1 = _theta1(limited, alpha[0], canonical, branch)
     if canonical.priority is Priority.PITCH:
-        # The pitch comes first, and no posture within a hop has one that is farther away.
+        # The pitch comes first, and no posture within a hop differs more in pitch.
         pitch = arm.pitch(alpha)
         turn = wrapped(canonical.pitch(alpha[0]) - pitch)
         canonical = canonical.pitched(arm, pitch + min(max(turn, -HOP), HOP))
@@ -267,14 +292,15 @@ def _hop(
 def _theta1(
     limited: LimitedArm, theta1: float, canonical: CanonicalTarget, branch: Branch
 ) -> Interval:
-    """Where axis 1 may go from `theta1` in a hop, which is the way that leads nearer."""
+    """Return the range of axis 1 within a hop of `theta1`, in the direction that leads nearer."""
     facing = canonical.facing(limited.arm, branch.shoulder)
     if facing is None:
         return Interval(theta1, theta1)
     turn = wrapped(facing - theta1)
     aside = canonical.aside(limited.arm)
     if aside != 0.0:
-        # A plane beside axis 1 comes nearer on one way round, though it may be the longer one.
+        # A plane beside axis 1 comes nearer in one direction of turning, even if that is the longer
+        # one.
         square = math.copysign(0.5 * math.pi, aside) - (
             math.atan2(canonical.y, canonical.x) - facing
         )
@@ -299,20 +325,23 @@ def _within_hop(a: Five, b: Five) -> bool:
 
 
 def _misses(arm: FiveAxisArm, canonical: CanonicalTarget, alpha: Five) -> tuple[float, ...]:
-    """What `alpha` misses of `asked` [m], [rad], what counts most first."""
+    """Return the errors [m], [rad] of `alpha`, in the order of the priority."""
     position = math.dist(arm.tool_point(alpha), canonical.tool)
     pitch, roll = arm.pitch(alpha), alpha[4]
     if canonical.priority is Priority.POSE:
         return position, canonical.orientation.angle(pitch, roll)
-    wished_pitch, wished_roll = canonical.orientation.best()
-    pitch, roll = abs(wrapped(pitch - wished_pitch)), abs(wrapped(roll - wished_roll))
+    target_pitch, target_roll = canonical.orientation.best()
+    pitch, roll = abs(wrapped(pitch - target_pitch)), abs(wrapped(roll - target_roll))
     if canonical.priority is Priority.PITCH:
         return pitch, position, roll
     return position, pitch, roll
 
 
 def _nearer(a: tuple[float, ...], b: tuple[float, ...], by: float) -> bool:
-    """Whether the misses `a` are less than `b` by more than `by`, and none before it is more."""
+    """Return True if the errors `a` are less than `b` by more than `by`, in order of priority.
+
+    An earlier error that is larger makes the result False.
+    """
     for miss_a, miss_b in zip(a, b, strict=True):
         if miss_a < miss_b - by:
             return True

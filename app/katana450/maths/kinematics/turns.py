@@ -1,4 +1,4 @@
-"""Which of the angles that differ by whole turns to take. Angles in rad."""
+"""The choice between angles that differ by whole turns. Angles in rad."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from katana450.maths.kinematics.chain import Chain
 
 
 def wrapped(theta: float) -> float:
-    """`theta` in (-pi, pi]."""
+    """Return `theta` wrapped to (-pi, pi]."""
     theta = math.remainder(theta, math.tau)
     return math.pi if theta == -math.pi else theta
 
 
 def in_turn(theta: float, lower: float, upper: float) -> float:
-    """`theta` in the turn between the limits if there is one, else in (-pi, pi]."""
+    """Return `theta` in the turn between the limits if there is one, else in (-pi, pi]."""
     theta = wrapped(theta)
     lower, upper = lower - tolerances.LIMIT_SLACK, upper + tolerances.LIMIT_SLACK
     if lower <= theta <= upper:
         return theta
-    # The first turn past the limit that it misses.
+    # The first turn that is not beyond the violated limit.
     turns = math.ceil((lower - theta) / math.tau)
     if theta > upper:
         turns = math.floor((upper - theta) / math.tau)
@@ -32,13 +32,13 @@ def in_turn(theta: float, lower: float, upper: float) -> float:
 
 
 def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:
-    """`q` (n,), each angle in the turn inside its limits if there is one, else wrapped."""
+    """Return `q` (n,), each angle in the turn inside its limits if there is one, else wrapped."""
     limits = zip(q.tolist(), chain.lower.tolist(), chain.upper.tolist(), strict=True)
     return np.array([in_turn(theta, lower, upper) for theta, lower, upper in limits])
 
 
 def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatArray:
-    """`q` (n,), each angle in that turn nearest to `hint` (n,) which is inside its limits.
+    """Return `q` (n,), each angle in the turn nearest to `hint` (n,) inside its limits.
 
     Only limits wider than a turn leave this choice.
     """

@@ -1,9 +1,10 @@
-"""What the arm can do at once: how fast, in which directions, how near to where it loses one.
+"""Velocities of the arm: jogging, speed of the tool point, and distance from singularities.
 
-A twist has two units, so singular values mean something only with a length in them: translations
-are divided by the arm's characteristic length. Twists are (omega, v), v that of the tool point.
-Sources: Yoshikawa (1985) for the manipulability; Nakamura & Hanafusa (1986) for the damping;
-Lynch & Park, Modern Robotics (2017), ch. 5.3 and 5.4.
+A twist has two units, so singular values need a length to be comparable: translations are divided
+by the arm's characteristic length. Twists are (omega, v), with v the velocity of the tool point.
+
+Sources: Yoshikawa (1985) for the manipulability; Nakamura & Hanafusa (1986) for the damping; Lynch
+& Park, Modern Robotics (2017), ch. 5.3 and 5.4.
 """
 
 from __future__ import annotations
@@ -25,19 +26,22 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, joint_frames
 
 WELL_CONDITIONED: Final = 0.05
-"""[1] Smallest singular value from which on joint rates are not damped."""
+"""Singular value [1] from which on joint rates are not damped."""
 
 STRONGEST_DAMPING: Final = 0.05
-"""[1] Damping where a singular value is 0, falling to none at WELL_CONDITIONED: joint rates of a
-unit wish stay below 1.21 / WELL_CONDITIONED, not far above what they are where damping begins."""
+"""Damping [1] where a singular value is 0; it falls to zero at WELL_CONDITIONED. Joint rates for a
+unit twist stay below 1.21 / WELL_CONDITIONED, little above their values where damping begins.
+"""
 
 
 SLOW: Final = 1e-3
-"""[rad/s], over the length: a wish that no joint is too slow for. [s] A time that is short."""
+"""A task velocity [rad/s] (translations over the length) within every joint's speed; also a short
+duration [s].
+"""
 
 
 class JogFrame(Enum):
-    """Whose axes a jog is along; its linear velocity is that of the tool point either way."""
+    """The frame of a jog's axes; the linear velocity is that of the tool point in both frames."""
 
     BASE = "base"
     TOOL = "tool"
@@ -47,8 +51,10 @@ class JogFrame(Enum):
 class VelocityEllipsoid:
     """Velocities of the tool point with joint rates of unit norm.
 
-    axes: (3, 3), the principal directions in {S} as columns, right-handed. radii: (3,) [m/rad],
-    falling. Where a radius is 0 the arm cannot move the tool point that way.
+    Attributes:
+        axes: principal directions in {S} as columns (3, 3), right-handed.
+        radii: radii (3,) [m/rad] in falling order. Where a radius is 0 the arm cannot move the tool
+            point in that direction.
     """
 
     axes: FloatArray
@@ -57,9 +63,9 @@ class VelocityEllipsoid:
 
 @lru_cache(maxsize=16)
 def characteristic_length(chain: Chain) -> float:
-    """[m] Root mean square over the joints of the tool point's distance from their axes, at q = 0.
+    """Return the root mean square distance [m] of the tool point from the joint axes at q = 0.
 
-    A joint rate moves the tool by about as much along as it turns it, counted in this length.
+    Over this length, a joint rate moves the tool by about as much as it turns it.
     """
     p = chain.M[:3, 3]
     arms = [np.linalg.norm(np.cross(axis[:3], p - screws.point_on(axis))) for axis in chain.S.T]
@@ -67,31 +73,37 @@ def characteristic_length(chain: Chain) -> float:
 
 
 def singular_values(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """(n,) singular values [1] of the Jacobian at `q` (n,) [rad], falling; 0 in a singularity."""
+    """Return the singular values (n,) [1] of the Jacobian at `q` (n,) [rad], in falling order.
+
+    The last one is 0 in a singularity.
+    """
     J = jacobian_body(chain, q)
     J[3:] /= characteristic_length(chain)
     return np.asarray(np.linalg.svd(J, compute_uv=False))
 
 
 def manipulability(chain: Chain, q: npt.ArrayLike) -> float:
-    """Yoshikawa's measure [1]: sqrt(det(J^T J)), the product of the singular values."""
+    """Return Yoshikawa's measure [1]: sqrt(det(J^T J)), the product of the singular values."""
     return float(np.prod(singular_values(chain, q)))
 
 
 def condition_number(chain: Chain, q: npt.ArrayLike) -> float:
-    """Largest over smallest singular value, at least 1; infinite in a singularity."""
+    """Return the largest over the smallest singular value, at least 1.
+
+    The value is infinite in a singularity.
+    """
     values = singular_values(chain, q)
     return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf
 
 
 def limit_distances(chain: Chain, q: npt.ArrayLike) -> FloatArray:
-    """(n,) [rad] from each joint of `q` (n,) to its nearer limit; negative beyond it."""
+    """Return the distance (n,) [rad] of each joint from its nearer limit; negative beyond it."""
     q = chain.check_q(q)
     return np.minimum(q - chain.lower, chain.upper - q)
 
 
 def velocity_ellipsoid(chain: Chain, q: npt.ArrayLike) -> VelocityEllipsoid:
-    """Of the translational Jacobian of the tool point at `q` (n,) [rad]."""
+    """Return the ellipsoid of the tool point's translational Jacobian at `q` (n,) [rad]."""
     R = forward(chain, q)[:3, :3]
     axes, radii, _ = np.linalg.svd(R @ jacobian_body(chain, q)[3:])
     if np.linalg.det(axes) < 0.0:
@@ -108,27 +120,34 @@ def jog(
     *,
     bounds: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
-    """(5,) joint rates [rad/s] that move the tool with the twist `V` (6,) [rad/s, m/s].
+    """Return the joint rates (5,) [rad/s] that move the tool with the twist `V` (6,).
 
-    Of a rotation the arm can do two components, about the axes of pitch and of roll; the third is
-    left to follow from where the tool goes. Damped least squares: the rates stay bounded near a
-    singularity, and what is lost there is lost along the lost direction. A joint that would pass
-    its limit within `dt` [s] stops there and the others make up for it as they can. If a joint
-    would be too fast all are slowed alike, so the direction is kept.
+    The unit of `V` is [rad/s, m/s]. The arm can follow two components of a rotation, about the axes
+    of pitch and of roll; the third follows from the path of the tool. Damped least squares keep the
+    rates bounded near a singularity, where only motion along the lost direction is lost. A joint
+    that would pass its limit within `dt` [s] stops there, and the others compensate as far as they
+    can. If a joint would be too fast, all are slowed by the same factor, so the direction is kept.
 
-    bounds: the least and the most (n,) [rad/s] that each joint may have besides, around 0; those of
-    a joint that has mass and comes up to its limit.
+    Args:
+        chain: the arm.
+        q: joint angles (5,) [rad].
+        V: twist (6,) in `frame`.
+        frame: the frame of the twist.
+        dt: duration of the jog [s].
+        bounds: additional minimum and maximum rate (n,) [rad/s] of each joint, around 0. They bound
+            a joint with inertia that approaches its limit.
 
-    Raises InputError for a `q` or `V` that cannot be used, or a `dt` that is not above 0.
+    Raises:
+        InputError: `q` or `V` is invalid, or `dt` is not above 0.
     """
     if not (math.isfinite(dt) and dt > 0.0):
-        raise InputError(f"A jog lasts some time above 0 s, not {dt:g} s.")
+        raise InputError(f"The duration of a jog must be finite and above 0 s, not {dt:g} s.")
     q = chain.check_q(q)
     V = finite_array(V, (6,), "The twist")
     J, wanted = _task(chain, q, V, frame)
-    # Slowed before the limits are looked at: what the arm is too slow for passes none.
+    # Slowed before the limits are checked: motion that the arm is too slow for reaches no limit.
     wanted /= _excess(chain, _damped(J, wanted))
-    # A joint beyond its limit may come back, and need not.
+    # A joint beyond its limit may return, but need not.
     maximum = np.maximum((chain.upper - q) / dt, 0.0)
     minimum = np.minimum((chain.lower - q) / dt, 0.0)
     if bounds is not None:
@@ -147,10 +166,10 @@ def jog(
 
 
 def limited_jog(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None = None) -> float:
-    """The fraction of the twist `V` (6,) in {S} that a jog at `q` (n,) [rad] follows, from 0 to 1.
+    """Return the fraction, from 0 to 1, of the twist `V` (6,) in {S} that a jog can follow.
 
-    However fast it is. edge: so far from a limit [rad] a joint does not go towards it; None leaves
-    limits aside.
+    The speed of the twist does not count; `q` (n,) are joint angles [rad]. A joint nearer than
+    `edge` [rad] to a limit does not move towards it; None ignores limits.
     """
     J, wanted = _task(chain, q, V, JogFrame.BASE)
     size = float(wanted @ wanted)
@@ -166,10 +185,10 @@ def limited_jog(chain: Chain, q: FloatArray, V: FloatArray, edge: float | None =
 
 
 def tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:
-    """How fast the tool point is [m/s] at `q` (5,) [rad] with the joint rates `qd` (5,) [rad/s].
+    """Return the speed of the tool point [m/s] at `q` (5,) [rad] with the rates `qd` (5,) [rad/s].
 
-    On plain floats, for a control tick. Exact for a tool point on the roll axis; one beside it may
-    be slower than this says, and never is faster.
+    Uses plain floats, for a control tick. Exact for a tool point on the roll axis; for one beside
+    the axis this is an upper bound.
     """
     arm = arm_of(chain)
     _, two, three, four, _ = arm.canonical(q).tolist()
@@ -189,7 +208,10 @@ def tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:
 
 
 def tool_speed_bound(chain: Chain, qd: FloatArray) -> float:
-    """[m/s] No posture has a greater `tool_speed` with rates of up to `qd` (5,) [rad/s] each."""
+    """Return the maximum of `tool_speed` [m/s] over all postures.
+
+    `qd` (5,) are the maximum joint rates [rad/s].
+    """
     arm = arm_of(chain)
     pan, first, second, third, roll = np.abs(qd).tolist()
     l2, l3 = arm.l2 + arm.l3, arm.l3
@@ -200,21 +222,21 @@ def tool_speed_bound(chain: Chain, qd: FloatArray) -> float:
 
 
 def _excess(chain: Chain, qd: FloatArray) -> float:
-    """By what factor the rates `qd` (n,) [rad/s] are too fast for the joints; at least 1."""
+    """Return the factor, at least 1, by which `qd` (n,) [rad/s] is too fast for the joints."""
     return max(1.0, float((np.abs(qd) / chain.speed).max()))
 
 
 def _task(
     chain: Chain, q: FloatArray, V: FloatArray, frame: JogFrame
 ) -> tuple[FloatArray, FloatArray]:
-    """Jacobian (5, n) and wish (5,) of what the arm can follow: pitch, roll, and v over a length.
+    """Return Jacobian (5, n) and task (5,): pitch and roll rate, and v over a length.
 
-    All in the tool frame, at the tool point.
+    All components are in the tool frame, at the tool point.
     """
     R = forward(chain, q)[:3, :3]
     omega, v = (V[:3], V[3:]) if frame is JogFrame.TOOL else (R.T @ V[:3], R.T @ V[3:])
     frames = joint_frames(chain, q)
-    # Parallel axes stay parallel: axis 2 is the axis of pitch, and of roll the last.
+    # Parallel axes stay parallel: axis 2 is the pitch axis. The last axis is the roll axis.
     pitch_axis = R.T @ frames[1][:3, :3] @ chain.S[:3, 1]
     roll_axis = R.T @ frames[-1][:3, :3] @ chain.S[:3, -1]
     length = characteristic_length(chain)
@@ -224,7 +246,7 @@ def _task(
 
 
 def _damped(J: FloatArray, wanted: FloatArray) -> FloatArray:
-    """The rates for `wanted`, each singular direction damped as its singular value vanishes."""
+    """Return the rates for `wanted`, with damping where a singular value vanishes."""
     U, values, Vt = np.linalg.svd(J, full_matrices=False)
     shortfall = np.clip(1.0 - values / WELL_CONDITIONED, 0.0, 1.0)
     square = np.square(STRONGEST_DAMPING * shortfall)

@@ -1,1 +1,1 @@
-"""How a commanded joint position moves in time. Pure: time comes in as an argument."""
+"""The motion of a commanded joint position in time. Pure: time is an argument."""

@@ -1,9 +1,9 @@
-"""From goals to setpoints that a real arm can follow: bounded speed, acceleration and jerk.
+"""Setpoints that a real arm can follow to a goal: bounded speed, acceleration and jerk.
 
-Each step is planned anew from where the motion is to rest at the goal (Berscheid and Kroeger,
-"Jerk-limited real-time trajectory generation with arbitrary target states", RSS 2021, as the
-library ruckig does it) and its first ``dt`` is taken. So a goal may change at any tick, and from
-any state there is a way to stop. Angles in rad, times in s, arrays of one value a joint.
+Each step is planned from the present motion to rest at the goal (Berscheid and Kroeger,
+"Jerk-limited real-time trajectory generation with arbitrary target states", RSS 2021, as in the
+library ruckig), and its first ``dt`` is taken. A goal may therefore change at any tick, and every
+state can be stopped. Angles in rad, times in s, arrays with one value per joint.
 """
 
 from __future__ import annotations
@@ -27,23 +27,32 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 LINE_TOLERANCE = 1e-6
-"""Of the limits: a motion this little beside the line to its goal is on it."""
+"""Fraction of the limits: a motion that deviates less from the line to its goal is on the line."""
 
 LIMIT_TOLERANCE = 1e-9
-"""[rad] A plan that ends at a limit may miss it by rounding."""
+"""Tolerance [rad] at a limit: a plan that ends there may miss it by rounding."""
 
 VALID_RESULTS = (Result.Working, Result.Finished)
 
 BOUND_BRAKE_FRACTION = 0.7
-"""Of acceleration and jerk, what a joint that is led along a bound brakes with."""
+"""Fraction of acceleration and jerk with which a joint led along a bound brakes."""
 
 MIN_SPEED_FRACTION = 1e-3
-"""Of the speed; slower than that takes ages and is a hold."""
+"""Minimum fraction of the speed; anything slower is effectively a hold."""
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Of each joint: (n,) lower, upper [rad], speed [rad/s], acceleration, jerk [rad/s^3]."""
+    """The limits of each joint; all arrays (n,).
+
+    Raises InputError for limits that are not finite, not positive or not in order.
+
+    Attributes:
+        lower, upper: limits of position [rad].
+        speed: maximum speed [rad/s].
+        acceleration: maximum acceleration [rad/s^2].
+        jerk: maximum jerk [rad/s^3].
+    """
 
     lower: FloatArray
     upper: FloatArray
@@ -65,7 +74,7 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """Where the joints are and how they move: q, qd, qdd, (n,) each [rad, rad/s, rad/s^2]."""
+    """Positions, rates and accelerations of the joints: q, qd, qdd, (n,) [rad, rad/s, rad/s^2]."""
 
     q: FloatArray
     qd: FloatArray
@@ -73,18 +82,18 @@ class JointMotion:
 
     @staticmethod
     def rest(q: FloatArray) -> JointMotion:
-        """Standing still at ``q`` (n,)."""
+        """Return the motion at rest at ``q`` (n,) [rad]."""
         zero = frozen(np.zeros(len(q)))
         return JointMotion(frozen(q), zero, zero)
 
     @property
     def at_rest(self) -> bool:
-        """Whether nothing moves, or is about to."""
+        """True if all rates and accelerations are zero."""
         return not (self.qd.any() or self.qdd.any())
 
 
 class Limiter:
-    """Steps of one arm's motion. Its methods are pure; it is for one thread."""
+    """Steps of one arm's motion. Its methods are pure; use it from one thread only."""
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
@@ -103,12 +112,12 @@ class Limiter:
     def towards(
         self, now: JointMotion, goal: FloatArray, dt: float, fraction: float = 1.0
     ) -> JointMotion:
-        """The motion ``dt`` [s] on, on its way to rest at ``goal`` (n,) inside the limits.
+        """Return the motion after ``dt`` [s] that leads to rest at ``goal`` (n,) inside the limits.
 
         All joints arrive together. A motion that heads straight for the goal, as one from rest
-        does, stays on the straight line to it; one under way to another goal bends over to it.
-        share: of the greatest speed, above 0 and up to 1. From rest inside the limits no step
-        leaves them, however often the goal changes.
+        does, stays on the straight line to it. A motion towards another goal bends over to it.
+        ``fraction`` scales the maximum speed, above 0 and up to 1. From rest inside the limits no
+        step leaves them, however often the goal changes.
         """
         if dt <= 0.0 or (now.at_rest and (now.q == goal).all()):
             return now
@@ -122,16 +131,18 @@ class Limiter:
             self._input.synchronization = synchronization
             if self._planned() and self._inside():
                 return self._at(dt, goal)
-        # Each joint alone would still leave its limits, so it came too fast: stop first.
+        # Even unsynchronized joints would leave their limits, so the motion is too fast: stop
+        # first.
         return self.stop(now, dt)
 
     def at_rate(
         self, now: JointMotion, qd: FloatArray, dt: float, fraction: float = 1.0
     ) -> JointMotion:
-        """The motion ``dt`` [s] on, on its way to the joint rates ``qd`` (n,) [rad/s].
+        """Return the motion after ``dt`` [s] on its path to the joint rates ``qd`` (n,) [rad/s].
 
-        The joints get to them in step, so that the direction stays what it is. Where one could then
-        not stop before its limit it brakes as hard as it may, and the others go on by themselves.
+        The joints reach the rates together, which keeps the direction. A joint that could then not
+        stop before its limit brakes as hard as possible, and the others continue unsynchronized.
+        ``fraction`` scales the maximum speed.
         """
         if dt <= 0.0:
             return now
@@ -148,9 +159,10 @@ class Limiter:
         return self.stop(now, dt)
 
     def stoppable(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The least and the most rates (n,) [rad/s] that joints at ``q`` (n,) can lose in time.
+        """Return the minimum and maximum rates (n,) [rad/s] from which the joints can stop.
 
-        Braking takes v^2 / 2a + v a / 2j, or v^(3/2) / j^(1/2) where the jerk alone bounds it.
+        ``q`` (n,) [rad] is the present place. Braking takes v^2 / 2a + v a / 2j, or v^(3/2) /
+        j^(1/2) where the jerk alone bounds it.
         """
         a, j = (
             BOUND_BRAKE_FRACTION * self.limits.acceleration,
@@ -163,7 +175,10 @@ class Limiter:
         return -minimum, maximum
 
     def pause(self, now: JointMotion, goal: FloatArray, dt: float) -> JointMotion:
-        """The motion ``dt`` [s] on when it brakes on its way to ``goal``, so that it can go on."""
+        """Return the motion after ``dt`` [s] that brakes on the path to ``goal``.
+
+        It can continue on the path later.
+        """
         if dt <= 0.0 or now.at_rest:
             return now
         line = self._line_to(now, goal, 1.0)
@@ -174,13 +189,13 @@ class Limiter:
         return self.stop(now, dt)
 
     def stop(self, now: JointMotion, dt: float) -> JointMotion:
-        """The motion ``dt`` [s] on when every joint brakes as hard as it may."""
+        """Return the motion after ``dt`` [s] when every joint brakes as hard as possible."""
         if dt <= 0.0 or now.at_rest:
             return now
         return self._rates(now, np.zeros(len(now.q)), dt, 1.0, Synchronization.No)
 
     def stopping_point(self, now: JointMotion) -> FloatArray:
-        """(n,) where the joints come to rest when they brake now [rad]."""
+        """Return the place (n,) [rad] where the joints come to rest when they brake now."""
         if now.at_rest:
             return now.q
         self._brake(now)
@@ -188,36 +203,37 @@ class Limiter:
         return np.array(q)
 
     def stopping_path(self, now: JointMotion, longest: float) -> list[FloatArray]:
-        """Where the joints pass when they brake now, (n,) each, the present place first.
+        """Return places (n,) [rad] on the braking path, the present place first.
 
-        longest: [rad] all joints together move no farther from one to the next.
+        From one place to the next all joints together move at most ``longest`` [rad].
         """
         if now.at_rest:
             return [now.q]
         self._brake(now)
         trajectory = self._trajectory
         end, _, _ = trajectory.at_time(trajectory.duration)
-        # Each joint only goes on as it goes, or back from where it was about to: twice is enough.
+        # Each joint either continues in its direction or returns to it: twice the distance is
+        # enough.
         pieces = max(1, math.ceil(2.0 * float(np.abs(np.array(end) - now.q).sum()) / longest))
         times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
         return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
 
     def braking(self, now: JointMotion) -> tuple[Callable[[float], JointMotion], float]:
-        """The motion by time from now on [s] when every joint brakes, and how long that takes [s].
+        """Return the braking motion by time from now [s], and its duration [s].
 
-        To be used before anything else is asked of this limiter.
+        The function is valid only until the next call of this limiter.
         """
         self._brake(now)
         at = self._trajectory.at_time
         return lambda t: JointMotion(*map(np.array, at(t))), self._trajectory.duration
 
     def fastest(self, now: JointMotion) -> FloatArray:
-        """(n,) the greatest rates while they brake from now on [rad/s]: they may still rise."""
+        """Return the maximum rates (n,) [rad/s] while braking from now on: they may still rise."""
         rise = now.qdd * np.abs(now.qdd) / (2.0 * self.limits.jerk)
         return np.maximum(np.abs(now.qd), np.abs(now.qd + rise))
 
     def stopping_time(self, now: JointMotion) -> float:
-        """[s] until then."""
+        """Return the time [s] until the joints come to rest when they brake now."""
         if now.at_rest:
             return 0.0
         self._brake(now)
@@ -226,7 +242,7 @@ class Limiter:
     def _along(
         self, now: JointMotion, goal: FloatArray, dt: float, fraction: float
     ) -> JointMotion | None:
-        """The step on the straight line to ``goal``, or None when the motion is not on it."""
+        """Return the step on the straight line to ``goal``; None when the motion is not on it."""
         line = self._line_to(now, goal, fraction)
         if line is None:
             return None
@@ -241,12 +257,15 @@ class Limiter:
         return self._on_line(now, line, dt)
 
     def _line_to(self, now: JointMotion, goal: FloatArray, fraction: float) -> FloatArray | None:
-        """The direction (n,) to ``goal``, the plan along it prepared; None when not on the way."""
-        way = goal - now.q
-        length = float(np.linalg.norm(way))
+        """Return the direction (n,) to ``goal`` and prepare the plan along the line.
+
+        None means that the motion is not on the line.
+        """
+        offset = goal - now.q
+        length = float(np.linalg.norm(offset))
         if length == 0.0:
             return None
-        d = way / length
+        d = offset / length
         limits, line = self.limits, self._line
         v, a = float(now.qd @ d), float(now.qdd @ d)
         beside = max(
@@ -301,11 +320,11 @@ class Limiter:
     ) -> None:
         self._start(now, ControlInterface.Velocity, fraction)
         self._input.target_velocity = qd
-        for way in (synchronization, Synchronization.No):
-            self._input.synchronization = way
+        for choice in (synchronization, Synchronization.No):
+            self._input.synchronization = choice
             if self._planned():
                 return
-        raise ArithmeticError("No way to brake was found, which is a fault of the limiter.")
+        raise ArithmeticError("The limiter found no braking motion. This is a bug.")
 
     def _start(self, now: JointMotion, interface: ControlInterface, fraction: float) -> None:
         self._input.control_interface = interface
@@ -340,7 +359,7 @@ class Limiter:
 
 
 def _planned(ruckig: Ruckig, wanted: InputParameter, trajectory: Trajectory) -> bool:
-    """Whether ``trajectory`` now leads where ``wanted`` says; there may be another way."""
+    """Return True if ruckig found a ``trajectory`` for ``wanted``."""
     try:
         return ruckig.calculate(wanted, trajectory) in VALID_RESULTS
     except RuckigError:

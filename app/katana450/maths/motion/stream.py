@@ -1,9 +1,9 @@
-"""A stream of joint angles as a motion: smoothed positions, rates and accelerations at any time.
+"""A stream of joint angles as a motion: smoothed positions, rates and accelerations.
 
-Samples arrive unevenly, so differences of neighbours say little about rates. A parabola is fitted
-to the samples of a short window instead (least squares, as Savitzky and Golay do) and read a moment
-before now. The more unevenly the samples arrive, the longer are the window and that moment. Angles
-in rad, times in s.
+Samples arrive unevenly, so differences of neighbours give poor rates. A parabola is fitted to the
+samples of a short window instead (least squares, as by Savitzky and Golay) and read a moment before
+now. The more unevenly the samples arrive, the longer are the window and that moment. Angles in rad,
+times in s.
 """
 
 from __future__ import annotations
@@ -17,58 +17,62 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import JointMotion
 
 READ_DELAY = 0.02
-"""[s] How long before now an even stream is read: about one sample of a usual one."""
+"""Delay [s] with which an even stream is read: about one sample of a usual stream."""
 
 WINDOW = 0.12
-"""[s] Of samples that count in an even stream."""
+"""Length [s] of the window of samples in an even stream."""
 
-MORE_LAG, MOST_LAG = 8.0, 0.03
-"""[1], [s] Lag added per second of jitter, and the most of it."""
+LAG_PER_JITTER, MAX_ADDED_LAG = 8.0, 0.03
+"""Lag added per second of jitter [1], and its maximum [s]."""
 
-MORE_WINDOW, MOST_WINDOW = 20.0, 0.14
-"""[1], [s] Window added per second of jitter, and the most of it."""
+WINDOW_PER_JITTER, MAX_ADDED_WINDOW = 20.0, 0.14
+"""Window added per second of jitter [1], and its maximum [s]."""
 
 TURN_MEMORY = 4.0
-"""[s] Over which it is forgotten how hard a stream has turned."""
+"""Time constant [s] with which the hardness of earlier turns fades."""
 
-MARGIN, MOST_HARDNESS = 1.15, 5.0
-"""[1] A stream may turn harder than it was seen to; beyond the most it makes no difference."""
+HARDNESS_MARGIN, MAX_HARDNESS = 1.15, 5.0
+"""A stream may turn harder than observed by this factor [1]; hardness is limited to the maximum
+[1].
+"""
 
-DOUBT, MOST_DOUBT = 100.0, 0.4
-"""[1/s], [1] About its rates, per second of jitter, and the most of it."""
+CAUTION_PER_JITTER, MAX_CAUTION = 100.0, 0.4
+"""Caution about the rates per second of jitter [1/s], and its maximum [1]."""
 
 MIN_SPREAD = 0.08
-"""[s] Over which samples have to lie before their curvature says anything."""
+"""Minimum time span [s] of samples for a meaningful curvature."""
 
 MIN_SAMPLES = 4
-"""Samples kept of a slow stream, whatever their age."""
+"""Number of samples kept of a slow stream, at any age."""
 
 SPACING = 2e-3
-"""[s] Samples nearer to each other count as one, the later."""
+"""Samples nearer to each other than this [s] count as one, the later."""
 
 AVERAGING = 0.1
-"""[1] Weight of the newest interval in the mean interval; half of it in the mean deviation."""
+"""Weight [1] of the newest interval in the mean interval; half of it in the mean deviation."""
 
 RATES_WEIGHT = 0.05
-"""[s] Error of a position that counts as much as one of a rate by 1 per second."""
+"""Position error per rate error of equal weight [s]."""
 
 CURVE_HORIZON = 0.04
-"""[s] Beyond its newest sample, or two periods if longer, a stream is taken to curve as it did."""
+"""Time [s] beyond the newest sample, or two periods if longer, for which the curvature is
+extrapolated.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """The newest samples of a stream of n joints, and what is known of the earlier ones.
+    """The newest samples of a stream of n joints, and statistics of the earlier ones.
 
     Attributes:
-        times: (k,) when each came [s], rising.
-        q: (k, n) the samples [rad].
-        qd: (k, n) how fast each says it changes [rad/s]; None where the sender does not say.
-        lower, upper: (n,) the extremes of all samples so far [rad].
-        hardness: (n,) the most that it accelerated with of late, of what the joints can, from 1.
-        parabola: (3, n) coefficients of q by time from the newest sample on.
+        times: arrival time (k,) of each sample [s], rising.
+        q: the samples (k, n) [rad].
+        qd: the rates (k, n) sent with them [rad/s]; None if the sender gives none.
+        lower, upper: the extremes (n,) of all samples so far [rad].
+        hardness: maximum recent acceleration (n,) relative to that of the joints, at least 1.
+        parabola: coefficients (3, n) of q by time from the newest sample on.
         period: mean interval between samples [s]; 0 before the second.
-        jitter: mean deviation of the intervals from it [s].
+        jitter: mean deviation of the intervals from the period [s].
     """
 
     times: FloatArray
@@ -83,7 +87,7 @@ class Stream:
 
     @staticmethod
     def begin(t: float, q: FloatArray, qd: FloatArray | None) -> Stream:
-        """The stream whose first sample ``q`` (n,), changing at ``qd``, came at ``t`` [s]."""
+        """Return the stream whose first sample ``q`` (n,), rates ``qd``, arrived at ``t`` [s]."""
         rates = None if qd is None else qd[None]
         times, samples = np.array([t]), q[None]
         parabola = _fitted(times, samples, rates)
@@ -91,31 +95,34 @@ class Stream:
 
     @property
     def t(self) -> float:
-        """When the newest sample came [s]."""
+        """The arrival time of the newest sample [s]."""
         return float(self.times[-1])
 
     @property
     def caution(self) -> FloatArray:
-        """(n,) by how much harder it may turn than the joints can brake, at least 1."""
-        return self.hardness * (1.0 + min(DOUBT * self.jitter, MOST_DOUBT))
+        """The factor (n,), at least 1, by which it may turn harder than the joints can brake."""
+        return self.hardness * (1.0 + min(CAUTION_PER_JITTER * self.jitter, MAX_CAUTION))
 
     @property
     def _lag(self) -> float:
         return (
             READ_DELAY
             if self.qd is not None
-            else READ_DELAY + min(MORE_LAG * self.jitter, MOST_LAG)
+            else READ_DELAY + min(LAG_PER_JITTER * self.jitter, MAX_ADDED_LAG)
         )
 
     @property
     def sure_until(self) -> float:
-        """[s] From when on nothing is known of where it goes, unless another sample comes."""
+        """The time [s] after which the stream is unknown unless another sample arrives."""
         return self.t + self._lag + max(CURVE_HORIZON, 2.0 * self.period)
 
     def followed_by(
         self, t: float, q: FloatArray, qd: FloatArray | None, acceleration: FloatArray
     ) -> Stream:
-        """The stream with one sample more; see ``begun``. acceleration: (n,) of the joints."""
+        """Return the stream with one more sample; the arguments are those of ``begin``.
+
+        ``acceleration`` (n,) is the limit of the joints.
+        """
         rates = None
         if qd is not None and self.qd is not None:
             rates = self.qd
@@ -127,7 +134,11 @@ class Stream:
         else:
             period = self.period + AVERAGING * (interval - self.period) if self.period else interval
             jitter = self.jitter + AVERAGING / 2.0 * (abs(interval - period) - self.jitter)
-            window = WINDOW if qd is not None else WINDOW + min(MORE_WINDOW * jitter, MOST_WINDOW)
+            window = (
+                WINDOW
+                if qd is not None
+                else WINDOW + min(WINDOW_PER_JITTER * jitter, MAX_ADDED_WINDOW)
+            )
             first = int(np.searchsorted(self.times, t - window))
             kept = slice(max(min(first, len(self.times) - MIN_SAMPLES + 1), 0), None)
         times = np.append(self.times[kept], t if interval >= SPACING else self.t)
@@ -138,8 +149,8 @@ class Stream:
         fading = math.exp(-max(interval, 0.0) / TURN_MEMORY)
         hardness = np.maximum(1.0 + fading * (self.hardness - 1.0), 1.0)
         if times[-1] - times[0] >= MIN_SPREAD:
-            seen = MARGIN * np.abs(2.0 * parabola[2]) / acceleration
-            hardness = np.maximum(hardness, np.minimum(seen, MOST_HARDNESS))
+            seen = HARDNESS_MARGIN * np.abs(2.0 * parabola[2]) / acceleration
+            hardness = np.maximum(hardness, np.minimum(seen, MAX_HARDNESS))
         return Stream(
             times,
             samples,
@@ -153,7 +164,7 @@ class Stream:
         )
 
     def at(self, now: float) -> JointMotion:
-        """What the stream does, as seen at ``now`` [s]: q, qd, qdd (n,) a short lag ago."""
+        """Return the motion of the stream at ``now`` [s]: q, qd, qdd (n,) a short lag ago."""
         seen = min(now, self.sure_until)
         late, known = now - seen, seen - self._lag - self.t
         c0, c1, c2 = self.parabola
@@ -163,7 +174,7 @@ class Stream:
 
 
 def _fitted(times: FloatArray, q: FloatArray, qd: FloatArray | None) -> FloatArray:
-    """(3, n) coefficients of the parabola through samples, by time from the newest on."""
+    """Return the parabola's coefficients (3, n) through samples, by time from the newest on."""
     s, values, degree = times - times[-1], q, min(3, len(times))
     rows = np.stack((s**0, s, s * s), axis=1)
     if qd is not None:

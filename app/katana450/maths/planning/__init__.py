@@ -1,1 +1,1 @@
-"""Paths whose shape is exact, their time under limits, and ways round what is in between. Pure."""
+"""Paths of exact shape, their timing under limits, and paths around obstacles. Pure."""

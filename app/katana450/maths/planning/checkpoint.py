@@ -1,5 +1,7 @@
-"""Cancellation of a long calculation: the loops of planning call ``checkpoint``, and the code that
-started them decides in ``checked_by`` whether they continue.
+"""Cancellation of a long calculation.
+
+The loops of planning call ``checkpoint``. The code that started them decides in ``checked_by``
+whether they continue.
 """
 
 from __future__ import annotations
@@ -17,16 +19,16 @@ _check: ContextVar[Callable[[], None]] = ContextVar("check", default=_continue)
 
 
 def checkpoint() -> None:
-    """Raise what the check of the present context raises; without one do nothing."""
+    """Call the check of the present context, which may raise; do nothing without a check."""
     _check.get()()
 
 
 @contextmanager
 def checked_by(check: Callable[[], None]) -> Iterator[None]:
-    """Have every ``checkpoint`` within this context and thread call ``check``.
+    """Make every ``checkpoint`` within this context and thread call ``check``.
 
     ``check`` raises CancelledError to end the calculation. It is called thousands of times a
-    second, so it has to be cheap.
+    second, so it must be cheap.
     """
     token = _check.set(check)
     try:

@@ -1,9 +1,9 @@
-"""Whether a way is clear, and where the arm comes nearest to anything: all of it, not samples.
+"""Clearance of whole paths, not of samples: whether a path is clear, and its nearest place.
 
-A distance changes by no more than the bodies travel against each other, and they travel no farther
-than their joints turn. So a place of the way answers for a piece about it, and where that leaves
-something open the piece is halved (Schwarzer, Saha and Latombe, Exact collision checking of robot
-paths, WAFR 2002).
+A distance changes by no more than the bodies travel against each other, and that is bounded by the
+turns of their joints. A place on a path therefore decides for an interval about it. Where that
+leaves a case open, the interval is halved (Schwarzer, Saha and Latombe, Exact collision checking of
+robot paths, WAFR 2002).
 """
 
 from __future__ import annotations
@@ -20,22 +20,25 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.checkpoint import checkpoint
 
 FINE = 1e-4
-"""[m] A piece on which no body travels farther is not halved: the least clearance may be nearer by
-that much than asked for."""
+"""An interval on which no body travels farther than this [m] is not halved: the clearance may be
+smaller than required by that much.
+"""
 
 FRACTION = 0.1
-"""[1] How exactly the nearest clearance is found, of itself."""
+"""Relative accuracy [1] of the nearest clearance."""
 
 At = Callable[[float], FloatArray]
-"""x (k,) [rad] at some place of a way."""
+"""A function from a place on a path to x (k,) [rad or m]."""
 
 Turned = Callable[[float, float], FloatArray]
-"""(k,) at most how far each joint turns on the way from one place to another [rad]."""
+"""A function from two places on a path to a bound (k,) on the turn of each joint between them [rad
+or m].
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """Where on a way two parts come nearest. sigma: the place, from 0 to 1."""
+    """The nearest contact on a path, and its place sigma from 0 to 1."""
 
     contact: Contact
     sigma: float
@@ -43,9 +46,11 @@ class Clearance:
 
 @dataclass(frozen=True, eq=False)
 class SweptClearance:
-    """What a way has to keep clear of, and by how much.
+    """A collision world, and the distance that a path keeps.
 
-    world: bodies and pairs. least: (p,) [m] the distance that each pair keeps.
+    Attributes:
+        world: bodies and pairs.
+        minimum: the distance (p,) that each pair keeps [m].
     """
 
     world: CollisionWorld
@@ -55,10 +60,10 @@ class SweptClearance:
     def about(
         world: CollisionWorld, margin: float, start: FloatArray, end: FloatArray | None = None
     ) -> SweptClearance:
-        """Room of `margin` [m] for a way from `start` (k,) to `end` (k,) [rad].
+        """Return the room for a path from `start` (k,) to `end` (k,) with `margin` [m].
 
-        Pairs that are nearer at the start come no nearer: so a way may lead out of a contact. Those
-        that are nearer at the end may be as near as that, but not below STOP.
+        Pairs that are nearer at the start come no nearer, so a path may lead out of a contact.
+        Pairs that are nearer at the end may be as near as there, but not below STOP.
         """
         minimum = np.full(len(world.first), margin)
         for x, lowest in ((start, -np.inf), (end, STOP)):
@@ -74,9 +79,10 @@ class SweptClearance:
     def blocked(
         self, at: At, turned: Turned, low: float = 0.0, high: float = 1.0, fine: float = FINE
     ) -> Clearance | None:
-        """A place on the way from `low` to `high` that is too near, or None; the first it finds.
+        """Return a place on the path from `low` to `high` that is too near; None if it is clear.
 
-        fine: pieces on which no body travels farther are not halved [m].
+        The first place found is returned. Intervals on which no body travels farther than `fine`
+        [m] are not halved.
         """
         pieces = [(low, high)]
         while pieces:
@@ -86,7 +92,7 @@ class SweptClearance:
             x = at(middle)
             placed = self.world.at(x)
             travel = self._travel(placed, x, turned, low, high)
-            # Where joints turn too far for a bound only the place itself is looked at.
+            # If joints turn too far for a bound, only the place itself is checked.
             reach = np.zeros(len(self.minimum)) if travel is None else travel
             left_open = travel is None
             for pair in placed.nearer_than(self.minimum + reach)[0].tolist():
@@ -99,14 +105,14 @@ class SweptClearance:
         return None
 
     def blocked_line(self, start: FloatArray, end: FloatArray) -> Clearance | None:
-        """The same on the straight line from `start` (k,) to `end` (k,) [rad]."""
-        way = end - start
+        """Check the straight line from `start` (k,) to `end` (k,) [rad or m], as `blocked`."""
+        line = end - start
         return self.blocked(
-            lambda fraction: start + fraction * way, lambda a, b: (b - a) * np.abs(way)
+            lambda fraction: start + fraction * line, lambda a, b: (b - a) * np.abs(line)
         )
 
     def nearest(self, at: At, turned: Turned) -> Clearance | None:
-        """Where parts come nearest on the whole way, to FRACTION of it; None when none can meet."""
+        """Return the nearest place of the whole path, to FRACTION; None when no parts can meet."""
         best: Clearance | None = None
         pieces = [(0.0, 1.0)]
         while pieces:
@@ -136,9 +142,9 @@ class SweptClearance:
     def _travel(
         self, placed: PlacedWorld, x: FloatArray, turned: Turned, low: float, high: float
     ) -> FloatArray | None:
-        """(p,) the most that each pair travels from `x`, in the middle, to any place between.
+        """Return a bound (p,) on the travel of each pair from `x`, in the middle, to the interval.
 
-        None where the joints turn too far for a bound.
+        None means that the joints turn too far for a bound.
         """
         middle = 0.5 * (low + high)
         turns = np.maximum(turned(low, middle), turned(middle, high))

@@ -1,7 +1,7 @@
-"""What the tool is to do along a path: its point, pitch and roll as functions of one parameter.
+"""Curves of the tool: its point, pitch and roll as functions of one parameter.
 
-Each curve is a formula of sigma, which runs from 0 to 1, and is asked for jets: so a place on it is
-exact wherever it is asked for, and so are its derivatives. Lengths in m, angles in rad, frame {S}.
+Each curve is a formula of sigma, which runs from 0 to 1, and is evaluated on jets. Every place on
+it is therefore exact, and so are its derivatives. Lengths in m, angles in rad, frame {S}.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from katana450.maths.planning.polyline import Polyline
 from katana450.maths.planning.posture import facing
 
 TURN_LENGTH = 0.25
-"""[m] A turn by 1 rad counts for as long a way, where the legs of a way are told in lengths."""
+"""Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
 
 VIA_TOLERANCE = 1e-9
-"""[m] Vias nearer to each other are one."""
+"""Vias nearer to each other than this [m] are the same."""
 
 Profile = Callable[[Jet], Jet]
 """An angle along a curve [rad], as a function of sigma."""
 
 
 class ToolCoordinates(NamedTuple):
-    """The five freedoms as jets: the tool point x, y, z in {S}, pitch and roll."""
+    """The five freedoms of the tool as jets: the tool point x, y, z in {S}, pitch and roll."""
 
     x: Jet
     y: Jet
@@ -47,21 +47,21 @@ class ToolCoordinates(NamedTuple):
 
 
 class Curve(Protocol):
-    """Where the tool is along a path."""
+    """The tool along a path."""
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """Where between 0 and 1 one formula ends and another begins, growing."""
+        """The places between 0 and 1 where one formula ends and another begins, in rising order."""
         ...
 
     def at(self, sigma: Jet) -> ToolCoordinates:
-        """The tool at `sigma`, one place or many."""
+        """Return the tool at `sigma`, one place or many."""
         ...
 
 
 @dataclass(frozen=True)
 class Linear:
-    """An angle that goes evenly from `start` to `end` [rad]; constant where they are equal."""
+    """An angle that changes evenly from `start` to `end` [rad]; constant where they are equal."""
 
     start: float
     end: float
@@ -70,6 +70,7 @@ class Linear:
         finite_array((self.start, self.end), (2,), "The ends of an angle's profile")
 
     def __call__(self, sigma: Jet) -> Jet:
+        """Return the angle [rad] at `sigma`."""
         return self.start + (self.end - self.start) * sigma
 
 
@@ -77,7 +78,7 @@ class Linear:
 class Swing:
     """An angle that follows a circle: mean + sine sin(t) + cosine cos(t) [rad].
 
-    t runs from `begin` through `angle` [rad], as along the arc it belongs to.
+    t runs from `begin` through `angle` [rad], as along the arc that the angle belongs to.
     """
 
     mean: float
@@ -91,15 +92,16 @@ class Swing:
         finite_array(numbers, (5,), "The numbers of an angle's profile")
 
     def __call__(self, sigma: Jet) -> Jet:
+        """Return the angle [rad] at `sigma`."""
         s, c = sin_cos(self.begin + self.angle * sigma)
         return self.mean + self.sine * s + self.cosine * c
 
 
 @dataclass(frozen=True, eq=False)
 class ToolLine:
-    """The straight way from one target to another, pitch and roll turning evenly on it.
+    """A straight path from one target to another, on which pitch and roll turn evenly.
 
-    With both at one point the tool only turns, which is how a cup is poured out.
+    With both targets at one point the tool only turns, as when a cup is emptied.
     """
 
     start: ToolTarget
@@ -112,10 +114,11 @@ class ToolLine:
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """None: it is one formula."""
+        """No joins: the line is one formula."""
         return ()
 
     def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
         x, y, z = (
             a + (b - a) * sigma
             for a, b in zip(self.start.position.tolist(), self.end.position.tolist(), strict=True)
@@ -126,10 +129,14 @@ class ToolLine:
 
 @dataclass(frozen=True, eq=False)
 class ToolLines:
-    """From target to target on straight lines, pitch and roll turning evenly, its corners rounded.
+    """Straight lines from target to target with rounded corners; pitch and roll turn evenly.
 
-    vias: two or more, the first and last are start and end. blend: (m - 2,) how much of half of its
-    shorter leg each corner cuts off, above 0 up to 1. Corners are those of `Polyline`.
+    Corners are those of `Polyline`.
+
+    Attributes:
+        vias: two or more targets, the first and last are start and end.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
     """
 
     vias: tuple[ToolTarget, ...]
@@ -140,29 +147,34 @@ class ToolLines:
         rows = [(*via.position.tolist(), via.pitch, via.roll) for via in self.vias]
         numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
         legs = np.diff(numbers, axis=0)
-        ways = np.linalg.norm(legs[:, :3], axis=1)
-        lengths = np.maximum(ways, TURN_LENGTH * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
+        distances = np.linalg.norm(legs[:, :3], axis=1)
+        lengths = np.maximum(distances, TURN_LENGTH * np.abs(legs[:, 3:]).max(axis=1, initial=0.0))
         if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
-            raise InputError("Lines need two vias at least, each of them elsewhere.")
+            raise InputError("Lines need at least two vias, each different from the one before.")
         line = Polyline(frozen(numbers), lengths, self.blend)
         object.__setattr__(self, "blend", line.blend)
         object.__setattr__(self, "_line", line)
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """Where legs and corners meet."""
+        """The places where legs and corners meet."""
         return self._line.joins
 
     def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
         return ToolCoordinates(*self._line.at(sigma))
 
 
 @dataclass(frozen=True, eq=False)
 class ToolArc:
-    """A turn of the tool point by `angle` [rad] about an axis, a whole circle or more if it is.
+    """A turn of the tool point by `angle` [rad] about an axis, also by more than a whole circle.
 
-    start: (3,) where it begins [m]. centre, axis: (3,) a point on the axis [m] and its direction.
-    pitch, roll: what the tool does meanwhile. climb: along the axis over the whole turn [m].
+    Attributes:
+        start: first point (3,) [m].
+        centre, axis: a point (3,) on the axis [m] and its direction (3,).
+        angle: the angle of the turn [rad].
+        pitch, roll: pitch and roll of the tool along the arc.
+        climb: motion along the axis over the whole turn [m].
     """
 
     start: FloatArray
@@ -185,20 +197,21 @@ class ToolArc:
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """None: it is one formula."""
+        """No joins: the arc is one formula."""
         return ()
 
     def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
         s, c = sin_cos(self.angle * sigma)
         x, y, z = (c * u + s * v + (f + k * sigma) for u, v, f, k in self._terms)
         return ToolCoordinates(x, y, z, self.pitch(sigma), self.roll(sigma))
 
     @cached_property
     def _terms(self) -> list[list[float]]:
-        """Of x, y, z: with the cosine, with the sine, constant, with sigma."""
+        """The terms of x, y, z: with the cosine, with the sine, constant, with sigma."""
         arm = self.start - self.centre
         along = (arm @ self.axis) * self.axis
-        # The quarter turn of a radius is as long as it, so this is a circle to rounding.
+        # The quarter turn of a radius has its length, so this is a circle to rounding.
         terms = arm - along, np.cross(self.axis, arm), self.centre + along, self.climb * self.axis
         rows: list[list[float]] = np.stack(terms, axis=1).tolist()
         return rows
@@ -206,12 +219,12 @@ class ToolArc:
 
 @dataclass(frozen=True, eq=False)
 class ToolScrew:
-    """The tool moved along a twist (omega, v) in {S} from where `q` has it, as five axes can.
+    """A motion of the tool along a twist (omega, v) in {S} from its pose at `q`, for five axes.
 
-    The tool point follows exp(twist sigma) exactly. The tool turns to the orientation nearest to it
-    that the arm's plane allows; yaw follows the arm. Source: Lynch & Park (2017), ch. 3.3; for what
-    is nearest maths/kinematics/orientation.py. Raises InputError for a tool point beside the roll
-    axis: the plane then depends on the turn, and the turn on the plane.
+    The tool point follows exp(twist sigma) exactly. The tool turns to the orientation nearest to
+    that motion that the arm's plane allows; yaw follows from the arm. Sources: Lynch & Park (2017),
+    ch. 3.3; for the nearest orientation maths/kinematics/orientation.py. Raises InputError for a
+    tool point beside the roll axis: the plane then depends on the turn, and the turn on the plane.
     """
 
     chain: Chain
@@ -225,19 +238,20 @@ class ToolScrew:
         object.__setattr__(self, "twist", frozen(twist))
         if arm_of(self.chain).off_axis > 0.0:
             raise InputError(
-                "A screw path is for a tool point on the roll axis; this one is "
+                "A screw path needs a tool point on the roll axis; this one is "
                 f"{1e3 * arm_of(self.chain).off_axis:.3g} mm beside it. Give pitch and roll "
                 "along an arc instead."
             )
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """None: it is one formula."""
+        """No joins: the screw is one formula."""
         return ()
 
     def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
         arm = arm_of(self.chain)
-        x, y, z, _, _ = self._way.at(sigma)
+        x, y, z, _, _ = self._point_path.at(sigma)
         # The orientation of {K} in {C} as a quaternion, turned by the twist.
         (w0, x0, y0, z0), (a, b, c), turn = self._turning
         s, k = sin_cos((0.5 * turn) * sigma)
@@ -245,7 +259,7 @@ class ToolScrew:
         X = k * x0 + s * (a * w0 + b * z0 - c * y0)
         Y = k * y0 + s * (b * w0 + c * x0 - a * z0)
         Z = k * z0 + s * (c * w0 + a * y0 - b * x0)
-        # Seen from the arm's plane.
+        # In the arm's plane.
         alpha1, _, _ = facing(arm, self.branch.shoulder, x, y, z)
         s, k = sin_cos(0.5 * alpha1)
         W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
@@ -253,8 +267,8 @@ class ToolScrew:
         return ToolCoordinates(x, y, z, total + difference, total - difference)
 
     @cached_property
-    def _way(self) -> ToolLine | ToolArc:
-        """The way of the tool point."""
+    def _point_path(self) -> ToolLine | ToolArc:
+        """The path of the tool point."""
         p = forward(self.chain, self.q)[:3, 3]
         omega, v = self.twist[:3], self.twist[3:]
         turn = math.hypot(*omega)
@@ -265,7 +279,7 @@ class ToolScrew:
 
     @cached_property
     def _turning(self) -> tuple[list[float], list[float], float]:
-        """The quaternion of {K} in {C} at the start, the axis in {C}, the angle."""
+        """The quaternion of {K} in {C} at the start, the axis in {C}, and the angle."""
         arm = arm_of(self.chain)
         R = arm.pose(forward(self.chain, self.q))[:3, :3]
         omega = self.twist[:3]

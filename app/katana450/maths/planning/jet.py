@@ -1,9 +1,10 @@
 """Functions of one variable with their first three derivatives, by truncated Taylor series.
 
-A jet is the Taylor polynomial c0 + c1 h + c2 h^2 + c3 h^3 of a function at one place, or at many at
-once when its coefficients are arrays. Sums, products and functions of jets are jets, so a formula
+A jet is the Taylor polynomial c0 + c1 h + c2 h^2 + c3 h^3 of a function at one place, or at many
+places if its coefficients are arrays. Sums, products and functions of jets are jets, so a formula
 written for numbers yields its derivatives to rounding (Griewank and Walther, Evaluating
-Derivatives, 2008, ch. 13). Coefficients that are plain floats stay so: that is quickest for one.
+Derivatives, 2008, ch. 13). Coefficients that are plain floats stay floats, which is fastest for one
+place.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 
 from katana450.maths.kinematics.closed_form import Functions
 
-# float or array: the formulas are the same.
+# A float or an array: the formulas are the same.
 Coefficient = Any
 
 
@@ -23,7 +24,7 @@ class Jet:
     """A Taylor polynomial of third order."""
 
     __slots__ = ("c0", "c1", "c2", "c3")
-    # An array to the left of an operator leaves it to the jet.
+    # An array on the left of an operator leaves the operation to the jet.
     __array_ufunc__ = None
 
     def __init__(self, c0: Coefficient, c1: Coefficient, c2: Coefficient, c3: Coefficient) -> None:
@@ -34,16 +35,16 @@ class Jet:
 
     @staticmethod
     def variable(at: Coefficient) -> Jet:
-        """The variable itself, at one place or at many (N,)."""
+        """Return the variable itself, at one place or at many (N,)."""
         return Jet(at, 1.0, 0.0, 0.0)
 
     @staticmethod
     def constant(value: Coefficient) -> Jet:
-        """What does not change."""
+        """Return a constant jet."""
         return Jet(value, 0.0, 0.0, 0.0)
 
     def derivatives(self) -> tuple[Coefficient, Coefficient, Coefficient, Coefficient]:
-        """The value and the first three derivatives."""
+        """Return the value and the first three derivatives."""
         return self.c0, self.c1, 2.0 * self.c2, 6.0 * self.c3
 
     def __neg__(self) -> Jet:
@@ -97,7 +98,7 @@ Number = Jet | Coefficient
 
 
 def sqrt(a: Jet) -> Jet:
-    """The square root; where `a` is not above 0 nothing of it is a number."""
+    """Return the square root; NaN in all coefficients where `a` is not above 0."""
     r0 = math.sqrt(a.c0) if isinstance(a.c0, float) else np.sqrt(a.c0)
     half = 0.5 / r0
     r1 = half * a.c1
@@ -106,7 +107,7 @@ def sqrt(a: Jet) -> Jet:
 
 
 def sin_cos(a: Jet) -> tuple[Jet, Jet]:
-    """Sine and cosine."""
+    """Return sine and cosine."""
     a0, a1, a2, a3 = a.c0, a.c1, a.c2, a.c3
     one = isinstance(a0, float)
     s0, c0 = (math.sin(a0), math.cos(a0)) if one else (np.sin(a0), np.cos(a0))
@@ -118,7 +119,7 @@ def sin_cos(a: Jet) -> tuple[Jet, Jet]:
 
 
 def atan2(y: Jet, x: Jet) -> Jet:
-    """The angle of (x, y), its value in (-pi, pi]."""
+    """Return the angle of (x, y), its value in (-pi, pi]."""
     one = isinstance(y.c0, float) and isinstance(x.c0, float)
     angle = math.atan2(y.c0, x.c0) if one else np.arctan2(y.c0, x.c0)
     dx = Jet(x.c1, 2.0 * x.c2, 3.0 * x.c3, 0.0)
@@ -128,10 +129,10 @@ def atan2(y: Jet, x: Jet) -> Jet:
 
 
 def direction(y: Jet, x: Jet) -> tuple[Jet, Jet, Jet]:
-    """The angle of (x, y), its cosine, its sine."""
+    """Return the angle of (x, y), its cosine and its sine."""
     length = sqrt(x * x + y * y)
     return atan2(y, x), x / length, y / length
 
 
 JETS: Final = Functions(atan2, sqrt, sqrt, direction)
-"""What the closed form needs in order to be of jets."""
+"""The functions with which the closed form runs on jets."""

@@ -1,4 +1,4 @@
-"""Straight ways of the joints from via to via, their corners rounded."""
+"""Straight joint paths from via to via, with rounded corners."""
 
 from __future__ import annotations
 
@@ -16,17 +16,21 @@ from katana450.maths.planning.polyline import Polyline
 from katana450.maths.planning.posture import FiveJets, ThreeJets, tool_point
 
 VIA_TOLERANCE = 1e-9
-"""[rad] Vias nearer to each other are one."""
+"""Vias nearer to each other than this [rad] are the same."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointPath:
-    """From via to via on straight lines in joint space, its corners rounded as those of `Polyline`.
+    """Straight lines in joint space from via to via, with corners rounded as in `Polyline`.
 
-    With its vias inside the limits the path is.
+    The path is inside the limits, because its vias must be. Raises InputError for a via beyond a
+    limit, and for vias that coincide.
 
-    chain: the arm with its tool. vias: (m, 5) [rad], the first and last are start and end. blend:
-    (m - 2,) how much of half of its shorter leg each corner cuts off, above 0 up to 1.
+    Attributes:
+        chain: the arm with its tool.
+        vias: (m, 5) [rad], the first and last are start and end.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
     """
 
     chain: Chain
@@ -37,7 +41,7 @@ class JointPath:
     def __post_init__(self) -> None:
         vias = np.array([self.chain.check_q(q) for q in self.vias])
         if len(vias) < 2 or (np.abs(np.diff(vias, axis=0)).max(axis=1) <= VIA_TOLERANCE).any():
-            raise InputError("A path needs two vias at least, each of them elsewhere.")
+            raise InputError("A path needs at least two vias, each different from the one before.")
         for number, q in enumerate(vias):
             if not self.chain.within_limits(q):
                 beyond = np.maximum(self.chain.lower - q, q - self.chain.upper)
@@ -46,7 +50,7 @@ class JointPath:
                     f"Via {number + 1} has axis {axis + 1} at {math.degrees(q[axis]):.1f} deg, "
                     f"{math.degrees(beyond[axis]):.2g} deg beyond its limit."
                 )
-        # As long as a leg takes at full speed, so that none is run through in no time.
+        # A leg is as long as its duration at full speed, so that no leg has length 0.
         lengths = (np.abs(np.diff(vias, axis=0)) / self.chain.speed).max(axis=1)
         line = Polyline(frozen(vias), lengths, self.blend)
         object.__setattr__(self, "vias", line.vias)
@@ -55,26 +59,26 @@ class JointPath:
 
     @property
     def start(self) -> FloatArray:
-        """(5,) where it begins [rad]."""
+        """The joint angles (5,) [rad] at the start."""
         return frozen(self.vias[0])
 
     @property
     def end(self) -> FloatArray:
-        """(5,) where it ends [rad]."""
+        """The joint angles (5,) [rad] at the end."""
         return frozen(self.vias[-1])
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """Where legs and corners meet."""
+        """The places where legs and corners meet."""
         return self._line.joins
 
     def joints(self, sigma: Jet) -> FiveJets:
-        """The joint angles [rad] at `sigma`, one place or many (N,)."""
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         one, two, three, four, five = self._line.at(sigma)
         return one, two, three, four, five
 
     def point(self, sigma: Jet) -> ThreeJets:
-        """The tool point [m], in {C}."""
+        """Return the tool point [m], in {C}."""
         arm = arm_of(self.chain)
         one, two, three, four, five = (
             sign * q + shift

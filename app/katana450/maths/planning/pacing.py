@@ -1,4 +1,4 @@
-"""The search for the scaling of a path that runs through it in the least time."""
+"""Search for the scaling that runs through a path in the shortest time."""
 
 from __future__ import annotations
 
@@ -14,46 +14,47 @@ from katana450.maths.planning.path import Path, joint_derivatives, point_derivat
 from katana450.maths.planning.scaling import CUBIC, Bounds, Scaling, rest_to_rest
 
 KNOTS: Final = 20
-"""Pieces of the slowness, and half as many more for each join of the path."""
+"""Number of pieces of the slowness; each join of the path adds half as many."""
 
 SAMPLES_PER_PIECE: Final = 16
-"""Places looked at in each of them; what lies between is covered by SPARE."""
+"""Number of checked places in each piece; LIMIT_FRACTION covers what lies between them."""
 
 LIMIT_FRACTION: Final = 0.995
-"""[1] Of every limit."""
+"""Fraction [1] of every limit that is used."""
 
 ROUNDS: Final = 50
-"""Of making a path slower where it is too fast and faster where it is not."""
+"""Number of rounds that make a path slower where it is too fast and faster where it is not."""
 
 TRIAL_ROUNDS: Final = 8
-"""Of the same, to tell whether other a and j are better."""
+"""The number of rounds that compare other values of a and j."""
 
 SLOWING_POWER: Final = 0.6
-"""[1] Power of what a place is too fast by, by which it is slowed in one round."""
+"""Power [1] of the excess of a place, by which it is slowed in one round."""
 
 SPEEDING_POWER: Final = 0.1
-"""[1] The same where it is too slow: less, or the rounds would chase each other."""
+"""Power [1] for a place that is too slow: smaller, or the rounds would oscillate."""
 
 SMALLEST_DIVISOR: Final = 1e-300
-"""Keeps nothing by nothing from being no number."""
+"""Smallest divisor, which avoids 0 / 0."""
 
 SEARCH_FACTORS: Final = (2.0, 1.4, 1.18, 1.08)
-"""[1] By which a and j are varied, ever less, as long as it saves time."""
+"""Falling factors [1] by which a and j are varied, as long as it saves time."""
 
 
 def fastest(path: Path, bounds: Bounds) -> Scaling:
-    """The scaling of `path` that keeps to `bounds` and takes the least time found.
+    """Return the fastest scaling of `path` found that keeps to `bounds`.
 
-    For given a and j each coefficient of the slowness is pressed up while a limit is exceeded near
-    it and relaxed while none is met, and all are made slower together by what is left over; a and j
-    are then sought on a pattern that narrows. Not the optimum, but near: tests say how near.
+    For given a and j each coefficient of the slowness is raised while a limit is exceeded near it,
+    and lowered while no limit is reached. All coefficients are then made slower by the remaining
+    excess. a and j are sought on a pattern that narrows. The result is near the optimum; tests show
+    how near.
     """
     sampled = _Sampled.of(path, bounds)
     joints = bounds.joints
     a = float((joints.acceleration / joints.speed).min())
     j = float((joints.jerk / joints.speed).min())
     even = np.ones(len(sampled.first) + 3)
-    # As slow everywhere, or as slow as each place by itself has to be: either may end up better.
+    # Uniform slowness, or the slowness that each place needs by itself: either may end up better.
     starts = even, sampled.near(sampled.excess(even, a, j))
     best = min((sampled.fitted(a, j, each, ROUNDS) for each in starts), key=lambda f: f.time)
     for factor in SEARCH_FACTORS:
@@ -82,9 +83,14 @@ class _Fitted:
 class _Sampled:
     """A path at many places.
 
-    q: (3, N, 5) derivatives of the joints by sigma, over their speed; p: (2, N, 3) of the tool
-    point. piece: (N,) of the slowness that each is in. weights: (3, N, 4) of its four coefficients
-    for the slowness and its first two derivatives. first: (K,) index of the first place in each.
+    Attributes:
+        q: derivatives (3, N, 5) of the joints by sigma.
+        p: derivatives (2, N, 3) of the tool point by sigma.
+        piece: number (N,) of the piece of the slowness at each place.
+        weights: weights (3, N, 4) of its four coefficients for the slowness and its first two
+            derivatives.
+        first: index (K,) of the first place in each piece.
+        bounds: the limits of the motion.
     """
 
     q: FloatArray
@@ -98,7 +104,7 @@ class _Sampled:
     def of(path: Path, bounds: Bounds) -> _Sampled:
         count = KNOTS + (KNOTS // 2) * len(path.joins)
         even = np.linspace(0.0, 1.0, count * SAMPLES_PER_PIECE + 1)
-        # Either side of a join, where the third derivative leaps.
+        # Add places on either side of a join, where the third derivative leaps.
         joins = np.array(path.joins)
         sigma = np.unique(np.concatenate((even, joins - 1e-12, joins + 1e-12)))
         piece = np.minimum((sigma * count).astype(np.int64), count - 1)
@@ -118,14 +124,17 @@ class _Sampled:
         )
 
     def fitted(self, a: float, j: float, start: FloatArray, rounds: int) -> _Fitted:
-        """The least slowness found for the bounds `a` and `j` of tau(t), from `start` (K + 3,)."""
+        """Return the least slowness found for the bounds `a` and `j` of tau(t).
+
+        The search begins with `start` (K + 3,).
+        """
         c = start * self.excess(start, a, j).max()
         best, minimum = c, np.inf
         for _ in range(rounds):
             checkpoint()
             excess = self.excess(c, a, j)
             maximum = float(excess.max())
-            # tau at the end, were all made slower until nothing is too fast.
+            # tau at the end, if the whole path is slowed until nothing is too fast.
             time = rest_to_rest(maximum * self._span(c), a, j)
             if time < minimum:
                 best, minimum = maximum * c, time
@@ -134,7 +143,10 @@ class _Sampled:
         return _Fitted(best, a, j, minimum)
 
     def near(self, excess: FloatArray) -> FloatArray:
-        """(K + 3,) the greatest of `excess` (N,) that each coefficient has a part in."""
+        """Return the maximum of `excess` (N,) near each coefficient, (K + 3,).
+
+        A coefficient affects four pieces.
+        """
         worst = np.maximum.reduceat(excess, self.first)
         padded = np.concatenate((np.zeros(3), worst, np.zeros(3)))
         return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
@@ -145,7 +157,7 @@ class _Sampled:
         return float(total) / (len(c) - 3)
 
     def excess(self, c: FloatArray, a: float, j: float) -> FloatArray:
-        """(N,) how many times slower each place must be run through to keep every limit."""
+        """Return the factor (N,) by which each place must be slower to keep every limit."""
         limits, bounds = self.bounds.joints, self.bounds
         fours = np.stack([c[self.piece + k] for k in range(4)], axis=1)
         w, w1, w2 = (np.einsum("nk,nk->n", fours, each) for each in self.weights)
@@ -175,13 +187,16 @@ class _Sampled:
 
 
 def _quadratic(x: FloatArray, y: FloatArray) -> FloatArray:
-    """The r > 0 with x / r^2 + y / r = 1."""
+    """Return the r > 0 with x / r^2 + y / r = 1."""
     return np.asarray(0.5 * (y + np.sqrt(y * y + 4.0 * x)))
 
 
 def _cubic(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
-    """The r > 0 with x / r^3 + y / r^2 + z / r = 1, from above so that no limit is passed."""
-    # r^3 - z r^2 - y r - x is convex and rises beyond its root, and this is beyond it.
+    """Return the r > 0 with x / r^3 + y / r^2 + z / r = 1.
+
+    The value is approached from above, so that no limit is exceeded.
+    """
+    # r^3 - z r^2 - y r - x is convex and rises beyond its root, and the start is beyond it.
     r = np.cbrt(x) + np.sqrt(y) + z
     for _ in range(3):
         value = ((r - z) * r - y) * r - x

@@ -1,4 +1,4 @@
-"""A way of the joints without time: their angles as a function of sigma, from 0 to 1."""
+"""A joint path without time: joint angles as a function of sigma, from 0 to 1."""
 
 from __future__ import annotations
 
@@ -13,45 +13,44 @@ from katana450.maths.planning.posture import FiveJets, ThreeJets
 
 
 class Path(Protocol):
-    """The joints along a way, twice smooth: their third derivative is bounded.
-
-    chain: the arm with the tool whose point counts.
-    """
+    """A joint path that is twice continuously differentiable and has a bounded third derivative."""
 
     @property
-    def chain(self) -> Chain: ...
+    def chain(self) -> Chain:
+        """The arm, with the tool whose point counts."""
+        ...
 
     @property
     def start(self) -> FloatArray:
-        """(5,) where it begins [rad]."""
+        """The joint angles (5,) [rad] at the start."""
         ...
 
     @property
     def end(self) -> FloatArray:
-        """(5,) where it ends [rad]."""
+        """The joint angles (5,) [rad] at the end."""
         ...
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """Where between 0 and 1 the third derivative leaps, growing."""
+        """The places between 0 and 1 where the third derivative leaps, in rising order."""
         ...
 
     def joints(self, sigma: Jet) -> FiveJets:
-        """The joint angles [rad] at `sigma`, one place or many (N,)."""
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         ...
 
     def point(self, sigma: Jet) -> ThreeJets:
-        """The tool point [m], in a frame that stands still."""
+        """Return the tool point [m], in a fixed frame."""
         ...
 
 
 def joint_derivatives(path: Path, sigma: FloatArray) -> FloatArray:
-    """(4, N, 5) the joint angles at `sigma` (N,) and their first three derivatives by it."""
+    """Return the joint angles at `sigma` (N,) and their first three derivatives, (4, N, 5)."""
     return _stacked(path.joints(Jet.variable(sigma)), sigma)
 
 
 def point_derivatives(path: Path, sigma: FloatArray) -> FloatArray:
-    """(4, N, 3) the same of the tool point [m]."""
+    """Return the tool point [m] at `sigma` (N,) and its first three derivatives, (4, N, 3)."""
     return _stacked(path.point(Jet.variable(sigma)), sigma)
 
 

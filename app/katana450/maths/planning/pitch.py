@@ -1,4 +1,4 @@
-"""The pitch that leaves the joints the most room along an arc."""
+"""The pitch that keeps the joints farthest from their limits along an arc."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.posture import posture
 
 ARC_SAMPLES: Final = 48
-"""Of the arc, looked at."""
+"""Number of intervals of the arc that are checked."""
 
 SWINGS: Final = np.radians((-30.0, -15.0, 0.0, 15.0, 30.0))
-"""How much the pitch may follow the arc, to begin with."""
+"""First values for the amplitude of the pitch along the arc [rad]."""
 
 MEANS: Final = 72
-"""Pitches about which it may swing, all round."""
+"""Number of mean pitches that are tried, all round."""
 
 HALVINGS: Final = 12
-"""Of the steps by which the best is made better; the last is a thousandth of a degree."""
+"""Number of halvings of the steps that refine the best; the last is a thousandth of a degree."""
 
 
 def roomiest(chain: Chain, branch: Branch, arc: ToolArc) -> ToolArc:
-    """`arc` with that swing of its pitch which keeps axes 1 to 4 farthest from their limits.
+    """Return `arc` with the swing of its pitch that keeps axes 1 to 4 farthest from their limits.
 
-    The pitch is a mean and a wave of the arc's own angle. Found on a grid and then by ever smaller
+    The pitch is a mean plus a wave of the arc's own angle, found on a grid and then by ever smaller
     steps. Raises InputError when no such pitch keeps the joints inside on `branch`.
     """
     grid = np.array(
@@ -62,9 +62,10 @@ def roomiest(chain: Chain, branch: Branch, arc: ToolArc) -> ToolArc:
 
 
 def _rooms(chain: Chain, branch: Branch, arc: ToolArc, swings: FloatArray) -> FloatArray:
-    """(G,) [rad] from axes 1 to 4 to their limits, the least on the arc, for `swings` (G, 3).
+    """Return the minimum distance (G,) [rad] of axes 1 to 4 from their limits on the arc.
 
-    Below 0 beyond them, and -infinity out of reach.
+    `swings` (G, 3) are the tried pitches. The value is below 0 beyond the limits, and -infinity out
+    of reach.
     """
     arm = arm_of(chain)
     sigma = np.linspace(0.0, 1.0, ARC_SAMPLES + 1)

@@ -1,4 +1,4 @@
-"""A plan: paths one after another, timed, and known to be clear, before anything moves."""
+"""A plan: paths one after another, timed, and checked for contacts before anything moves."""
 
 from __future__ import annotations
 
@@ -24,18 +24,20 @@ from katana450.maths.planning.scaling import Bounds, Scaling
 from katana450.maths.planning.sweep import Sweep
 
 MARGIN = STOP + 1e-3
-"""[m] What a plan keeps: more than the arm stops at, so that rounding never stops it."""
+"""Distance [m] that a plan keeps: more than the distance at which the arm stops, so that rounding
+never stops it.
+"""
 
 JOIN_TOLERANCE = 1e-7
-"""[rad] Paths that follow each other meet to this."""
+"""Maximum gap [rad] between paths that follow each other."""
 
 CHORDS = 1000
-"""By which the length of the tool's way is measured."""
+"""Number of chords that measure the length of the tool's path."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathMotion:
-    """Joints at some tau, (5,) each: q [rad] and its derivatives by tau [rad/s, rad/s^2]."""
+    """The joints at some tau, (5,) each: q [rad] and its derivatives by tau [rad/s, rad/s^2]."""
 
     q: FloatArray
     first: FloatArray
@@ -44,13 +46,13 @@ class PathMotion:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """One path and its time; the arm rests at both ends."""
+    """One path and its scaling; the arm rests at both ends."""
 
     path: Path
     scaling: Scaling
 
     def at(self, tau: float) -> PathMotion:
-        """The joints at `tau`, from 0 to the scaling's span [s]."""
+        """Return the joints at `tau`, from 0 to the scaling's span [s]."""
         pace = self.scaling.pace(tau)
         joints = self.path.joints(Jet.variable(pace.sigma))
         q, q1, q2 = (
@@ -60,19 +62,19 @@ class Segment:
 
     @cached_property
     def length(self) -> float:
-        """Of the tool point's way [m]."""
+        """The length of the tool point's path [m]."""
         points = point_derivatives(self.path, np.linspace(0.0, 1.0, CHORDS + 1))[0]
         return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
     @cached_property
     def sweep(self) -> Sweep:
-        """What it sweeps."""
+        """The sweep of the path, for clearance checks."""
         return Sweep(self.path)
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Where on a plan two parts come nearest. tau: when at full speed but for the ramps [s]."""
+    """The nearest contact on a plan. tau: its time at full speed without the ramps [s]."""
 
     contact: Contact
     tau: float
@@ -80,11 +82,14 @@ class Nearest:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Segments in their order, tau running through them all.
+    """Segments in their order; tau runs through all of them.
 
-    clear_of, fingers: the world it is known to be clear of, with the finger joint at that angle
-    [rad]; None when nothing was looked at. nearest: the least clearance on the whole
-    way; None where nothing can meet or nothing was looked at.
+    Attributes:
+        segments: the timed paths.
+        clear_of: fingerprint of the world in which the plan is clear; None when it was not checked.
+        fingers: angle of the finger joint meanwhile [rad].
+        nearest: the minimum clearance on the whole path; None where nothing can meet or nothing was
+            checked.
     """
 
     segments: tuple[Segment, ...]
@@ -94,42 +99,42 @@ class Plan:
 
     @cached_property
     def begins(self) -> tuple[float, ...]:
-        """Tau at which each segment begins, and the last ends [s]."""
+        """The tau at which each segment begins, and that at the end of the last [s]."""
         spans = [segment.scaling.span for segment in self.segments]
         return tuple(np.cumsum([0.0, *spans]).tolist())
 
     @property
     def span(self) -> float:
-        """Tau at the end [s]."""
+        """The tau at the end [s]."""
         return self.begins[-1]
 
     @property
     def duration(self) -> float:
-        """[s] at full speed, from rest to rest of every segment."""
+        """The duration [s] at full speed, from rest to rest of every segment."""
         return sum(segment.scaling.duration for segment in self.segments)
 
     @property
     def length(self) -> float:
-        """Of the tool point's way [m]."""
+        """The length of the tool point's path [m]."""
         return sum(segment.length for segment in self.segments)
 
     @cached_property
     def start(self) -> FloatArray:
-        """(5,) where it begins [rad]."""
+        """The joint angles (5,) [rad] at the start."""
         return self.segments[0].path.start
 
     @cached_property
     def end(self) -> FloatArray:
-        """(5,) where it ends [rad]."""
+        """The joint angles (5,) [rad] at the end."""
         return self.segments[-1].path.end
 
     def q(self, tau: float) -> FloatArray:
-        """(5,) the joints at `tau` [s], from 0 to `span` [rad]."""
+        """Return the joint angles (5,) [rad] at `tau` [s], from 0 to `span`."""
         number = min(max(bisect_right(self.begins, tau) - 1, 0), len(self.segments) - 1)
         return self.segments[number].at(tau - self.begins[number]).q
 
     def postures(self, count: int) -> FloatArray:
-        """(count, 5) joints evenly in tau, from start to end [rad]: a preview of the way."""
+        """Return joint angles (count, 5) [rad] evenly in tau from start to end, for a preview."""
         return np.array([self.q(tau) for tau in np.linspace(0.0, self.span, count).tolist()])
 
 
@@ -140,29 +145,36 @@ def plan(
     fingers: float = 0.0,
     margin: float = MARGIN,
 ) -> Plan:
-    """The paths in their order, each as fast as `bounds` allow, with the arm at rest between them.
+    """Return the paths as a plan, each as fast as `bounds` allow, with rest between them.
 
-    world: what must not be touched, with whatever the gripper holds; without one nothing is looked
-    at. fingers: the angle of the finger joint meanwhile [rad]. margin: the distance kept [m]; what
-    is nearer at the start comes no nearer. Raises BlockedError where that cannot be: which parts,
-    how near, where; InputError when the paths do not meet each other.
+    Args:
+        paths: the paths, each of which begins where the one before ends.
+        bounds: the limits of the motion.
+        world: the obstacles, with anything that the gripper holds; None skips all checks.
+        fingers: angle of the finger joint meanwhile [rad].
+        margin: distance to keep [m]; parts that are nearer at the start come no nearer.
+
+    Raises:
+        BlockedError: a path comes too near to something. The message names parts, distance and
+            place.
+        InputError: the paths do not meet each other.
     """
     if not paths:
-        raise InputError("A plan needs a path at least.")
+        raise InputError("A plan needs at least one path.")
     for number, (before, after) in enumerate(pairwise(paths), 1):
         gap = float(np.abs(after.start - before.end).max())
         if gap > JOIN_TOLERANCE:
             raise InputError(
                 f"Path {number + 1} begins {np.degrees(gap):.3g} deg from where path {number} ends."
             )
-    # A path that is gone along again is looked at and timed once.
+    # A path that is used repeatedly is checked and timed once.
     once = {id(path): path for path in paths}
-    looked = {
+    checked = {
         key: None if world is None else _clearance(path, world, fingers, margin)
         for key, path in once.items()
     }
     timed = {key: Segment(path, fastest(path, bounds)) for key, path in once.items()}
-    clearances = [looked[id(path)] for path in paths]
+    clearances = [checked[id(path)] for path in paths]
     segments = tuple(timed[id(path)] for path in paths)
     found = Plan(segments, None if world is None else world.fingerprint, fingers)
     each = [
@@ -174,29 +186,30 @@ def plan(
 
 
 def check_clear(path: Path, world: CollisionWorld, fingers: float, margin: float = MARGIN) -> None:
-    """BlockedError, as of `plan`, unless the whole of `path` keeps `margin` [m]."""
-    _clearance(path, world, fingers, margin, canonical=False)
+    """Raise BlockedError, as `plan`, unless the whole of `path` keeps `margin` [m]."""
+    _clearance(path, world, fingers, margin, with_nearest=False)
 
 
 def _clearance(
-    path: Path, world: CollisionWorld, fingers: float, margin: float, *, canonical: bool = True
+    path: Path, world: CollisionWorld, fingers: float, margin: float, *, with_nearest: bool = True
 ) -> Clearance | None:
-    """The nearest on `path`, if it is asked for; BlockedError where it is too near."""
+    """Return the nearest contact on `path` if `with_nearest`; raise BlockedError if too near."""
     sweep = Sweep(path)
     room = SweptClearance.about(world, margin, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
     met = sweep.blocked(room, fingers)
     if met is None:
-        return sweep.nearest(room, fingers) if canonical else None
+        return sweep.nearest(room, fingers) if with_nearest else None
     one, other = met.contact.parts
     x, y, z = (1e3 * forward(path.chain, sweep.at(met.sigma, fingers)[:5])[:3, 3]).tolist()
     raise BlockedError(
-        f"The way is blocked {100.0 * met.sigma:.0f} % along it, with the tool at ({x:.0f}, "
-        f"{y:.0f}, {z:.0f}) mm: {one} and {other} would be {_apart(met.contact.distance)}, and "
-        f"{1e3 * margin:g} mm are kept. Lead the way round, or move what is there."
+        f"The path is blocked {100.0 * met.sigma:.0f} % along it, with the tool at ({x:.0f}, "
+        f"{y:.0f}, {z:.0f}) mm: {one} and {other} would {_apart(met.contact.distance)}, and "
+        f"{1e3 * margin:g} mm are required. Lead the path around the obstacle, or move it."
     )
 
 
 def _apart(distance: float) -> str:
+    """Return a distance [m] in words, for an error message."""
     if distance < 0.0:
-        return f"{-1e3 * distance:.1f} mm in each other"
-    return f"{1e3 * distance:.1f} mm apart"
+        return f"overlap by {-1e3 * distance:.1f} mm"
+    return f"be {1e3 * distance:.1f} mm apart"

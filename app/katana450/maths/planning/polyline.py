@@ -22,26 +22,31 @@ QUINTIC = np.array(
         [-1.0, 5.0, -10.0, 10.0, -5.0, 1.0],
     ]
 )
-"""From the control points of a Bezier curve of degree 5 to its coefficients, lowest power first."""
+"""The map from the control points of a Bezier curve of degree 5 to its coefficients, lowest power
+first.
+"""
 
 STRETCH = 2.5
-"""[1] How much of sigma a corner takes, to its reach along either leg, for its ends to be passed as
-quickly as the legs are."""
+"""Ratio [1] of a corner's length in sigma to its reach along either leg, which makes the speed at
+its ends equal to that of the legs.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """From via to via on straight legs, round each corner on a quintic.
+    """Straight legs from via to via, with a quintic round each corner.
 
-    A corner is a Bezier curve of degree 5 whose control points lie on the two legs, three evenly
-    spaced on each, the last of the one and the first of the other in the via: so it leaves and
-    meets the legs with their rates and without acceleration, and stays in the triangle that it cuts
-    off (Farin, Curves and Surfaces for CAGD, 2002, ch. 5). Inner vias are passed by, the nearer
-    the smaller the blend.
+    A corner is a Bezier curve of degree 5. Its control points lie on the two legs, three evenly
+    spaced on each; the last of the first leg and the first of the second leg are the via. It
+    therefore leaves and meets the legs with their rates and without acceleration, and stays in the
+    triangle that it cuts off (Farin, Curves and Surfaces for CAGD, 2002, ch. 5). The path passes
+    beside inner vias, the nearer the smaller the blend.
 
-    vias: (m, n), the first and last are start and end. lengths: (m - 1,) how much of sigma each leg
-    takes, to the others. blend: (m - 2,) how much of half of its shorter leg each corner cuts off,
-    above 0 up to 1.
+    Attributes:
+        vias: (m, n), the first and last are start and end.
+        lengths: length (m - 1,) of each leg in sigma, relative to the others.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
     """
 
     vias: FloatArray
@@ -54,17 +59,17 @@ class Polyline:
     def __post_init__(self) -> None:
         blend = finite_array(self.blend, (len(self.vias) - 2,), "The blend of the corners")
         if not ((blend > 0.0) & (blend <= 1.0)).all():
-            raise InputError(f"A blend is above 0 and up to 1, not {blend.tolist()}.")
+            raise InputError(f"A blend must be above 0 and at most 1, not {blend.tolist()}.")
         object.__setattr__(self, "blend", frozen(blend))
         self._build()
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """Where legs and corners meet."""
+        """The places where legs and corners meet."""
         return tuple(start / self._total for start in self._starts[1:])
 
     def at(self, sigma: Jet) -> tuple[Jet, ...]:
-        """The n coordinates at `sigma`, one place or many (N,)."""
+        """Return the n coordinates at `sigma`, one place or many (N,)."""
         t = self._total * sigma
         if isinstance(t.c0, float):
             piece = max(bisect_right(self._starts, t.c0) - 1, 0)
@@ -76,7 +81,7 @@ class Polyline:
         return tuple(_polynomial(row, local) for row in terms)
 
     def _build(self) -> None:
-        """Legs and corners as polynomials, each from 0 of its own fraction of sigma."""
+        """Build legs and corners as polynomials, each from 0 of its own part of sigma."""
         vias, lengths = self.vias, self.lengths
         rates = np.diff(vias, axis=0) / lengths[:, None]
         cut = np.zeros(len(vias))
@@ -94,17 +99,22 @@ class Polyline:
                 reach, via = cut[leg + 1], vias[leg + 1]
                 before, after = via - reach * rate, via + reach * rates[leg + 1]
                 points = (before, 0.5 * (before + via), via, via, 0.5 * (via + after), after)
-                lasts = STRETCH * float(reach)
+                corner_length = STRETCH * float(reach)
                 starts.append(at)
-                terms.append((QUINTIC @ np.array(points)) / lasts ** np.arange(6.0)[:, None])
-                at += lasts
+                terms.append(
+                    (QUINTIC @ np.array(points)) / corner_length ** np.arange(6.0)[:, None]
+                )
+                at += corner_length
         object.__setattr__(self, "_starts", starts)
         object.__setattr__(self, "_terms", frozen(terms))
         object.__setattr__(self, "_total", at)
 
 
 def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
-    """By Horner's rule; `terms` of the lowest power first, floats or (6, N)."""
+    """Return the polynomial at `t` by Horner's rule.
+
+    `terms` are floats or (6, N), the lowest power first.
+    """
     found = Jet.constant(terms[5])
     for term in (terms[4], terms[3], terms[2], terms[1], terms[0]):
         found = found * t + term

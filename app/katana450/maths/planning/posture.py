@@ -1,6 +1,6 @@
-"""The joints that have the tool somewhere on one branch, and the tool point of joints, as jets.
+"""Inverse and forward kinematics on jets: joints of one branch, and the tool point.
 
-The closed form of maths/kinematics/closed_form.py run on Taylor series: exact, with derivatives.
+The closed form of maths/kinematics/closed_form.py runs on Taylor series: exact, with derivatives.
 Lengths in m, angles in rad.
 """
 
@@ -18,10 +18,11 @@ ThreeJets = tuple[Jet, Jet, Jet]
 def facing(
     arm: FiveAxisArm, shoulder: Shoulder, x: Jet, y: Jet, z: Jet, aside: Jet | float = 0.0
 ) -> ThreeJets:
-    """(alpha1, u, height): the arm's plane that holds the point (x, y, z) of {S}.
+    """Return (alpha1, u, height) of the arm's plane that holds the point (x, y, z) of {S}.
 
-    aside: how far sideways of {K} the point is in it [m]. u: how far outward the point is from axis
-    1 [m], not a number where no plane holds it; height: above the shoulder [m].
+    `aside` is the sideways offset of the point from {K} in the plane [m]. u is the distance of the
+    point outward from axis 1 [m], NaN where no plane holds it. height is its distance above the
+    shoulder [m].
     """
     (r11, r12, r13, p1), (r21, r22, r23, p2), (r31, r32, r33, p3), _ = arm.T_C_S.tolist()
     if not arm.is_canonical:
@@ -39,16 +40,16 @@ def facing(
 def posture(
     arm: FiveAxisArm, branch: Branch, x: Jet, y: Jet, z: Jet, pitch: Jet, roll: Jet
 ) -> FiveJets:
-    """alpha, the canonical angles on `branch` with the tool point at (x, y, z) of {S}.
+    """Return the canonical angles on `branch` with the tool point at (x, y, z) of {S}.
 
-    Angles differ by whole turns from those inside limits. Out of reach they are not numbers.
+    The angles may differ by whole turns from those inside limits. Out of reach they are NaN.
     """
     sp, cp = sin_cos(pitch)
     sr, cr = sin_cos(roll)
     outward: Jet | float
     outward, sideways, up = _beside(arm, sp, cp, sr, cr) if arm.off_axis else (0.0, 0.0, 0.0)
     alpha1, u, height = facing(arm, branch.shoulder, x, y, z, sideways)
-    # {K} as its own plane sees it: there alpha1 is 0.
+    # {K} in its own plane: there alpha1 is 0.
     rows = (
         (cp, sp * sr, sp * cr, u - outward),
         (Jet.constant(0.0), cr, -sr, Jet.constant(arm.d)),
@@ -57,12 +58,12 @@ def posture(
     )
     _, elbow_up, elbow_down, bend, _ = closed_form(arm, JETS)(1.0, 0.0, u - outward, rows)
     two, three = (elbow_up, bend) if branch.elbow == "up" else (elbow_down, -bend)
-    # Pitch and roll as they were given have not lost their turns.
+    # The given pitch and roll have kept their turns.
     return alpha1, two, three, (pitch + arm.tilt) - two - three, roll
 
 
 def tool_point(arm: FiveAxisArm, alpha: FiveJets) -> ThreeJets:
-    """The tool point in {C} at the canonical angles `alpha`."""
+    """Return the tool point in {C} at the canonical angles `alpha`."""
     one, two, three, four, five = alpha
     b = two + three
     phi = b + four
@@ -77,7 +78,7 @@ def tool_point(arm: FiveAxisArm, alpha: FiveJets) -> ThreeJets:
 
 
 def _beside(arm: FiveAxisArm, sp: Jet, cp: Jet, sr: Jet, cr: Jet) -> ThreeJets:
-    """As `FiveAxisArm.beside`: the tool point from {K}, outward, sideways and up."""
+    """Return the tool point relative to {K}, as `FiveAxisArm.beside`: outward, sideways, up."""
     x, y, z = arm.T_K_tool[:3, 3].tolist()
     y, z = cr * y - sr * z, sr * y + cr * z
     return cp * x + sp * z, y, cp * z - sp * x

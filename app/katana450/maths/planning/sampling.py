@@ -1,8 +1,8 @@
-"""A way round: two trees of clear postures that grow towards each other, then drawn taut.
+"""A path around obstacles: two trees of clear postures that grow together, then shortcuts.
 
 Sources: Kuffner and LaValle, RRT-Connect, ICRA 2000; Geraerts and Overmars, Creating high-quality
-paths for motion planning, 2007, for shortcuts. Chance comes from a seed, and effort is counted in
-postures, so the same question has the same answer on every machine.
+paths for motion planning, 2007, for shortcuts. Random numbers come from a seed, and effort is
+counted in postures, so the same question has the same answer on every machine.
 """
 
 from __future__ import annotations
@@ -22,48 +22,50 @@ from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.plan import MARGIN, check_clear
 
 TREE_STEP: Final = 0.3
-"""[s] How long the joints move at full speed from one posture of a tree to the next."""
+"""Duration [s] of the motion at full speed from one posture of a tree to the next."""
 
 MAX_POSTURES: Final = 3000
-"""Postures drawn before the search is given up: some seconds."""
+"""Maximum number of drawn postures before the search ends without success: some seconds."""
 
 SHORTCUTS: Final = 150
-"""Tries to go straight from one place of the way to another."""
+"""Number of attempts to connect two places of the path by a straight line."""
 
 ROUNDINGS: Final = (1.0, 0.5, 0.25, 0.1, 0.03)
 """Fractions of half a leg that a corner may cut off, the smoothest first."""
 
 SAME_POSTURE_TIME: Final = 1e-3
-"""[s] What is nearer than this is the same posture."""
+"""Postures nearer to each other than this [s] are the same."""
 
 
 @dataclass
 class _Tree:
-    """Postures (k,) [rad] and the one each was reached from."""
+    """A tree of postures (k,) [rad]; each knows the number of its parent."""
 
     postures: list[FloatArray]
     came_from: list[int] = field(default_factory=lambda: [-1])
 
     def nearest(self, q: FloatArray, speed: FloatArray) -> int:
+        """Return the number of the posture nearest to ``q`` in time."""
         away = np.abs(np.array(self.postures) - q) / speed
         return int(np.einsum("nk,nk->n", away, away).argmin())
 
     def grown(self, number: int, q: FloatArray) -> int:
+        """Add the posture ``q``, reached from posture ``number``, and return its number."""
         self.postures.append(q)
         self.came_from.append(number)
         return len(self.postures) - 1
 
-    def way(self, number: int) -> list[FloatArray]:
-        """From posture ``number`` back to the root."""
-        way = []
+    def path(self, number: int) -> list[FloatArray]:
+        """Return the postures from posture ``number`` back to the root."""
+        path = []
         while number >= 0:
-            way.append(self.postures[number])
+            path.append(self.postures[number])
             number = self.came_from[number]
-        return way
+        return path
 
 
 class _Search:
-    """One question: from where to where, in what room."""
+    """The search for one path between two postures in one world."""
 
     def __init__(
         self,
@@ -80,12 +82,12 @@ class _Search:
         self.start, self.end = start, end
 
     def met(self, a: FloatArray, b: FloatArray) -> Contact | None:
-        """What is too near on the straight way from `a` to `b`; None when nothing is."""
+        """Return the contact on the straight path from `a` to `b`; None when it is clear."""
         found = self.room.blocked_line(np.append(a, self.fingers), np.append(b, self.fingers))
         return None if found is None else found.contact
 
     def connected(self, random: np.random.Generator) -> list[FloatArray] | None:
-        """Vias of a clear way; None when EFFORT was not enough."""
+        """Return the vias of a clear path; None when MAX_POSTURES were not enough."""
         chain, speed = self.chain, self.chain.speed
         trees = _Tree([self.start]), _Tree([self.end])
         for turn in range(MAX_POSTURES):
@@ -99,57 +101,58 @@ class _Search:
             while number is not None and not self._same(other.postures[number], reached):
                 number = self._extended(other, number, reached)
             if number is not None:
-                way = growing.way(new)[::-1] + other.way(number)[1:]
-                return way if turn % 2 == 0 else way[::-1]
+                path = growing.path(new)[::-1] + other.path(number)[1:]
+                return path if turn % 2 == 0 else path[::-1]
         return None
 
     def _extended(self, tree: _Tree, number: int, towards: FloatArray) -> int | None:
-        """A step from posture `number`; None when it is not clear."""
+        """Add a step from posture `number`; return None when it is not clear."""
         here = tree.postures[number]
-        way = towards - here
-        fraction = TREE_STEP / float((np.abs(way) / self.chain.speed).max())
-        q = towards if fraction >= 1.0 else here + fraction * way
+        step = towards - here
+        fraction = TREE_STEP / float((np.abs(step) / self.chain.speed).max())
+        q = towards if fraction >= 1.0 else here + fraction * step
         return None if self.met(here, q) is not None else tree.grown(number, q)
 
     def _same(self, a: FloatArray, b: FloatArray) -> bool:
         return bool((np.abs(a - b) <= SAME_POSTURE_TIME * self.chain.speed).all())
 
-    def taut(self, way: list[FloatArray], random: np.random.Generator) -> list[FloatArray]:
-        """`way` with its detours cut off, never longer in time."""
+    def taut(self, path: list[FloatArray], random: np.random.Generator) -> list[FloatArray]:
+        """Return `path` with its detours cut off, never longer in time."""
         for _ in range(SHORTCUTS):
-            if len(way) == 2:
+            if len(path) == 2:
                 break
-            low, high = np.sort(random.uniform(0.0, len(way) - 1.0, 2)).tolist()
+            low, high = np.sort(random.uniform(0.0, len(path) - 1.0, 2)).tolist()
             before, after = int(low), int(high)
             if before == after:
                 continue
-            a = way[before] + (low - before) * (way[before + 1] - way[before])
-            b = way[after] + (high - after) * (way[min(after + 1, len(way) - 1)] - way[after])
-            around = [a, *way[before + 1 : after + 1], b]
-            if self._long([a, b]) < 0.99 * self._long(around) and self.met(a, b) is None:
-                way = self._tidied([*way[: before + 1], a, b, *way[after + 1 :]])
-        return self._fewer(way)
+            a = path[before] + (low - before) * (path[before + 1] - path[before])
+            b = path[after] + (high - after) * (path[min(after + 1, len(path) - 1)] - path[after])
+            around = [a, *path[before + 1 : after + 1], b]
+            if self._duration([a, b]) < 0.99 * self._duration(around) and self.met(a, b) is None:
+                path = self._tidied([*path[: before + 1], a, b, *path[after + 1 :]])
+        return self._fewer(path)
 
-    def _fewer(self, way: list[FloatArray]) -> list[FloatArray]:
-        """Without the vias that the way does not need."""
+    def _fewer(self, path: list[FloatArray]) -> list[FloatArray]:
+        """Return `path` without the vias that it does not need."""
         number = 1
-        while number < len(way) - 1:
-            if self.met(way[number - 1], way[number + 1]) is None:
-                del way[number]
+        while number < len(path) - 1:
+            if self.met(path[number - 1], path[number + 1]) is None:
+                del path[number]
             else:
                 number += 1
-        return way
+        return path
 
-    def _tidied(self, way: list[FloatArray]) -> list[FloatArray]:
-        kept = way[:1]
-        for q in way[1:-1]:
-            if not self._same(kept[-1], q) and not self._same(way[-1], q):
+    def _tidied(self, path: list[FloatArray]) -> list[FloatArray]:
+        """Return `path` without vias next to each other or to its end."""
+        kept = path[:1]
+        for q in path[1:-1]:
+            if not self._same(kept[-1], q) and not self._same(path[-1], q):
                 kept.append(q)
-        return [*kept, way[-1]]
+        return [*kept, path[-1]]
 
-    def _long(self, way: list[FloatArray]) -> float:
-        """[s] with every leg at full speed."""
-        legs = np.abs(np.diff(np.array(way), axis=0)) / self.chain.speed
+    def _duration(self, path: list[FloatArray]) -> float:
+        """Return the duration [s] with every leg at full speed."""
+        legs = np.abs(np.diff(np.array(path), axis=0)) / self.chain.speed
         return float(legs.max(axis=1).sum())
 
 
@@ -161,9 +164,9 @@ def collision_free_path(
     fingers: float,
     seed: int,
 ) -> JointPath:
-    """A clear path from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
+    """Return a clear path from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
 
-    Raises BlockedError when an end is too near to something, or none was found.
+    Raises BlockedError when an end is too near to an obstacle, or when no path was found.
     """
     search = _Search(chain, world, fingers, start, end)
     for name, q in (("start", start), ("end", end)):
@@ -171,31 +174,31 @@ def collision_free_path(
         if met is not None:
             one, other = met.parts
             raise BlockedError(
-                f"At the {name} {one} and {other} are {1e3 * met.distance:.1f} mm from each other, "
-                "which is too near: choose another posture."
+                f"At the {name}, the clearance between {one} and {other} is "
+                f"{1e3 * met.distance:.1f} mm, which is too small. Choose another posture."
             )
     random = np.random.default_rng(seed)
-    way = search.connected(random)
-    if way is None:
+    vias = search.connected(random)
+    if vias is None:
         straight = search.met(start, end)
         between = (
-            "" if straight is None else f" The straight way meets {' and '.join(straight.parts)}."
+            "" if straight is None else f" The straight path meets {' and '.join(straight.parts)}."
         )
         raise BlockedError(
-            f"No way round was found in {MAX_POSTURES} tries from seed {seed}.{between} "
-            "Try another seed, or go by a posture in between."
+            f"No path around the obstacles was found in {MAX_POSTURES} tries from seed {seed}."
+            f"{between} Try another seed, or add a posture in between."
         )
-    way = search.taut(way, random)
-    # Each corner as smooth as there is room for.
-    blend = np.full(len(way) - 2, ROUNDINGS[0])
+    vias = search.taut(vias, random)
+    # Each corner is as smooth as the free space allows.
+    blend = np.full(len(vias) - 2, ROUNDINGS[0])
     for rounding in ROUNDINGS:
         blend = np.minimum(blend, rounding)
-        path = JointPath(chain, np.array(way), blend)
+        path = JointPath(chain, np.array(vias), blend)
         try:
             check_clear(path, world, fingers)
         except BlockedError:
             continue
         return path
     raise BlockedError(
-        "A way round was found, but none that can be run through without a halt. Try another seed."
+        "The path found cannot be followed without stops at its corners. Try another seed."
     )

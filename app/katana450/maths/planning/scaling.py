@@ -1,7 +1,7 @@
-"""How a path is run through in time: as fast as the limits allow, and slower wherever asked.
+"""The time scaling of a path: as fast as the limits allow, and slower on request.
 
-Two steps lead from time to the path. sigma = g(tau) is fixed when a path is planned; tau(t) is left
-to whoever runs it, as long as |tau'| <= 1, |tau''| <= a and |tau'''| <= j. With subscripts for
+Two steps lead from time to the path. sigma = g(tau) is fixed when a path is planned. tau(t) is
+chosen while the path runs, with |tau'| <= 1, |tau''| <= a and |tau'''| <= j. With subscripts for
 derivatives by tau the joints then have
 
     qd = q_tau tau',   qdd = q_tautau tau'^2 + q_tau tau'',
@@ -11,7 +11,7 @@ so that speed, acceleration and jerk keep their limits v, A, J for every such ta
 
     |q_tau| <= v,   |q_tautau| + |q_tau| a <= A,   |q_tautautau| + 3 |q_tautau| a + |q_tau| j <= J.
 
-To pause, reverse or slow down is then a matter of tau alone and keeps the shape of the path. g is
+To pause, reverse or slow down therefore changes tau alone and keeps the shape of the path. g is
 given by its slowness w = d tau / d sigma, a uniform cubic B-spline with coefficients above 0.
 """
 
@@ -35,15 +35,21 @@ CUBIC: Final = (
     )
     / 6.0
 )
-"""From four coefficients of a uniform cubic B-spline to the polynomial between two knots."""
+"""The map from four coefficients of a uniform cubic B-spline to the polynomial between two knots.
+"""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What a motion keeps to.
+    """The limits of a motion along a path.
 
-    joints: of speed, acceleration and jerk. tool_speed: the most of the tool point [m/s].
-    tool_acceleration: the same [m/s^2], as for a full cup; None for any.
+    Raises InputError unless the tool's limits are numbers above 0.
+
+    Attributes:
+        joints: limits of speed, acceleration and jerk.
+        tool_speed: maximum speed of the tool point [m/s].
+        tool_acceleration: maximum acceleration of the tool point [m/s^2], as for a full cup; None
+            for no limit.
     """
 
     joints: Limits
@@ -56,12 +62,12 @@ class Bounds:
             ("acceleration", self.tool_acceleration),
         ):
             if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise InputError(f"The tool's {name} has to be a number above 0, not {value!r}.")
+                raise InputError(f"The tool's {name} must be a number above 0, not {value!r}.")
 
 
 @dataclass(frozen=True)
 class PathRates:
-    """sigma at some tau, and its first three derivatives by tau."""
+    """Sigma at some tau, and its first three derivatives by tau."""
 
     sigma: float
     first: float
@@ -71,10 +77,11 @@ class PathRates:
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """sigma = g(tau) from 0 to `span` [s], and what tau(t) may do.
+    """The map sigma = g(tau) for tau from 0 to `span` [s], and the limits of tau(t).
 
-    coefficients: (K + 3,) [s] of the slowness over K equal pieces of sigma. acceleration, jerk: a
-    and j, the most of tau'' [1/s] and tau''' [1/s^2].
+    Attributes:
+        coefficients: coefficients (K + 3,) [s] of the slowness over K equal pieces of sigma.
+        acceleration, jerk: a and j, the maximum of tau'' [1/s] and tau''' [1/s^2].
     """
 
     coefficients: FloatArray
@@ -84,30 +91,32 @@ class Scaling:
     def __post_init__(self) -> None:
         c = finite_array(self.coefficients, (np.size(self.coefficients),), "The coefficients")
         if len(c) < 4 or not (c > 0.0).all() or not min(self.acceleration, self.jerk) > 0.0:
-            raise InputError("A scaling needs four or more coefficients, all its numbers above 0.")
+            raise InputError(
+                "A scaling needs at least four coefficients, and all its numbers above 0."
+            )
         object.__setattr__(self, "coefficients", frozen(c))
 
     @property
     def span(self) -> float:
-        """Tau at the end of the path [s]."""
+        """The tau at the end of the path [s]."""
         return self._starts[-1]
 
     @property
     def duration(self) -> float:
-        """[s] from rest to rest at full speed."""
+        """The duration [s] from rest to rest at full speed."""
         return rest_to_rest(self.span, self.acceleration, self.jerk)
 
     def tau_after(self, t: float) -> float:
-        """Tau [s] ``t`` [s] after the start at full speed, from 0 to `duration`."""
+        """Return tau [s] at ``t`` [s] after the start at full speed, from 0 to `duration`."""
         return self.motion_after(t)[0]
 
     def motion_after(self, t: float) -> tuple[float, float, float]:
-        """Tau [s] ``t`` [s] after the start at full speed, tau' [1] and tau'' [1/s]."""
+        """Return tau [s], tau' [1] and tau'' [1/s] at ``t`` [s] after the start at full speed."""
         return motion_after(t, self.span, self.acceleration, self.jerk)
 
     @cached_property
     def _pieces(self) -> list[list[float]]:
-        """Of each piece the slowness as a polynomial of its own fraction."""
+        """The slowness of each piece as a polynomial of the fraction of that piece."""
         c = self.coefficients
         fours = np.stack([c[k : len(c) - 3 + k] for k in range(4)], axis=1)
         pieces: list[list[float]] = (fours @ CUBIC.T).tolist()
@@ -115,19 +124,19 @@ class Scaling:
 
     @cached_property
     def _starts(self) -> list[float]:
-        """Tau where each piece begins, and that at the end."""
+        """The tau at which each piece begins, and that at the end."""
         fractions = np.array([1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0]) / len(self._pieces)
         passed = np.cumsum(np.array(self._pieces) @ fractions)
         return [0.0, *passed.tolist()]
 
     def pace(self, tau: float) -> PathRates:
-        """Sigma at `tau`, from 0 to `span`."""
+        """Return sigma and its derivatives at `tau`, from 0 to `span`."""
         starts, count = self._starts, len(self._pieces)
         piece = min(max(bisect_right(starts, tau) - 1, 0), count - 1)
         a, b, c, d = self._pieces[piece]
         passed = (tau - starts[piece]) * count
-        # tau grows with the fraction and is nearly straight over a piece: Newton is there in no
-        # time.
+        # tau grows with the fraction and is nearly straight over a piece: Newton's rule converges
+        # fast.
         fraction = passed / ((starts[piece + 1] - starts[piece]) * count)
         for _ in range(8):
             gone = fraction * (a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0)))
@@ -141,7 +150,7 @@ class Scaling:
         return PathRates((piece + fraction) / count, *_inverted(w, w1, w2))
 
     def tau(self, sigma: float) -> float:
-        """[s] at the place `sigma` of the path, from 0 to 1."""
+        """Return tau [s] at the place `sigma` of the path, from 0 to 1."""
         count = len(self._pieces)
         piece = min(max(int(sigma * count), 0), count - 1)
         a, b, c, d = self._pieces[piece]
@@ -150,32 +159,32 @@ class Scaling:
         return self._starts[piece] + gone / count
 
 
-def rest_to_rest(way: float, a: float, j: float) -> float:
-    """[s] that `way` takes from rest to rest under a speed of 1, acceleration `a`, jerk `j`.
+def rest_to_rest(distance: float, a: float, j: float) -> float:
+    """Return the time [s] for `distance` from rest to rest at speed 1, acceleration `a`, jerk `j`.
 
     Source: Biagiotti and Melchiorri, Trajectory Planning (2008), ch. 3.4.
     """
     if a * a >= j:
         # Full speed is reached without full acceleration.
         up = 2.0 / math.sqrt(j)
-        return way + up if way >= up else 4.0 * (way / (2.0 * j)) ** (1.0 / 3.0)
+        return distance + up if distance >= up else 4.0 * (distance / (2.0 * j)) ** (1.0 / 3.0)
     up = 1.0 / a + a / j
-    if way >= up:
-        return way + up
-    if way >= 2.0 * a**3 / j**2:
-        return a / j + math.sqrt((a / j) ** 2 + 4.0 * way / a)
-    return float(4.0 * (way / (2.0 * j)) ** (1.0 / 3.0))
+    if distance >= up:
+        return distance + up
+    if distance >= 2.0 * a**3 / j**2:
+        return a / j + math.sqrt((a / j) ** 2 + 4.0 * distance / a)
+    return float(4.0 * (distance / (2.0 * j)) ** (1.0 / 3.0))
 
 
-def motion_after(t: float, way: float, a: float, j: float) -> tuple[float, float, float]:
-    """The motion of `rest_to_rest` ``t`` [s] after its start: place, speed and acceleration."""
-    total = rest_to_rest(way, a, j)
+def motion_after(t: float, distance: float, a: float, j: float) -> tuple[float, float, float]:
+    """Return place, speed and acceleration of `rest_to_rest` at ``t`` [s] after its start."""
+    total = rest_to_rest(distance, a, j)
     t = min(max(t, 0.0), total)
     if t > 0.5 * total:
-        left, speed, acceleration = motion_after(total - t, way, a, j)
-        return way - left, speed, -acceleration
+        left, speed, acceleration = motion_after(total - t, distance, a, j)
+        return distance - left, speed, -acceleration
     # The jerk lasts for `ramp`, and the speed grows until `up`.
-    ramp = min(a / j, 1.0 / math.sqrt(j), math.cbrt(way / (2.0 * j)))
+    ramp = min(a / j, 1.0 / math.sqrt(j), math.cbrt(distance / (2.0 * j)))
     up = min(1.0 / (j * ramp) + ramp, 0.5 * total)
     if t <= ramp:
         return j * t**3 / 6.0, 0.5 * j * t**2, j * t
@@ -190,7 +199,10 @@ def motion_after(t: float, way: float, a: float, j: float) -> tuple[float, float
 
 
 def _inverted(w: float, w1: float, w2: float) -> tuple[float, float, float]:
-    """sigma_tau, sigma_tautau, sigma_tautautau from the slowness and its derivatives by sigma."""
+    """Return sigma_tau, sigma_tautau, sigma_tautautau from the slowness and its derivatives.
+
+    The derivatives w1, w2 are by sigma.
+    """
     first = 1.0 / w
     cube = first**3
     return first, -w1 * cube, (3.0 * w1 * w1 * first - w2) * cube * first

@@ -1,4 +1,4 @@
-"""What a path sweeps: where the arm is along it, and how far its joints turn between two places."""
+"""The motion along a path: the arm at a place, and bounds on the joint turns between two places."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path, joint_derivatives
 
 SWEEP_PIECES = 512
-"""Pieces in each of which the rates of the joints are bounded."""
+"""Number of pieces; in each of them the rates of the joints are bounded."""
 
 MAX_DERIVATIVE_RATIO = 2.0
-"""[1] The third derivative changes by no more than this within a piece."""
+"""Maximum ratio [1] of the third derivative within a piece to that at its ends."""
 
 
 class Sweep:
-    """Along one path. Its methods are pure."""
+    """The motion along one path. Its methods are pure."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -26,17 +26,18 @@ class Sweep:
         d = np.abs(joint_derivatives(path, self._sigma))
         h = np.diff(self._sigma)[:, None]
         rate, jerk = (np.maximum(each[:-1], each[1:]) for each in (d[1], d[3]))
-        # Between its ends a function is above its chord by no more than h^2 / 8 of its bend.
+        # Between its ends a function is above its chord by at most h^2 / 8 of its second
+        # derivative.
         turns = h * (rate + MAX_DERIVATIVE_RATIO * h * h / 8.0 * jerk)
         self._turned = np.vstack((np.zeros(turns.shape[1]), np.cumsum(turns, axis=0)))
 
     def at(self, sigma: float, fingers: float) -> FloatArray:
-        """(6,) the joints at `sigma`, and the `fingers` as they are held [rad]."""
+        """Return the joints at `sigma` and the fixed angle of the `fingers`, (6,) [rad]."""
         joints = self._path.joints(Jet.variable(sigma))
         return np.array([*(each.c0 for each in joints), fingers])
 
     def nearest(self, room: SweptClearance, fingers: float) -> Clearance | None:
-        """Where on the whole path parts come nearest."""
+        """Return the nearest contact on the whole path; None when no parts can meet."""
         return room.nearest(lambda sigma: self.at(sigma, fingers), self.turned)
 
     def blocked(
@@ -47,14 +48,15 @@ class Sweep:
         high: float = 1.0,
         fine: float = FINE,
     ) -> Clearance | None:
-        """A place between two that is too near, or None; as `SweptClearance.blocked`."""
+        """Return a place from `low` to `high` that is too near, as `SweptClearance.blocked`."""
         return room.blocked(lambda sigma: self.at(sigma, fingers), self.turned, low, high, fine)
 
     def turned(self, low: float, high: float) -> FloatArray:
-        """(6,) at most how far each turns between two places [rad]."""
+        """Return a bound (6,) on the turn of each joint between two places [rad]."""
         return np.append(self._passed(high) - self._passed(low), 0.0)
 
     def _passed(self, sigma: float) -> FloatArray:
+        """Return the bound on the turns (5,) from the start to `sigma`."""
         piece = int(np.searchsorted(self._sigma, sigma, side="right")) - 1
         piece = min(max(piece, 0), len(self._sigma) - 2)
         low, high = self._sigma[piece], self._sigma[piece + 1]

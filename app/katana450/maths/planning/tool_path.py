@@ -1,4 +1,4 @@
-"""Joints that take the tool along a curve, solved anew at every place: nothing is interpolated."""
+"""A joint path that keeps the tool on a curve, computed at every place without interpolation."""
 
 from __future__ import annotations
 
@@ -24,29 +24,35 @@ from katana450.maths.planning.jet import Coefficient, Jet
 from katana450.maths.planning.posture import FiveJets, ThreeJets, posture
 
 KNOTS = 400
-"""Places at which a path is looked at when it is built."""
+"""Number of intervals in which a path is checked when it is built."""
 
 MIN_KNOTS = 16
-"""The same on each piece of its curve."""
+"""Minimum number of intervals on each piece of its curve."""
 
 MIN_KNOT_GAP = 1e-9
-"""[1] No two of them are nearer."""
+"""Minimum distance [1] of two checked places."""
 
 KINK_TOLERANCE = 1e-4
-"""[rad] Between two of them no axis is farther from the cubic through both, unless the path meets
-the end of the branch in between."""
+"""Maximum deviation [rad] of an axis from the cubic through two neighbouring places; more means
+that the path meets the end of the branch between them.
+"""
 
 HALVINGS = 40
-"""Until the place where a path fails is known to rounding."""
+"""Number of halvings that find the place where a path fails to rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class ToolPath:
-    """The joints on `branch` that have the tool on `curve`.
+    """The joints on `branch` that keep the tool on `curve`.
 
-    chain: the arm with its tool. near: (5,) [rad] of the turns an angle may be in, that nearest to
-    this is taken at the start. Raises InputError where the curve leaves the branch's reach or the
-    limits, or meets the end of the branch: where on the way, what binds, what to do.
+    Raises InputError where the curve leaves the branch's reach or the limits, or meets the end of
+    the branch. The message states the place on the path, the constraint and the remedy.
+
+    Attributes:
+        chain: the arm with its tool.
+        curve: the path of the tool.
+        branch: the branch of the joints.
+        near: joint angles (5,) [rad]; each angle starts in the turn nearest to this.
     """
 
     chain: Chain
@@ -59,8 +65,8 @@ class ToolPath:
     def __post_init__(self) -> None:
         near = frozen(self.chain.check_q(self.near))
         object.__setattr__(self, "near", near)
-        sigma = frozen(self._looks())
-        q, qd = self._loose(sigma)
+        sigma = frozen(self._places())
+        q, qd = self._unwound(sigma)
         bad = np.flatnonzero(~np.isfinite(qd).all(axis=1))
         if bad.size:
             self._refuse_reach(sigma, int(bad[0]))
@@ -74,11 +80,11 @@ class ToolPath:
 
     @property
     def joins(self) -> tuple[float, ...]:
-        """Those of the curve."""
+        """The joins of the curve."""
         return self.curve.joins
 
     def joints(self, sigma: Jet) -> FiveJets:
-        """The joint angles [rad] at `sigma`, one place or many (N,)."""
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         arm = arm_of(self.chain)
         alpha = posture(arm, self.branch, *self.curve.at(sigma))
         found = []
@@ -90,22 +96,22 @@ class ToolPath:
         return one, two, three, four, five
 
     def point(self, sigma: Jet) -> ThreeJets:
-        """The tool point in {S} [m]."""
+        """Return the tool point in {S} [m]."""
         x, y, z, _, _ = self.curve.at(sigma)
         return x, y, z
 
     @cached_property
     def start(self) -> FloatArray:
-        """(5,) where it begins [rad]."""
+        """The joint angles (5,) [rad] at the start."""
         return frozen([each.c0 for each in self.joints(Jet.variable(0.0))])
 
     @cached_property
     def end(self) -> FloatArray:
-        """(5,) where it ends [rad]."""
+        """The joint angles (5,) [rad] at the end."""
         return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
 
     def _turn(self, axis: int, sigma: Coefficient, angle: Coefficient) -> Coefficient:
-        """How many turns `angle` is short: they go on from place to place."""
+        """Return the number of turns to add to `angle`, which continue along the path."""
         knots = self._turns[:, axis]
         if isinstance(sigma, float):
             place = min(max(round(sigma * KNOTS), 0), KNOTS)
@@ -113,8 +119,8 @@ class ToolPath:
         place = np.clip(np.rint(sigma * KNOTS), 0, KNOTS).astype(np.int64)
         return np.rint((knots[place] - angle) / math.tau)
 
-    def _looks(self) -> FloatArray:
-        """Where it is looked at: evenly, and often enough on each piece of the curve."""
+    def _places(self) -> FloatArray:
+        """Return the places to check: evenly spaced, and enough on each piece of the curve."""
         even = np.linspace(0.0, 1.0, KNOTS + 1)
         ends = (0.0, *self.joins, 1.0)
         if len(ends) == 2:
@@ -124,8 +130,8 @@ class ToolPath:
         near = even[np.clip(np.rint(inner * KNOTS), 0, KNOTS).astype(np.int64)]
         return np.unique(np.concatenate((even, inner[np.abs(inner - near) > MIN_KNOT_GAP])))
 
-    def _loose(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Angles and their rates (N, 5) whatever turn they are in; not finite out of reach."""
+    def _unwound(self, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return angles and rates (N, 5) in any turn; values out of reach are not finite."""
         arm = arm_of(self.chain)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             alpha = posture(arm, self.branch, *self.curve.at(Jet.variable(sigma)))
@@ -134,14 +140,16 @@ class ToolPath:
         return (q - arm.shifts) * arm.signs, qd * arm.signs
 
     def _target(self, sigma: float) -> ToolTarget:
+        """Return the tool target at `sigma`."""
         tool = ToolCoordinates(*(float(each.c0) for each in self.curve.at(Jet.variable(sigma))))  # type: ignore[arg-type]
         return ToolTarget(np.array(tool[:3]), float(tool.pitch), float(tool.roll))  # type: ignore[arg-type]
 
     def _refuse_reach(self, sigma: FloatArray, bad: int) -> None:
+        """Raise InputError for a path that leaves the reach at or before the place `bad`."""
         good, failing = float(sigma[max(bad - 1, 0)]), float(sigma[bad])
         for _ in range(HALVINGS if bad else 0):
             middle = 0.5 * (good + failing)
-            _, qd = self._loose(np.array([middle]))
+            _, qd = self._unwound(np.array([middle]))
             good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
         target = self._target(failing)
         limited = LimitedArm.of(self.chain, within_limits=False)
@@ -149,16 +157,19 @@ class ToolPath:
         best = nearest_posture(limited, canonical, self.branch, limited.arm.angles(self.near))
         short = f", {1e3 * best.position_error:.1f} mm beyond reach" if not bad else ""
         raise InputError(
-            f"The path leaves what the arm reaches on the branch {self.branch} "
-            f"{_at(failing, target)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}: "
-            "links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
+            f"The path leaves the reach of the arm on the branch {self.branch} "
+            f"{_at(failing, target)} with a pitch of {math.degrees(target.pitch):.1f} deg{short}. "
+            "Links come in line there, or the tool comes over axis 1. Keep the path nearer to the "
             "arm, or give it another pitch."
         )
 
     def _refuse_kinks(self, q: FloatArray, qd: FloatArray) -> None:
-        """Where a branch ends the angles leap or turn back at once, maybe between two places."""
+        """Raise InputError where angles leap or turn back at the end of a branch.
+
+        This also finds ends between two checked places.
+        """
         h = np.diff(self._sigma)[:, None]
-        middle, _ = self._loose(self._sigma[:-1] + 0.5 * h[:, 0])
+        middle, _ = self._unwound(self._sigma[:-1] + 0.5 * h[:, 0])
         smooth = 0.5 * (q[:-1] + q[1:]) + 0.125 * h * (qd[:-1] - qd[1:])
         gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
         kinked = ~(gap <= KINK_TOLERANCE)
@@ -166,13 +177,16 @@ class ToolPath:
             place, axis = (int(each) for each in np.argwhere(kinked)[0])
             sigma = float(self._sigma[place])
             raise InputError(
-                f"Axis {axis + 1} would have to leap or turn at once "
-                f"{_at(sigma, self._target(sigma))}: links come in line there, or the tool passes "
+                f"Axis {axis + 1} would have to leap or turn back at once "
+                f"{_at(sigma, self._target(sigma))}. Links come in line there, or the tool passes "
                 "over axis 1. Lead the path around that place."
             )
 
     def _refuse_limits(self, q: FloatArray, qd: FloatArray) -> None:
-        """Extremes between two places are those of the cubic through their angles and rates."""
+        """Raise InputError where an axis exceeds its limit.
+
+        Extremes between two places are those of the cubic through their angles and rates.
+        """
         slack, lower, upper = tolerances.LIMIT_SLACK, self.chain.lower, self.chain.upper
         beyond = np.maximum(lower - q, q - upper)
         peaks = _peaks(q, qd, np.diff(self._sigma)[:, None])
@@ -196,16 +210,17 @@ class ToolPath:
 
 
 def _at(sigma: float, target: ToolTarget) -> str:
+    """Return the place in words, for an error message."""
     x, y, z = (1e3 * target.position).tolist()
     return f"{100.0 * sigma:.1f} % along it, at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
-    """(N, n) the extreme inside each piece of length `h` (N, 1), or its start where it has none."""
+    """Return the extreme (N, n) inside each piece of length `h` (N, 1), or its start if none."""
     a, b = q[:-1], q[1:]
     da, db = h * qd[:-1], h * qd[1:]
     turns = da * db < 0.0
-    # The cubic of Hermite, a + da t + e t^2 + f t^3, where its rate is 0 between the ends.
+    # The Hermite cubic, a + da t + e t^2 + f t^3, where its rate is 0 between the ends.
     e, f = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
     root = np.sqrt(np.maximum(e * e - 3.0 * f * da, 0.0))
     divisor = -e - np.copysign(root, e)

@@ -1,1 +1,1 @@
-"""Water: how a tilted cup holds it, loses it, and where it goes. Pure: time is an argument."""
+"""Water in a tilted cup: its surface, its flow and where it lands. Pure: time is an argument."""

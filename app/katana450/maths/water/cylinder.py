@@ -1,14 +1,14 @@
-"""How much a tilted cylinder holds below a plane, in closed form, for every tilt.
+"""Volume in a tilted cylinder below a plane, in closed form, for every tilt.
 
-The cylinder stands on z = 0 of its own frame, open at the top. A plane is given by its ``tilt``
-[rad], from 0 (level) to pi (upside down), between the cylinder's axis and the plane's normal, which
-points out of the water; and by its ``level`` [m], its height along the normal over the middle of
-the floor. Volumes in m^3.
+The cylinder stands on z = 0 of its own frame and is open at the top. A plane is given by its
+``tilt`` [rad], from 0 (level) to pi (upside down), between the cylinder's axis and the plane's
+normal, which points out of the water; and by its ``level`` [m], its height along the normal over
+the middle of the floor. Volumes in m^3.
 
-A slice across the axis is a disc that the plane cuts along a chord. The water's part of it has the
-area r^2 (phi - sin phi cos phi), phi being half the angle of its arc; the volume is the mean of
-that over the depth. The mean is worked out from the half angles at floor and rim alone, so one
-formula serves every way the plane can pass: through the wall only, the floor, the rim, or both.
+A slice across the axis is a disc that the plane cuts along a chord. The wet part has the area r^2
+(phi - sin phi cos phi), where phi is half the angle of its arc; the volume is the mean of that over
+the depth. The mean depends only on the half angles at floor and rim, so one formula serves for
+every plane: through the wall only, the floor, the rim, or both.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from katana450.errors import InputError
 from katana450.tolerances import ROUNDING
 
 ROUNDS = 100
-"""More halvings than a float has bits."""
+"""Maximum number of halvings: more than a float has bits."""
 
 
 class Arcs(NamedTuple):
-    """Half the angle [rad] of wall that is wet, at the floor and at the rim."""
+    """Half the angle [rad] of the wet part of the wall, at the floor and at the rim."""
 
     floor: float
     rim: float
@@ -33,7 +33,10 @@ class Arcs(NamedTuple):
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Its inside: radius and depth [m]. Raises InputError unless both are positive numbers."""
+    """The inside of a cylinder: radius and depth [m].
+
+    Raises InputError unless both are positive numbers.
+    """
 
     radius: float
     depth: float
@@ -46,27 +49,27 @@ class Cylinder:
 
     @property
     def capacity(self) -> float:
-        """What it holds upright [m^3]."""
+        """The volume [m^3] that the upright cylinder holds."""
         return math.pi * self.radius**2 * self.depth
 
     def span(self, tilt: float) -> tuple[float, float]:
-        """The levels [m] at which it is empty, and full."""
+        """Return the levels [m] at which the cylinder is empty, and full."""
         across = self.radius * math.sin(tilt)
         up = self.depth * math.cos(tilt)
         return min(up, 0.0) - across, max(up, 0.0) + across
 
     def lip(self, tilt: float) -> float:
-        """The level [m] of the lowest point of the rim, where water leaves first."""
+        """Return the level [m] of the lowest point of the rim, where water leaves first."""
         return self.depth * math.cos(tilt) - self.radius * math.sin(tilt)
 
     def arcs(self, tilt: float, level: float) -> Arcs:
-        """How much of the wall is wet at floor and rim."""
+        """Return the half angles of the wet wall at floor and rim."""
         across = self.radius * math.sin(tilt)
         up = self.depth * math.cos(tilt)
         return Arcs(_half_angle(level, across), _half_angle(level - up, across))
 
     def volume(self, tilt: float, level: float) -> float:
-        """The volume [m^3] below the plane."""
+        """Return the volume [m^3] below the plane."""
         across = self.radius * math.sin(tilt)
         floor, rim = level, level - self.depth * math.cos(tilt)
         low, high = min(floor, rim), max(floor, rim)
@@ -78,15 +81,16 @@ class Cylinder:
         cut = _mean_segment(_half_angle(base, across), _half_angle(top, across))
         if high == low:
             return self.radius**2 * self.depth * cut
-        # Slices that are wet all over, and those that the plane cuts.
+        # Slices that are wet all over, and slices that the plane cuts.
         fraction = (math.pi * (high - top) + cut * (top - base)) / (high - low)
         return self.radius**2 * self.depth * fraction
 
     def level(self, tilt: float, volume: float) -> float:
-        """The level [m] below which there is ``volume`` [m^3]: to rounding, by Newton's rule.
+        """Return the level [m] below which there is ``volume`` [m^3], to rounding.
 
-        The volume grows with the level at the rate of the surface's area. Steps out of what is
-        known to hold the answer halve that instead.
+        Newton's rule: the volume grows with the level at the rate of the surface's area. A step
+        that leaves the interval known to contain the answer is replaced by a halving of the
+        interval.
         """
         low, high = self.span(tilt)
         if volume <= 0.0:
@@ -112,7 +116,7 @@ class Cylinder:
         return level
 
     def surface(self, tilt: float, level: float) -> float:
-        """The area [m^2] of the plane inside."""
+        """Return the area [m^2] of the plane inside the cylinder."""
         floor, rim = self.arcs(tilt, level)
         cosine = math.cos(tilt)
         if abs(cosine) < AXIAL_COSINE:
@@ -120,13 +124,13 @@ class Cylinder:
         return self.radius**2 * (_segment(floor) - _segment(rim)) / cosine
 
     def holds(self, tilt: float) -> float:
-        """The most [m^3] it can hold at ``tilt``: what is below its lip."""
+        """Return the maximum volume [m^3] at ``tilt``: the volume below the lip."""
         return self.volume(tilt, self.lip(tilt)) if math.cos(tilt) > 0.0 else 0.0
 
     def spills_at(self, volume: float) -> float:
-        """The tilt [rad] from which it no longer holds ``volume`` [m^3].
+        """Return the tilt [rad] from which the cylinder no longer holds ``volume`` [m^3].
 
-        Down to half of its content the floor stays covered and the answer is an arc tangent.
+        Down to half of its capacity the floor stays covered and the answer is an arc tangent.
         """
         rise = self.depth - volume / (math.pi * self.radius**2)
         if rise <= 0.5 * self.depth:
@@ -143,16 +147,16 @@ class Cylinder:
         return low
 
     def margin(self, tilt: float, level: float) -> float:
-        """How far [m] below its lip the plane is, square to the plane; negative above it."""
+        """Return the distance [m] of the plane below the lip, negative above it."""
         return self.lip(tilt) - level
 
 
 AXIAL_COSINE = 1e-9
-"""Cosine of a tilt at which the plane runs along the axis, but for rounding."""
+"""Cosine of a tilt at which the plane runs along the axis, to rounding."""
 
 
 def _half_angle(height: float, across: float) -> float:
-    """Half the wet arc [rad] of the slice whose middle is ``height`` below the plane."""
+    """Return half the wet arc [rad] of the slice whose middle is ``height`` below the plane."""
     if height >= across:
         return math.pi
     if height <= -across:
@@ -161,15 +165,15 @@ def _half_angle(height: float, across: float) -> float:
 
 
 def _segment(phi: float) -> float:
-    """Area of a segment of the unit disc with half angle ``phi``."""
+    """Return the area of a segment of the unit disc with half angle ``phi``."""
     return phi - math.sin(phi) * math.cos(phi)
 
 
 def _mean_segment(a: float, b: float) -> float:
-    """Mean of the segment's area while its height goes evenly from half angle ``a`` to ``b``.
+    """Return the mean of the segment's area as its height changes from half angle ``a`` to ``b``.
 
-    The integral of phi - sin phi cos phi over the height -cos phi, divided by the way: written by
-    half sum m and half difference d, so that it loses no digits where the ends meet.
+    The integral of phi - sin phi cos phi over the height -cos phi, divided by the change of height.
+    It is written with half sum m and half difference d, which keeps the digits where the ends meet.
     """
     m, d = 0.5 * (a + b), 0.5 * abs(b - a)
     sine, cosine = math.sin(m), math.cos(m)
@@ -180,7 +184,7 @@ def _mean_segment(a: float, b: float) -> float:
 
 
 def _one_less_cotangent(d: float) -> float:
-    """1 - d cot d, by its series where it is small."""
+    """Return 1 - d cot d, by its series where d is small."""
     if d > 0.05:
         return 1.0 - d / math.tan(d)
     x = d * d

@@ -1,4 +1,4 @@
-"""What the water is in, and what it may land on."""
+"""The vessels that hold the water, and the surfaces on which it may land."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from katana450.maths.water.cylinder import Cylinder
 
 @dataclass(frozen=True)
 class Cup:
-    """A straight cup: its inside, and how high that begins over the cup's own z = 0 [m]."""
+    """A straight cup: its inside, and the height of its inner floor over the cup's z = 0 [m]."""
 
     inside: Cylinder
     floor: float
@@ -20,10 +20,13 @@ class Cup:
 
 @dataclass(frozen=True)
 class Basin:
-    """An upright basin, a cone cut off inside; the fillet round its floor is left out. All in m.
+    """An upright basin with a conical inside; the fillet round its floor is ignored. All in m.
 
-    at: the middle of its foot in the base frame. floor: how high its inside begins over that.
-    floor_radius, rim_radius, depth: of its inside. outer_radius: of its widest part.
+    Attributes:
+        at: middle of its foot in the base frame.
+        floor: height of its inner floor over the foot.
+        floor_radius, rim_radius, depth: dimensions of its inside.
+        outer_radius: radius of its widest part.
     """
 
     at: Vector
@@ -43,35 +46,40 @@ class Basin:
 
     @property
     def capacity(self) -> float:
-        """What it holds [m^3]."""
+        """The volume [m^3] that the basin holds."""
         return self.volume(self.depth)
 
     @property
     def rim(self) -> float:
-        """Where its rim is [m] in the base frame."""
+        """The height [m] of its rim in the base frame."""
         return self.at[2] + self.floor + self.depth
 
     def radius(self, level: float) -> float:
-        """Of its inside ``level`` over its floor; all [m]."""
+        """Return the radius of its inside at ``level`` over its floor; all [m]."""
         return self.floor_radius + level * (self.rim_radius - self.floor_radius) / self.depth
 
     def volume(self, level: float) -> float:
-        """What it holds [m^3] up to ``level`` [m] over its floor."""
+        """Return the volume [m^3] up to ``level`` [m] over its floor."""
         a, b = self.floor_radius, self.radius(level)
         return math.pi / 3.0 * level * (a * a + a * b + b * b)
 
     def level(self, volume: float) -> float:
-        """How high ``volume`` [m^3] stands over its floor [m]: the inverse, in closed form."""
+        """Return the level [m] over its floor of ``volume`` [m^3]: the inverse, in closed form."""
         slope = (self.rim_radius - self.floor_radius) / self.depth
         part = volume / (math.pi * self.floor_radius**2)
         x = 3.0 * slope * part / self.floor_radius
-        # With x small the cube root of 1 + x, less 1, would be rounding alone.
+        # With small x the direct form (1 + x)^(1/3) - 1 would lose all digits.
         return self.floor_radius / slope * math.expm1(math.log1p(x) / 3.0) if slope else part
 
 
 @dataclass(frozen=True)
 class TableTop:
-    """Its upper face is z = 0 of the base frame; x, y: its ends; floor: the height of that [m]."""
+    """A table top.
+
+    Attributes:
+        x, y: its ends [m]; its upper face is z = 0 of the base frame.
+        floor: height of the floor [m] in the base frame.
+    """
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -80,7 +88,7 @@ class TableTop:
 
 @dataclass(frozen=True)
 class WaterEnvironment:
-    """All that holds or catches water."""
+    """The cup, the basin and the table, which hold or catch water."""
 
     cup: Cup
     basin: Basin

@@ -1,8 +1,8 @@
-"""Where the water is, and where it is a moment later.
+"""The flow of the water: where it is, and where it is one time step later.
 
-What a cup cannot hold at its tilt leaves over the lip as over a weir, flies in parcels and comes
-down in the basin, in the cup again, on the table or on the floor. Volumes are whole femtolitres
-that are only ever moved, so their sum stays what it is.
+Water that a tilted cup cannot hold leaves over the lip as over a weir, flies in parcels and lands
+in the basin, in the cup again, on the table or on the floor. Volumes are whole femtolitres that are
+only moved, so their sum is constant.
 """
 
 from __future__ import annotations
@@ -24,28 +24,33 @@ from katana450.maths.water.slosh import Slosh, frequency
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY, MILLILITRE, counted
 
 DISCHARGE = 0.61
-"""[1] The fraction of Poleni's rule that a sharp edge lets pass: Kirchhoff's pi / (pi + 2)."""
+"""Discharge coefficient [1] in Poleni's rule for a sharp edge: Kirchhoff's pi / (pi + 2)."""
 
 FILM_TIME = 0.25
-"""[s] In which what is left over the lip thins to a third. Of so thin a film a weir's rule would
-make a trickle without end."""
+"""Time [s] in which the film left over the lip thins to a third. For so thin a film a weir's rule
+would give an endless trickle.
+"""
 
 DROP_VOLUME = MILLILITRE // 20
-"""[fl] So little over the lip falls at once."""
+"""Volume [fl] over the lip below which it falls at once."""
 
 LEVEL_SINE = 1e-9
 """Sine of a tilt below which no side of the rim is the lower one."""
 
 MIN_GRAVITY = 1e-3
-"""[g] Water that weighs less stays where it is."""
+"""Apparent weight [g] below which water stays where it is."""
 
 
 @dataclass(frozen=True, eq=False)
 class Water:
-    """All of it. Volumes in femtolitres.
+    """The state of all water. Volumes in femtolitres.
 
-    cup, basin: what is in them. parcels: in the air, the oldest first. puddles: spilled. slosh: how
-    the surface in the cup leans. T_base_cup: where the cup is, (4, 4) [m].
+    Attributes:
+        cup, basin: volume in cup and basin.
+        parcels: water in the air, the oldest first.
+        puddles: spilled water.
+        slosh: lean of the surface in the cup.
+        T_base_cup: pose (4, 4) of the cup [m].
     """
 
     cup: int
@@ -57,25 +62,29 @@ class Water:
 
     @property
     def air(self) -> int:
-        """What flies."""
+        """The volume in the air."""
         return sum(parcel.volume for parcel in self.parcels)
 
     @property
     def spilled(self) -> int:
-        """What lies on table and floor."""
+        """The volume on table and floor."""
         return sum(puddle.volume for puddle in self.puddles)
 
     @property
     def total(self) -> int:
-        """What there is; a step never changes it."""
+        """The volume of all water; a step never changes it."""
         return self.cup + self.basin + self.air + self.spilled
 
 
 @dataclass(frozen=True)
 class WaterSurface:
-    """The surface in the cup, as a plane of `Cylinder`: tilt [rad] and level [m].
+    """The surface in the cup, as a plane of `Cylinder`.
 
-    downhill: unit vector, in the cup's frame and square to its axis, to the lowest side of the rim.
+    Attributes:
+        tilt: tilt [rad].
+        level: level [m].
+        downhill: unit vector to the lowest side of the rim, in the cup's frame and perpendicular to
+            its axis.
     """
 
     tilt: float
@@ -84,7 +93,7 @@ class WaterSurface:
 
 
 class WaterFlow:
-    """Steps of the water in one surrounding. Its methods are pure."""
+    """Time steps of the water in one environment. Its methods are pure."""
 
     def __init__(self, water_environment: WaterEnvironment) -> None:
         self.water_environment = water_environment
@@ -92,9 +101,9 @@ class WaterFlow:
         self._basin_holds = counted(water_environment.basin.capacity)
 
     def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
-        """``volume`` [m^3] at rest in the cup, and nothing elsewhere.
+        """Return ``volume`` [m^3] of water at rest in the cup, and none elsewhere.
 
-        Raises InputError when the cup does not hold it upright, or the pose is none.
+        Raises InputError when the upright cup does not hold it, or the pose is invalid.
         """
         if not 0.0 <= volume <= self.water_environment.cup.inside.capacity:
             maximum = self.water_environment.cup.inside.capacity * 1e6
@@ -107,10 +116,10 @@ class WaterFlow:
     def step(
         self, water: Water, T_base_cup: npt.ArrayLike, acceleration: npt.ArrayLike, dt: float
     ) -> Water:
-        """The water ``dt`` [s] on, when the cup has come to ``T_base_cup`` (4, 4) meanwhile.
+        """Return the water after ``dt`` [s], with the cup moved to ``T_base_cup`` (4, 4) meanwhile.
 
-        acceleration: (3,) [m/s^2] of the middle of the cup, in the base frame. Raises InputError
-        for a pose that is none and for numbers that are not finite.
+        ``acceleration`` (3,) [m/s^2] is that of the middle of the cup, in the base frame. Raises
+        InputError for an invalid pose and for numbers that are not finite.
         """
         T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
         pull = vector(finite_array(acceleration, (3,), "The acceleration of the cup"))
@@ -124,18 +133,18 @@ class WaterFlow:
         return self._pour(flown, T, dt)
 
     def surface(self, water: Water) -> WaterSurface:
-        """The surface in the cup."""
+        """Return the surface in the cup."""
         tilt, downhill = _lean(water.slosh, water.T_base_cup)
         level = self.water_environment.cup.inside.level(tilt, water.cup * FEMTOLITRE)
         return WaterSurface(tilt, level, downhill)
 
     def margin_to_rim(self, water: Water) -> float:
-        """How far [m] the lip is above the surface; negative while water flows over it."""
+        """Return the height [m] of the lip above the surface; negative while it overflows."""
         surface = self.surface(water)
         return self.water_environment.cup.inside.margin(surface.tilt, surface.level)
 
     def _pour(self, water: Water, T: FloatArray, dt: float) -> Water:
-        """Let flow over the lip what the cup cannot hold."""
+        """Let the water that the cup cannot hold flow over the lip."""
         cup = self.water_environment.cup.inside
         tilt, downhill = _lean(water.slosh, T)
         weight = norm(water.slosh.up)
@@ -163,7 +172,7 @@ class WaterFlow:
         )
 
     def _fly(self, water: Water, T: FloatArray, dt: float) -> Water:
-        """Let the parcels fly, and those come down that do."""
+        """Move the parcels by ``dt`` [s], and let those land that reach a surface."""
         if not water.parcels:
             return water
         cup, basin, puddles = water.cup, water.basin, water.puddles
@@ -190,7 +199,7 @@ class WaterFlow:
         return replace(water, cup=cup, basin=basin, parcels=tuple(flying), puddles=puddles)
 
     def _caught(self, parcel: Parcel, before: se3.Rows, after: se3.Rows, dt: float) -> bool:
-        """Whether it comes into the cup through its mouth in the next ``dt`` [s]."""
+        """Return True if ``parcel`` enters the cup through its mouth in the next ``dt`` [s]."""
         mouth = self.water_environment.cup.floor + self.water_environment.cup.inside.depth
         q = _seen_from(after, parcel.at(parcel.age + dt))
         if q[2] > mouth:
@@ -203,7 +212,7 @@ class WaterFlow:
         return math.hypot(x, y) < self.water_environment.cup.inside.radius
 
     def _beside_basin(self, point: Vector) -> Vector:
-        """Where on the table what the basin cannot hold comes down."""
+        """Return the place on the table for water that the basin cannot hold."""
         x, y, z = self.water_environment.basin.at
         away = math.hypot(point[0] - x, point[1] - y)
         out = self.water_environment.basin.outer_radius / away if away > 0.0 else 0.0
@@ -211,9 +220,7 @@ class WaterFlow:
 
 
 def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
-    """Tilt [rad] between the cup's axis and the surface's normal, and downhill as in
-    `WaterSurface`.
-    """
+    """Return the tilt [rad] of the surface in the cup, and `WaterSurface.downhill`."""
     R = T[:3, :3]
     weight = norm(slosh.up)
     if weight < MIN_GRAVITY:
@@ -226,11 +233,11 @@ def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
 
 
 def _discharge(radius: float, tilt: float, head: float, g: float) -> float:
-    """What flows over the lip [m^3/s] when the surface is ``head`` [m] above it.
+    """Return the flow over the lip [m^3/s] when the surface is ``head`` [m] above it.
 
-    Poleni's rule, (2/3) C sqrt(2 g) head^(3/2) a metre of edge (Chow, Open-Channel Hydraulics,
-    1959), summed over the part of the rim below the surface: near its lowest point that is a
-    parabola. No more than over the whole rim at that head.
+    Poleni's rule, (2/3) C sqrt(2 g) head^(3/2) per metre of edge (Chow, Open-Channel Hydraulics,
+    1959), summed over the part of the rim below the surface, which is a parabola near its lowest
+    point. The result is at most the flow over the whole rim at that head.
     """
     rule = 2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head) * head
     whole = math.tau * radius
@@ -240,10 +247,11 @@ def _discharge(radius: float, tilt: float, head: float, g: float) -> float:
 
 
 def _left_over(over: int, discharge: float, dt: float) -> int:
-    """What of ``over`` [fl] is still above the lip after ``dt`` [s].
+    """Return the part of ``over`` [fl] that is still above the lip after ``dt`` [s].
 
-    The discharge falls with the square of what is over; the film of it that is left, exponentially.
-    The equation of both, E' = -k E^2 - E / FILM, is Bernoulli's, and this its solution.
+    The discharge falls with the square of the volume above the lip, and the remaining film falls
+    exponentially. Together they follow E' = -k E^2 - E / FILM_TIME, a Bernoulli equation with this
+    solution.
     """
     decay = math.exp(-dt / FILM_TIME)
     left = over * decay / (1.0 + discharge / FEMTOLITRE / over * FILM_TIME * (1.0 - decay))
@@ -251,18 +259,22 @@ def _left_over(over: int, discharge: float, dt: float) -> int:
 
 
 def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
-    """Unit vector in the base frame along which water leaves: level, then out of the mouth."""
+    """Return the unit vector in the base frame along which water leaves.
+
+    Water leaves a cup in the horizontal direction, and a cup tilted further out of its mouth.
+    """
     steep = min(tilt, 0.5 * math.pi)
     local = (math.cos(steep) * downhill[0], math.cos(steep) * downhill[1], math.sin(steep))
     return vector(T[:3, :3] @ local)
 
 
 def _moved(T: FloatArray, point: Vector) -> Vector:
+    """Return ``point`` transformed by ``T``."""
     return vector(T[:3, :3] @ point + T[:3, 3])
 
 
 def _seen_from(T: se3.Rows, point: Vector) -> Vector:
-    """``point`` in the frame of T, on plain floats because every parcel is asked."""
+    """Return ``point`` in the frame of ``T``; plain floats, because it runs for every parcel."""
     (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = T
     u, v, w = point[0] - x, point[1] - y, point[2] - z
     return a * u + d * v + g * w, b * u + e * v + h * w, c * u + f * v + i * w

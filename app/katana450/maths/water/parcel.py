@@ -1,4 +1,4 @@
-"""Water in the air, in parcels that fly as thrown stones do, and where they come down."""
+"""Water in the air: parcels in free flight, and their landing places."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from katana450.maths.water.units import GRAVITY
 
 
 class Parcel(NamedTuple):
-    """What left the lip in one step.
+    """The water that left the lip in one step.
 
-    volume: [fl]. start, velocity: of its last bit as it left, [m] and [m/s] in the base frame. age:
-    how long ago that was [s]. span: how long it took to leave [s], so that its first bit is ahead.
+    Attributes:
+        volume: volume [fl].
+        start, velocity: place [m] and velocity [m/s] of its last part at the lip, in the base
+            frame.
+        age: time since then [s].
+        span: time that it took to leave [s]; its first part is ahead by this.
     """
 
     volume: int
@@ -25,12 +29,12 @@ class Parcel(NamedTuple):
     span: float
 
     def at(self, age: float) -> Vector:
-        """Where it is [m] at ``age`` [s]."""
+        """Return the place [m] at ``age`` [s]."""
         (x, y, z), (u, v, w) = self.start, self.velocity
         return x + u * age, y + v * age, z + (w - 0.5 * GRAVITY * age) * age
 
     def falls_to(self, z: float) -> float | None:
-        """At what age [s] it comes down through the height ``z`` [m]; None if it never does."""
+        """Return the age [s] at which it falls through the height ``z`` [m], or None."""
         w = self.velocity[2]
         square = w * w + 2.0 * GRAVITY * (self.start[2] - z)
         age = (w + math.sqrt(square)) / GRAVITY if square >= 0.0 else -1.0
@@ -38,7 +42,7 @@ class Parcel(NamedTuple):
 
 
 class Ground(Enum):
-    """What water can come down on."""
+    """The surfaces on which water can land."""
 
     BASIN = "basin"
     TABLE = "table"
@@ -46,7 +50,7 @@ class Ground(Enum):
 
 
 class Landing(NamedTuple):
-    """On what, at what age [s] and where [m]."""
+    """The landing of a parcel: on which ground, at which age [s] and at which point [m]."""
 
     ground: Ground
     age: float
@@ -54,9 +58,10 @@ class Landing(NamedTuple):
 
 
 def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -> Landing:
-    """Where ``parcel`` comes down; in the basin the water stands ``level`` [m] over its floor.
+    """Return the landing of ``parcel``; the basin's water stands ``level`` [m] over its floor.
 
-    The basin gets what comes down through the plane of its rim inside it. The cup is not looked at.
+    The basin receives water that falls through the plane of its rim, inside the rim. The cup is
+    ignored.
     """
     basin = water_environment.basin
     if _into(basin, parcel):
@@ -73,11 +78,12 @@ def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -
 
 
 def _into(basin: Basin, parcel: Parcel) -> bool:
+    """Return True if ``parcel`` lands in ``basin``."""
     age = parcel.falls_to(basin.rim)
     if age is not None:
         x, y, _ = parcel.at(age)
         return math.hypot(x - basin.at[0], y - basin.at[1]) < basin.rim_radius
-    # It never comes down through the rim: in the basin only if it left its cup there.
+    # It never falls through the rim: it is in the basin only if it left its cup there.
     x, y, z = parcel.start
     height = z - basin.at[2] - basin.floor
     inside = math.hypot(x - basin.at[0], y - basin.at[1]) < basin.radius(height)

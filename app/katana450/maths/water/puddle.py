@@ -1,4 +1,4 @@
-"""What was spilled, in a few puddles that take in what falls beside them."""
+"""Spilled water, in a few puddles that merge with water that falls beside them."""
 
 from __future__ import annotations
 
@@ -9,30 +9,32 @@ from katana450.maths.geometry.vectors import Vector, add, scale
 from katana450.maths.water.units import FEMTOLITRE
 
 THICKNESS = 2.7e-3
-"""[m] Of a large puddle that meets the table at 60 degrees: 2 sin(30 degrees) times the capillary
-length of water (de Gennes, Brochard-Wyart, Quere, Capillarity and Wetting Phenomena, 2004)."""
+"""Thickness [m] of a large puddle with a contact angle of 60 degrees: 2 sin(30 degrees) times the
+capillary length of water (de Gennes, Brochard-Wyart, Quere, Capillarity and Wetting Phenomena,
+2004).
+"""
 
 MERGE_DISTANCE = 0.015
-"""[m] So near to its edge water still runs into a puddle."""
+"""Distance [m] from the edge of a puddle within which water runs into it."""
 
 MAX_PUDDLES = 8
-"""Then water joins the nearest, however far."""
+"""Maximum number of puddles; further water joins the nearest one."""
 
 
 class Puddle(NamedTuple):
-    """at: its middle in the base frame [m]; volume: [fl]."""
+    """A puddle with its middle ``at`` in the base frame [m] and its ``volume`` [fl]."""
 
     at: Vector
     volume: int
 
     @property
     def radius(self) -> float:
-        """[m] As a flat disc."""
+        """The radius [m] of the puddle as a flat disc."""
         return math.sqrt(self.volume * FEMTOLITRE / (math.pi * THICKNESS))
 
 
 def spill(puddles: tuple[Puddle, ...], point: Vector, volume: int) -> tuple[Puddle, ...]:
-    """The puddles when ``volume`` [fl] more comes down on ``point`` [m]."""
+    """Return the puddles after ``volume`` [fl] more lands on ``point`` [m]."""
     near = min(puddles, key=lambda puddle: math.dist(puddle.at, point), default=None)
     if near is None or (
         len(puddles) < MAX_PUDDLES and math.dist(near.at, point) > near.radius + MERGE_DISTANCE

@@ -1,4 +1,4 @@
-"""How well water was carried and emptied."""
+"""The score of carrying and emptying water."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from katana450.maths.water.units import MILLILITRE
 
 @dataclass(frozen=True)
 class Course:
-    """What the cup went through: duration [s] and its greatest jerk [m/s^3].
+    """The motion of the cup so far.
 
-    acceleration: the last one [m/s^2]; None before the first.
+    Attributes:
+        duration: duration [s].
+        peak_jerk: maximum jerk [m/s^3].
+        acceleration: the last acceleration [m/s^2]; None before the first.
     """
 
     duration: float = 0.0
@@ -22,7 +25,7 @@ class Course:
     acceleration: Vector | None = None
 
     def after(self, acceleration: Vector, dt: float) -> Course:
-        """``dt`` [s] on, the cup's acceleration now ``acceleration`` [m/s^2]."""
+        """Return the course ``dt`` [s] later, with the cup's ``acceleration`` [m/s^2] then."""
         if dt <= 0.0:
             return self
         jerk = 0.0
@@ -33,8 +36,13 @@ class Course:
 
 @dataclass(frozen=True)
 class Score:
-    """emptied_percent: of all the water, what is in the basin. The volumes in ml; duration in s,
-    peak_jerk in m/s^3.
+    """Where the water is, and how the cup was moved.
+
+    Attributes:
+        emptied_percent: part of all water that is in the basin [%]; NaN without water.
+        in_cup_ml, in_basin_ml, in_air_ml, spilled_ml: volumes [ml].
+        duration: duration of the motion [s].
+        peak_jerk: maximum jerk of the cup [m/s^3].
     """
 
     emptied_percent: float
@@ -47,7 +55,7 @@ class Score:
 
 
 def score(water: Water, course: Course) -> Score:
-    """Of ``water`` as it is now, after ``course``."""
+    """Return the score of the present ``water`` after ``course``."""
     total = water.total
     return Score(
         emptied_percent=100.0 * water.basin / total if total else math.nan,

@@ -1,8 +1,8 @@
-"""How the surface in a moving cup tilts: not at once, but swinging about where it would rest.
+"""Sloshing: the surface in a moving cup swings about its rest position.
 
-In a cup that accelerates, water comes to rest square to gravity less the acceleration. On the way
-there its surface moves mostly in the first antisymmetric mode of an upright cylinder, an oscillator
-of known frequency (Ibrahim, Liquid Sloshing Dynamics, 2005, ch. 1). The surface is taken to stay
+In an accelerated cup, water comes to rest perpendicular to gravity minus the acceleration. Until
+then its surface moves mostly in the first antisymmetric mode of an upright cylinder, an oscillator
+of known frequency (Ibrahim, Liquid Sloshing Dynamics, 2005, ch. 1). The surface is assumed to stay
 flat and to lean by that oscillator alone.
 """
 
@@ -19,24 +19,30 @@ FIRST_MODE = 1.8412
 """The first zero of J1', the derivative of the Bessel function."""
 
 DAMPING = 0.02
-"""[1] Of critical. Viscosity alone gives a cup of 3 cm radius 0.006 (4.98 nu^1/2 r^-3/4 g^-1/4 over
-2 pi: Abramson, NASA SP-106, 1966); the rest is an allowance for its wall that is wetted anew in
-every swing."""
+"""Damping [1] relative to critical damping. Viscosity alone gives a cup of 3 cm radius 0.006 (4.98
+nu^1/2 r^-3/4 g^-1/4 over 2 pi: Abramson, NASA SP-106, 1966); the rest is an allowance for the wall,
+which is wetted again in every swing.
+"""
 
 SHALLOWEST = 0.25
-"""[radius] The depth below which the frequency falls no more: so little water lies in a corner of a
-tilted cup and is no longer a layer on its floor."""
+"""Depth [radius] below which the frequency falls no more: so little water lies in a corner of a
+tilted cup and is no longer a layer on its floor.
+"""
 
 REST_TOLERANCE = 1e-4
-"""[1] A surface that is off its rest by less than this is at rest: 3 um at the wall of a cup."""
+"""Deviation [1] from rest below which a surface is at rest: 3 um at the wall of a cup."""
 
 
 @dataclass(frozen=True)
 class Slosh:
-    """How the surface leans, in the base frame.
+    """The lean of the surface, in the base frame.
 
-    lean: level part of where its normal points; weight: upright part. Both in units of gravity, so
-    that at rest they are what is felt in the cup. rate: of the lean [1/s].
+    Lean and weight are in units of gravity; at rest they are the apparent gravity in the cup.
+
+    Attributes:
+        lean: horizontal part of the surface's normal.
+        rate: rate of the lean [1/s].
+        weight: vertical part of the normal.
     """
 
     lean: tuple[float, float] = (0.0, 0.0)
@@ -45,13 +51,14 @@ class Slosh:
 
     @property
     def up(self) -> Vector:
-        """Along the surface's normal."""
+        """The direction of the surface's normal."""
         return (*self.lean, self.weight)
 
     def after(self, acceleration: Vector, omega: float, dt: float) -> Slosh:
-        """``dt`` [s] on in a cup under a steady ``acceleration`` [m/s^2]: exact for any ``dt``.
+        """Return the slosh after ``dt`` [s] under a steady ``acceleration`` [m/s^2], exactly.
 
-        omega: of the mode [rad/s]. What is felt upright has no part in the mode and counts at once.
+        ``omega`` is the frequency of the mode [rad/s]. The vertical acceleration has no part in the
+        mode and acts at once.
         """
         rest = (acceleration[0] / GRAVITY, acceleration[1] / GRAVITY)
         weight = 1.0 + acceleration[2] / GRAVITY
@@ -72,16 +79,19 @@ class Slosh:
 
 
 def frequency(cup: Cylinder, volume: float) -> float:
-    """Of the first mode [rad/s] with ``volume`` [m^3] in it: omega^2 = g k tanh(k depth)."""
+    """Return the frequency [rad/s] of the first mode: omega^2 = g k tanh(k depth).
+
+    ``volume`` [m^3] is the water in the upright cup.
+    """
     depth = max(volume / (math.pi * cup.radius**2), SHALLOWEST * cup.radius)
     k = FIRST_MODE / cup.radius
     return math.sqrt(GRAVITY * k * math.tanh(k * depth))
 
 
 def steady_acceleration(cup: Cylinder, volume: float) -> float:
-    """The greatest horizontal acceleration [m/s^2] that an upright cup of ``volume`` [m^3] stands.
+    """Return the maximum steady horizontal acceleration [m/s^2] without a spill.
 
-    Kept up, so that the surface has come to rest; one that sets in at once makes it swing to nearly
-    twice the lean.
+    The cup is upright with ``volume`` [m^3] of water, and its surface has come to rest. A sudden
+    acceleration makes the surface swing to nearly twice the lean.
     """
     return GRAVITY * math.tan(cup.spills_at(volume))

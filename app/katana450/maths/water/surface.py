@@ -1,6 +1,6 @@
-"""Water as meshes: triangles with their corners in m, wound to be seen from outside.
+"""Water as meshes: triangles with their corners in m, counterclockwise seen from outside.
 
-Faces are the same for every shape of a kind, so that only corners change while water moves.
+The faces are the same for every shape of a kind, so only corners change while water moves.
 """
 
 from __future__ import annotations
@@ -21,33 +21,35 @@ from katana450.maths.water.units import FEMTOLITRE, GRAVITY
 Faces = npt.NDArray[np.uint32]
 
 RUNGS = 20
-"""Steps from the lowest to the highest side of the water in a cup."""
+"""Number of steps from the lowest to the highest side of the water in a cup."""
 
 SECTIONS, SIDES = 20, 8
-"""Of the stream."""
+"""Number of sections and sides of the stream."""
 
 MAX_STREAM_RADIUS = 0.3
-"""[cup radius] The stream at the lip: there it is slow, and a sheet rather than a jet."""
+"""Maximum radius of the stream at the lip, in cup radii: there it is slow, and a sheet rather than
+a jet.
+"""
 
 SHEET, GATHERED = 0.9, 0.03
-"""How much wider than a jet the sheet is at the lip, less 1; and in how far [m] it gathers."""
+"""Excess width of the sheet at the lip over a jet [1], and the length [m] in which it contracts."""
 
 SPOKES = 40
-"""Of a disc."""
+"""Number of spokes of a disc."""
 
 DOME = ((0.55, 1.0), (0.82, 0.94), (0.95, 0.62), (1.0, 0.0))
-"""(out, up) from the middle of a puddle to its edge, of radius and thickness."""
+"""(radius, height) from the middle of a puddle to its edge, relative to radius and thickness."""
 
 ROUND = 1e-9
-"""Cosine of a tilt nearer to 0 than which the surface is drawn along the axis."""
+"""Cosine of a tilt below which the surface is drawn along the axis."""
 
 
 def body(cylinder: Cylinder, surface: WaterSurface) -> FloatArray:
-    """Corners (2 (4 RUNGS + 2), 3) of the water in a cylinder that stands on z = 0.
+    """Return corners (2 (4 RUNGS + 2), 3) of the water in a cylinder that stands on z = 0.
 
-    Wall, underside and upper side, each with corners of its own so that only the wall is shaded
-    round. They are laid as the rungs of a ladder are from the lowest side to the highest, one of
-    them where the plane meets floor or rim: so the shape is right for every tilt.
+    Wall, underside and upper side have corners of their own, so that only the wall is shaded
+    smoothly. The corners lie like the rungs of a ladder from the lowest side to the highest. One
+    rung is where the plane meets floor or rim, so the shape is right for every tilt.
     """
     low, high = sorted(cylinder.arcs(surface.tilt, surface.level))
     first = min(max(round(RUNGS * low / high), 1), RUNGS - 1) if high > 0.0 else 1
@@ -59,11 +61,11 @@ def body(cylinder: Cylinder, surface: WaterSurface) -> FloatArray:
     cut = (surface.level + math.sin(surface.tilt) * near) / cosine
     cut = np.minimum(np.maximum(cut, 0.0), cylinder.depth)
     if low > 0.0:
-        # Wet from floor to rim; told by number, because with the plane along the axis all the other
-        # columns stand where the last of these does, and are nothing.
+        # These columns are wet from floor to rim. They are chosen by number: with the plane along
+        # the axis all other columns coincide with the last of these and have no area.
         cut[: first + 1] = cylinder.depth if cosine > 0.0 else 0.0
     x, y, _ = surface.downhill
-    # Wall, and once more for the faces: bottom and top of each.
+    # The wall, then a copy for underside and upper side; bottom and top of each.
     corners = np.empty((2, 2, 2 * RUNGS + 1, 3))
     for side, columns in ((-aside[::-1], slice(0, RUNGS + 1)), (aside, slice(RUNGS, None))):
         ahead = near if columns.start else near[::-1]
@@ -79,6 +81,7 @@ _STEPS = np.arange(RUNGS + 1)
 
 
 def _ladder() -> Faces:
+    """Return the faces of `body`."""
     columns = 2 * RUNGS + 1
     a = np.arange(columns - 1)
     wall = [(a, a + 1, a + 1 + columns), (a, a + 1 + columns, a + columns)]
@@ -91,11 +94,12 @@ def _ladder() -> Faces:
 
 
 def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
-    """Corners (SECTIONS SIDES, 3) of the water that flies, in the base frame; parcels: at least 1.
+    """Return corners (SECTIONS SIDES, 3) of the flying water in the base frame.
 
-    A tube along where water of every age is now, as wide as what left then is at its speed; closed
-    at its ends, and drawn to a thread where nothing flies. radius: of the cup. end: the age [s] at
-    which the oldest parcel comes down.
+    ``parcels`` are one or more. The stream is a tube along the present places of water of every
+    age, as wide as its flow at its speed requires. It is closed at its ends, and of zero width
+    where no water flies. ``radius`` is that of the cup, ``end`` the age [s] at which the oldest
+    parcel lands.
     """
     left = np.array(
         [(p.age, p.span, p.volume * FEMTOLITRE / p.span, *p.start, *p.velocity) for p in parcels]
@@ -121,7 +125,7 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     level = v[:, :2].sum(axis=0).tolist()
     long = math.hypot(*level)
     across = np.array((-level[1], level[0], 0.0)) / long if long > 0.0 else _X
-    # Square to both, and across is level.
+    # Perpendicular to both; ``across`` is level.
     under = v[:, (2, 2, 1)] * (across[1], -across[0], across[0])
     under[:, 2] -= across[1] * v[:, 0]
     under /= speed[:, None]
@@ -130,7 +134,7 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     spread = 1.0 + SHEET * near
     wide, thin = jet * spread, jet / spread
     aside = wide[:, None] * _ROUND_COS
-    # At the lip the sheet lies on the rim, and is as hollow.
+    # At the lip the sheet lies on the rim and follows its curve.
     lift = near[:, None] * (aside**2 / (2.0 * radius) + thin[:, None])
     down = thin[:, None] * _ROUND_SIN - lift
     corners = p[:, None] + aside[..., None] * across + down[..., None] * under[:, None]
@@ -138,14 +142,14 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
 
 
 MIN_STREAM_SPEED = 0.02
-"""[m/s]"""
+"""Minimum speed of the stream [m/s]."""
 
 AGE_ROUNDING = 1e-6
-"""[s] Rounding of ages."""
+"""Rounding of ages [s]."""
 
 
 _SPOTS = np.clip(np.arange(-1, SECTIONS - 1) / (SECTIONS - 3.0), 0.0, 1.0)
-"""Along the stream, of its length in time; both ends twice, to be closed."""
+"""Places along the stream as fractions of its duration; both ends twice, to close it."""
 
 _X = np.array((1.0, 0.0, 0.0))
 _TURN = np.arange(SIDES) * (math.tau / SIDES)
@@ -153,6 +157,7 @@ _ROUND_COS, _ROUND_SIN = np.cos(_TURN), np.sin(_TURN)
 
 
 def _tube() -> Faces:
+    """Return the faces of `stream`."""
     a = np.arange(SIDES)
     b = (a + 1) % SIDES
     quads = []
@@ -163,9 +168,9 @@ def _tube() -> Faces:
 
 
 def disc() -> tuple[FloatArray, Faces]:
-    """Corners and faces of a level disc of radius 1 about z, at z = 1.
+    """Return corners and faces of a level disc of radius 1 about z, at z = 1.
 
-    So its scale alone says how wide it is and how high it stands.
+    Its scale alone therefore gives its width and its height.
     """
     turn = np.arange(SPOKES) * (math.tau / SPOKES)
     rim = np.stack((np.cos(turn), np.sin(turn), np.ones(SPOKES)), axis=1)
@@ -175,7 +180,7 @@ def disc() -> tuple[FloatArray, Faces]:
 
 
 def blob() -> tuple[FloatArray, Faces]:
-    """Corners and faces of a puddle on z = 0: as large as a disc of radius 1, but not as round."""
+    """Return corners and faces of a puddle on z = 0: irregular, with the area of a unit disc."""
     turn = np.arange(SPOKES) * (math.tau / SPOKES)
     edge = 1.0 + 0.07 * np.cos(2 * turn + 1.0) + 0.05 * np.cos(3 * turn + 2.1)
     edge += 0.03 * np.cos(5 * turn)
@@ -200,6 +205,7 @@ def blob() -> tuple[FloatArray, Faces]:
 
 
 def _stacked(threes: Sequence[Sequence[npt.NDArray[np.intp]]]) -> Faces:
+    """Return triangles from rows of corner numbers."""
     return np.concatenate([np.stack(three, axis=1) for three in threes]).astype(np.uint32)
 
 

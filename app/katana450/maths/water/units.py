@@ -1,21 +1,22 @@
-"""Constants of water under gravity, and the unit its volumes are counted in."""
+"""Constants of water under gravity, and the unit in which volumes are counted."""
 
 from __future__ import annotations
 
 GRAVITY = 9.81
-"""[m/s^2]"""
+"""Gravity [m/s^2]."""
 
 FEMTOLITRE = 1e-18
-"""[m^3] Volumes are moved in whole ones, so that none is made or lost by rounding: a basin holds
-2e15 of them, which a float still tells apart."""
+"""The unit of volumes [m^3]. Whole units are moved, so that rounding neither creates nor loses
+water. A basin holds 2e15 of them, which a float still represents exactly.
+"""
 
 ML = 1e-6
-"""[m^3] A millilitre, as people tell volumes."""
+"""A millilitre [m^3], the unit that is displayed."""
 
 MILLILITRE = 1_000_000_000_000
-"""[fl] The same, as they are counted."""
+"""A millilitre [fl], the unit that is counted."""
 
 
 def counted(volume: float) -> int:
-    """The whole femtolitres in ``volume`` [m^3]."""
+    """Return the number of whole femtolitres in ``volume`` [m^3]."""
     return int(volume / FEMTOLITRE)
