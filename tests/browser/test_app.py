@@ -318,11 +318,11 @@ def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(
         lambda: np.allclose(other.gizmo(), robot.gizmo(), atol=1e-5), "the handle to come back"
     )
     other.settle()
-    robot.page.press_in_bar("Let go")
+    robot.page.press_in_bar("Release")
     other.page.drag_arrow(MOVE, "z", 0.05)
     other.settle()
     robot.settle()
-    other.page.press_in_bar("Let go")
+    other.page.press_in_bar("Release")
     assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
     assert other.page.errors == []
 

@@ -264,7 +264,7 @@ def test_the_arm_goes_from_hand_to_hand(
     page.wait_until(lambda: bar(page, "holder") == "You drive", "the arm")
     page.page.select_option("#acts select", label=they)
     other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
-    other.press_in_bar("Let go")
+    other.press_in_bar("Release")
     page.wait_until(lambda: bar(page, "holder") == "Nobody drives", "nobody to drive")
     # Who touches a control first has it.
     other.drag_slider("Axis 1", 10.0)

@@ -194,7 +194,7 @@ def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -
 def test_knob_of_a_spectator_springs_back_with_the_reason(
     page: ViserPage, server: AppServer, truth: Truth
 ) -> None:
-    page.press_in_bar("Let go")
+    page.press_in_bar("Release")
     with connect(server.url, "Octave") as other:
         other.ask(requests.Acquire())
         page.wait_until(lambda: bar(page, "holder") == "Octave drives", "who drives")

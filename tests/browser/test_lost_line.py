@@ -32,15 +32,15 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         page.page.wait_for_selector("#banner.lost")
         told = time.monotonic() - killed
         page.keep(artefacts / "gateway-lost.png")
-        assert "No line" in bar(page, "link")
-        assert bar(page, "headline") == "Out of touch"
+        assert "Offline" in bar(page, "link")
+        assert bar(page, "headline") == "No connection"
         assert told < 1.0
         robot.since = time.time()
         server.restart()
         back = time.monotonic()
         page.page.wait_for_selector("#banner", state="hidden")
         page.wait_until(lambda: page.connected, "viser to come back")
-        page.wait_until(lambda: bar(page, "headline") != "Out of touch", "the state to be told")
+        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state to be told")
         print(f"told after {told:.2f} s, back after {time.monotonic() - back:.2f} s")
         page.wait_ready(("/arm", MOVE))
         robot.settle()
@@ -107,7 +107,7 @@ def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) ->
         assert "fell silent while the arm moved" in truth.status()["stopped"]
         page.page.wait_for_selector("#banner:not([hidden])", timeout=2500)
         # What is true of a line that is only silent, and nothing shifts the scene in the hand.
-        assert bar(page, "banner") == "Nothing heard from the arm: what you see is old."
+        assert bar(page, "banner") == "The arm does not answer. The picture is old."
         assert scene.bounding_box() == place
         truth.wait(5.0, holder=None)
         line.cut = False

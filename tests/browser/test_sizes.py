@@ -307,7 +307,7 @@ def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
     page.page.wait_for_selector("#clear-stop:not([hidden])")
     for opener in ("jog-button", "objects-button"):
         page.page.tap(f"#{opener}")
-        page.page.evaluate("katana.toast('Axis 2: 300 is not between -124.25 and 7.75, not sent.')")
+        page.page.evaluate("katana.toast('Axis 2: 300 is not between -124.25 and 7.75. It was not sent.')")
         page.page.wait_for_selector("#toast.shown")
         found: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
         assert {"stop", "clear-stop", opener} <= found.keys()

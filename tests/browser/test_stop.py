@@ -64,7 +64,7 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
     driver.press_in_bar("Clear stop")
     other.wait_until(lambda: mood(other.page) == "ok", "the stop to be cleared")
     # With nobody driving everybody here may.
-    driver.press_in_bar("Let go")
+    driver.press_in_bar("Release")
     driver.page.keyboard.press("Space")
     other.wait_until(lambda: offers_clear_stop(other), "the offer")
     other.press_in_bar("Clear stop")
