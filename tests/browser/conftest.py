@@ -15,6 +15,8 @@ from playwright.sync_api import Error as PlaywrightError
 
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth, prepare
 
 THREAD_SECONDS = 5.0
 ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
@@ -91,6 +93,42 @@ def open_page(windows: Windows) -> Iterator[OpenPage]:
             return stack.enter_context(windows.open(url, **options))
 
         yield open_page
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def truth(server: AppServer) -> Truth:
+    return Truth(server)
+
+
+@pytest.fixture(scope="module")
+def window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        yield page
+
+
+@pytest.fixture
+def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
+    """A window whose person drives, the arm at home."""
+    prepare(window, truth)
+    yield window
+    if window.page.get_attribute("#jog-button", "aria-expanded") == "true":
+        window.page.click("#jog-button")
+    assert window.errors == []
+
+
+@pytest.fixture
+def new_page(server: AppServer, open_page: OpenPage, truth: Truth) -> Iterator[ViserPage]:
+    """Likewise, and no other test sees it."""
+    page = open_page(server.url, nodes=("/arm", MOVE))
+    prepare(page, truth)
+    yield page
+    assert page.errors == []
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,8 @@ import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal, Self
-from urllib.parse import urlencode
 
 import imageio.v3 as imageio
 import numpy as np
@@ -22,7 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from playwright.sync_api import Browser, Frame, Locator, Page
 from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
+from tests.browser.camera import Camera, Drawing
 from tests.browser.grip import ArrowGrip, Grip, RingGrip
+from tests.browser.message import Message
 
 Matrix = NDArray[np.floating[Any]]
 Pixel = tuple[float, float]
@@ -36,48 +35,6 @@ POLL_MILLISECONDS = 20.0
 THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
 COARSE = 0.5  # pixels drawn for one of the window: a software renderer is four times as fast
-
-
-class Drawing(StrEnum):
-    """When a window draws, which without a graphics card is most of what a browser does."""
-
-    PICTURES = "pictures"
-    """For pictures of it alone. Else all but the drawing is done, frame by frame."""
-    BEST = "best"
-    """Likewise, with reflections, shadows, smooth edges and every pixel."""
-    ALWAYS = "always"
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Where the browser looks from: viser's world, metres, `fov` vertical in radians."""
-
-    position: tuple[float, float, float] = (0.75, -0.7, 0.65)
-    look_at: tuple[float, float, float] = (0.2, 0.0, 0.22)
-    fov: float = 0.7
-
-    def query(self, pixels: float) -> str:
-        """The camera as viser's page takes it in its address.
-
-        `pixels` are drawn for each of the window's along either side.
-        """
-        values = {
-            "initialCameraPosition": ",".join(map(str, self.position)),
-            "initialCameraLookAt": ",".join(map(str, self.look_at)),
-            "initialCameraFov": str(self.fov),
-            # Else viser draws in fewer pixels whenever the machine is slow.
-            "fixedDpr": str(pixels),
-        }
-        return urlencode(values, safe=",")
-
-
-@dataclass(frozen=True)
-class Message:
-    """A decoded viser message: `time` in seconds since the epoch, as `time.time()` has it."""
-
-    time: float
-    type: str
-    body: dict[str, Any]
 
 
 class ViserPage:

@@ -13,7 +13,7 @@ from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import Truth, clear_stop, prepare
+from tests.browser.session import Truth, clear_stop, prepare
 
 MOVE = "/target/move"
 READY = Settings().ready

@@ -10,7 +10,7 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
-from tests.browser.test_gateway import Truth, bar
+from tests.browser.session import Truth, bar
 
 SCRIPT = """\
 name: Wave

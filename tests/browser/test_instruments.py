@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -18,9 +15,22 @@ from playwright.sync_api import Browser
 from katana450.client import connect
 from katana450.server.api import answers, requests
 from tests.browser.conftest import OpenPage
+from tests.browser.instruments import (
+    arrange,
+    card,
+    dial,
+    goal,
+    middle,
+    places,
+    reload,
+    show,
+    slowly,
+    table,
+    turn,
+)
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import MOVE, THIN, Truth, bar, clear_stop, take
+from tests.browser.session import MOVE, THIN, Truth, bar, clear_stop, take
 from tests.gateway.slow_link import SlowLink
 
 KEPT = "katana450.instruments"
@@ -62,73 +72,6 @@ def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
     truth.wait(20.0, mood="ok")
     yield window
     assert window.errors == []
-
-
-@contextmanager
-def slowly(page: ViserPage, truth: Truth) -> Iterator[None]:
-    """The arm is slow enough for a browser that draws without a graphics card."""
-    speed = dial(page, "speed")
-    speed.focus()
-    for key, wanted in (("PageDown", 0.05), ("PageUp", 1.0)):
-        while truth.status()["speed"] != pytest.approx(wanted):
-            page.page.keyboard.press(key)
-            page.page.wait_for_timeout(60)
-        if wanted < 1.0:
-            yield
-            speed.focus()
-
-
-def show(page: ViserPage, wanted: bool) -> None:
-    button = page.page.locator("#instruments-button")
-    if (button.get_attribute("aria-expanded") == "true") != wanted:
-        button.click()
-    if wanted:
-        page.page.wait_for_function(
-            "() => document.querySelector('.knob .goal')?.textContent.endsWith('°')"
-        )
-
-
-def card(page: ViserPage, name: str) -> Any:
-    found = page.page.locator(f"#instruments .card[data-id={name}]")
-    found.scroll_into_view_if_needed()
-    return found
-
-
-def dial(page: ViserPage, name: str) -> Any:
-    return card(page, name).get_by_role("slider")
-
-
-def goal(page: ViserPage, name: str) -> float:
-    """What a knob points at, in its own unit."""
-    return float(dial(page, name).get_attribute("aria-valuenow") or "nan")
-
-
-def middle(found: Any) -> tuple[float, float, float]:
-    """Of an element in the window, and half its width [px]."""
-    box = found.bounding_box()
-    assert box is not None
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
-
-
-def turn(page: ViserPage, name: str, degrees: float) -> None:
-    """Take a knob at the top and go round it clockwise."""
-    x, y, radius = middle(dial(page, name))
-    mouse = page.page.mouse
-    for step in range(11):
-        angle = math.radians(degrees * step / 10)
-        mouse.move(x + 0.7 * radius * math.sin(angle), y - 0.7 * radius * math.cos(angle))
-        if step == 0:
-            mouse.down()
-    mouse.up()
-
-
-def table(page: ViserPage, name: str) -> dict[str, Any]:
-    """What a plot shows, as it is saved: a column by its heading."""
-    with page.page.expect_download() as told:
-        card(page, name).get_by_role("button", name="as CSV").click()
-    assert told.value.suggested_filename == f"katana450-{name}.csv"
-    heading, *rows = csv.reader(io.StringIO(Path(told.value.path()).read_text(encoding="utf-8")))
-    return dict(zip(heading, np.array(rows, float).T, strict=True))
 
 
 def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, truth: Truth) -> None:
@@ -287,25 +230,6 @@ def test_a_plot_is_read_paused_and_sleeps_while_it_is_closed(page: ViserPage, tr
     page.page.wait_for_timeout(300)
     assert np.diff(table(page, "joint-angles")["t [s]"]).max() > 1.0
     assert np.median(np.diff(kept["t [s]"])) < 0.06
-
-
-def places(page: ViserPage) -> list[tuple[str, str]]:
-    """The shown cards in their order, with their sizes."""
-    found: list[list[str]] = page.page.evaluate(
-        """() => [...document.querySelectorAll("#instruments .card:not([hidden])")]
-          .map((card) => [card.dataset.id, card.dataset.size])"""
-    )
-    return [(name, size) for name, size in found]
-
-
-def arrange(page: ViserPage) -> None:
-    page.page.locator("#instruments .toolbar").get_by_role("button", name="Arrange").click()
-
-
-def reload(page: ViserPage) -> None:
-    """The panel opens by itself, as it was left."""
-    page.page.reload()
-    page.page.wait_for_selector("#instruments .card")
 
 
 def test_a_layout_is_arranged_by_hand_and_keys_and_outlives_the_page(page: ViserPage) -> None:

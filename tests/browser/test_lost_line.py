@@ -9,8 +9,8 @@ import numpy as np
 
 from tests.browser.conftest import OpenPage
 from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, take
 from tests.browser.test_app import Robot
-from tests.browser.test_gateway import MOVE, Truth, bar, camera, clear_stop, take
 from tests.gateway.slow_link import SlowLink
 
 

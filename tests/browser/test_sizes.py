@@ -20,7 +20,7 @@ from katana450.server.viser_bridge.themes import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import take
+from tests.browser.session import take
 from tests.gateway.slow_link import SlowLink
 
 MOVE = "/target/move"
@@ -307,7 +307,9 @@ def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
     page.page.wait_for_selector("#clear-stop:not([hidden])")
     for opener in ("jog-button", "objects-button"):
         page.page.tap(f"#{opener}")
-        page.page.evaluate("katana.toast('Axis 2: 300 is not between -124.25 and 7.75. It was not sent.')")
+        page.page.evaluate(
+            "katana.toast('Axis 2: 300 is not between -124.3 and 7.8. It was not sent.')"
+        )
         page.page.wait_for_selector("#toast.shown")
         found: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
         assert {"stop", "clear-stop", opener} <= found.keys()

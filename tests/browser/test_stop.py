@@ -13,7 +13,7 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import bar, mood, take
+from tests.browser.session import bar, mood, take
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="freezes a process")
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from katana450.resources import STATIC
+from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage, Windows
-from tests.browser.page import Camera, ViserPage
+from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.viser_parts_app import EYE
 from tests.viser_bridge.parts import part
