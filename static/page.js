@@ -79,7 +79,7 @@
   });
   stopButton.addEventListener("click", (event) => event.detail === 0 && stop());
 
-  // Called for keys in both documents. Space and Esc only stop the arm, wherever the focus is.
+  // Called for keys in both documents. Space and Esc only stop the arm, whatever has the focus.
   function key(event) {
     const ends = event.key === " " || event.key === "Escape";
     if (ends && event.type === "keydown" && !event.repeat) stop();

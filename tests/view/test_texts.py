@@ -1,4 +1,4 @@
-"""Every reason has its sentence, with its number in it."""
+"""Texts of the state: every reason has a sentence that contains its number."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def with_findings(state: State, *findings: Finding) -> State:
 
 @pytest.mark.parametrize("reason", Reason)
 def test_every_reason_has_a_sentence(state: State, reason: Reason) -> None:
-    told = sentence(with_findings(state, Finding(reason, 0.5, 1)))
-    assert not told[0].islower()
-    assert told.endswith(".")
+    text = sentence(with_findings(state, Finding(reason, 0.5, 1)))
+    assert not text[0].islower()
+    assert text.endswith(".")
 
 
 @pytest.mark.parametrize("status", Status)
@@ -56,7 +56,7 @@ def test_every_status_has_a_headline(status: Status) -> None:
     assert STATUS[status]
 
 
-def test_no_text_is_left_over() -> None:
+def test_texts_and_kinds_match() -> None:
     assert set(REASONS) == set(Reason)
     assert set(STATUS) == set(Status)
     assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(Priority)
@@ -85,7 +85,7 @@ def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, said: s
 
 
 @pytest.mark.parametrize("priority", Priority)
-def test_every_reading_has_a_name_of_its_own_and_a_hint(priority: Priority) -> None:
+def test_every_priority_has_a_unique_name_and_a_hint(priority: Priority) -> None:
     assert list(PRIORITIES.values()).count(PRIORITIES[priority]) == 1
     assert PRIORITY_HINTS[priority]
 
@@ -117,7 +117,7 @@ def test_contact_is_reported_with_both_parts_and_the_distance(state: State) -> N
     ("name", "said"),
     [("pan_link", "shoulder"), ("forearm_link", "forearm"), ("table", "table"), ("cup_2", "cup 2")],
 )
-def test_parts_are_named_as_people_name_them(name: str, said: str) -> None:
+def test_parts_have_plain_names(name: str, said: str) -> None:
     assert part(name) == said
 
 
@@ -170,7 +170,7 @@ def test_two_reasons_make_one_sentence(state: State) -> None:
     assert said == "32 mm out of reach; axis 2 at its limit of 7.75°."
 
 
-def test_nothing_wrong_nothing_said(state: State) -> None:
+def test_state_without_findings_has_no_sentence(state: State) -> None:
     assert sentence(state) == ""
     assert headline(state) == STATUS[Status.OK]
 

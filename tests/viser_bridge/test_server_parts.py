@@ -1,4 +1,4 @@
-"""Each private part of viser's server that the app relies on, tried on a real server."""
+"""Each private part of viser's server that the app uses, tested on a real server."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.viser_bridge.internals import sent
 from tests.viser_bridge.parts import part
 
 SECONDS = 10.0
-"""[s] In which whatever is awaited has come."""
+"""Timeout [s] of every wait."""
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": UPRIGHT, "position": [1.0, 0.0, 1.0], "fov": 0.7,
@@ -47,7 +47,7 @@ FROM_PAGE: dict[str, dict[str, Any]] = {
         "name": "/n", "instance_index": None, "modifier": None, "owner": "", **RAY,
     },
 }  # fmt: skip
-"""Fields of each message that the app reads of a page, as the page sends them."""
+"""Fields of each message that the app reads, as the page sends them."""
 
 
 @asynccontextmanager
@@ -194,8 +194,10 @@ def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> 
         async with browser(server) as one, browser(server) as other:
             await until(lambda: len(connections) == 2, "both")
             connections[0].queue_message(wire.SetPositionMessage("/only", (0.0, 0.0, 0.0)))
-            told = [await Peer(socket).listen() for socket in (one, other)]
-        named = [[each for each in messages if each.get("name") == "/only"] for messages in told]
+            received = [await Peer(socket).listen() for socket in (one, other)]
+        named = [
+            [each for each in messages if each.get("name") == "/only"] for messages in received
+        ]
         assert sorted(map(len, named)) == [0, 1]
 
     with part("queue_message"):
@@ -219,8 +221,8 @@ def test_state_of_a_node_can_be_written_and_sent(server: viser.ViserServer) -> N
         assert frame._impl.props.show_axes == frame.show_axes
     with part("_queue_scene_message"):
         frame._impl.api._queue_scene_message(wire.SetPositionMessage("/frame", (1.0, 2.0, 3.0)))
-        (told,) = (each for each in sent(server) if isinstance(each, wire.SetPositionMessage))
-        assert told.position == (1.0, 2.0, 3.0)
+        (message,) = (each for each in sent(server) if isinstance(each, wire.SetPositionMessage))
+        assert message.position == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("kind", FROM_PAGE)
