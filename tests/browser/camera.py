@@ -8,33 +8,33 @@ from urllib.parse import urlencode
 
 
 class Drawing(StrEnum):
-    """When a window draws, which without a graphics card is most of what a browser does."""
+    """When a window draws; without a graphics card, drawing is most of the work of a browser."""
 
     PICTURES = "pictures"
-    """For pictures of it alone. Else all but the drawing is done, frame by frame."""
+    """Only for pictures. Otherwise each frame does all work except the drawing."""
     BEST = "best"
-    """Likewise, with reflections, shadows, smooth edges and every pixel."""
+    """Only for pictures, with reflections, shadows, smooth edges and every pixel."""
     ALWAYS = "always"
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where the browser looks from: viser's world, metres, `fov` vertical in radians."""
+    """The camera of a browser, in viser's world [m]; `fov` is vertical [rad]."""
 
     position: tuple[float, float, float] = (0.75, -0.7, 0.65)
     look_at: tuple[float, float, float] = (0.2, 0.0, 0.22)
     fov: float = 0.7
 
     def query(self, pixels: float) -> str:
-        """The camera as viser's page takes it in its address.
+        """Return the camera as parameters of the address of viser's page.
 
-        `pixels` are drawn for each of the window's along either side.
+        `pixels` is the number of drawn pixels per pixel of the window, along each side.
         """
         values = {
             "initialCameraPosition": ",".join(map(str, self.position)),
             "initialCameraLookAt": ",".join(map(str, self.look_at)),
             "initialCameraFov": str(self.fov),
-            # Else viser draws in fewer pixels whenever the machine is slow.
+            # Without this, viser draws fewer pixels on a slow machine.
             "fixedDpr": str(pixels),
         }
         return urlencode(values, safe=",")

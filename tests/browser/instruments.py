@@ -19,7 +19,7 @@ from tests.browser.session import Truth
 
 @contextmanager
 def slowly(page: ViserPage, truth: Truth) -> Iterator[None]:
-    """The arm is slow enough for a browser that draws without a graphics card."""
+    """Slow the arm down for a browser that draws without a graphics card."""
     speed = dial(page, "speed")
     speed.focus()
     for key, wanted in (("PageDown", 0.05), ("PageUp", 1.0)):
@@ -52,19 +52,19 @@ def dial(page: ViserPage, name: str) -> Any:
 
 
 def goal(page: ViserPage, name: str) -> float:
-    """What a knob points at, in its own unit."""
+    """Return the goal that a knob shows, in its own unit."""
     return float(dial(page, name).get_attribute("aria-valuenow") or "nan")
 
 
 def middle(found: Any) -> tuple[float, float, float]:
-    """Of an element in the window, and half its width [px]."""
+    """Return x and y of the middle of an element in the window, and half its width [px]."""
     box = found.bounding_box()
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
 
 
 def turn(page: ViserPage, name: str, degrees: float) -> None:
-    """Take a knob at the top and go round it clockwise."""
+    """Drag round a knob clockwise, from its top."""
     x, y, radius = middle(dial(page, name))
     mouse = page.page.mouse
     for step in range(11):
@@ -76,16 +76,17 @@ def turn(page: ViserPage, name: str, degrees: float) -> None:
 
 
 def table(page: ViserPage, name: str) -> dict[str, Any]:
-    """What a plot shows, as it is saved: a column by its heading."""
-    with page.page.expect_download() as told:
+    """Return the columns of a plot's CSV file by heading."""
+    with page.page.expect_download() as download:
         card(page, name).get_by_role("button", name="as CSV").click()
-    assert told.value.suggested_filename == f"katana450-{name}.csv"
-    heading, *rows = csv.reader(io.StringIO(Path(told.value.path()).read_text(encoding="utf-8")))
+    file = download.value
+    assert file.suggested_filename == f"katana450-{name}.csv"
+    heading, *rows = csv.reader(io.StringIO(Path(file.path()).read_text(encoding="utf-8")))
     return dict(zip(heading, np.array(rows, float).T, strict=True))
 
 
 def places(page: ViserPage) -> list[tuple[str, str]]:
-    """The shown cards in their order, with their sizes."""
+    """Return the shown cards in their order, with their sizes."""
     found: list[list[str]] = page.page.evaluate(
         """() => [...document.querySelectorAll("#instruments .card:not([hidden])")]
           .map((card) => [card.dataset.id, card.dataset.size])"""
@@ -98,6 +99,6 @@ def arrange(page: ViserPage) -> None:
 
 
 def reload(page: ViserPage) -> None:
-    """The panel opens by itself, as it was left."""
+    """Reload the page. The instruments open again as before."""
     page.page.reload()
     page.page.wait_for_selector("#instruments .card")

@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Message:
-    """A decoded viser message: `time` in seconds since the epoch, as `time.time()` has it."""
+    """A decoded viser message; `time` is in seconds since the epoch, as in `time.time()`."""
 
     time: float
     type: str

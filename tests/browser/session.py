@@ -17,11 +17,11 @@ from tests.gateway.client import ask, enter
 MOVE = "/target/move"
 READY = np.array(Settings().ready)
 THIN = 15_000.0
-"""[bytes/s] On which viser alone shows an arm of half a minute ago."""
+"""Rate of a slow connection [bytes/s], on which viser alone shows pictures half a minute old."""
 
 
 class Truth:
-    """What the server itself says, asked without a browser."""
+    """The state of the server, queried without a browser."""
 
     def __init__(self, server: AppServer) -> None:
         self._url = server.url
@@ -30,12 +30,12 @@ class Truth:
     def status(self) -> dict[str, Any]:
         code, _, body = ask(f"{self._url}/api/v1/state", Cookie=self._cookie)
         assert code == 200
-        told: dict[str, Any] = json.loads(body)
-        mood = "moving" if told["moving"] and told["status"] == "ok" else told["status"]
-        return told | {"mood": mood if told["stopped"] is None else "stopped"}
+        state: dict[str, Any] = json.loads(body)
+        mood = "moving" if state["moving"] and state["status"] == "ok" else state["status"]
+        return state | {"mood": mood if state["stopped"] is None else "stopped"}
 
     def wait(self, seconds: float = 5.0, **wanted: Any) -> float:
-        """Until the status has these values; how long that took [s]."""
+        """Wait until the status has these values; return the time that it took [s]."""
         started = time.monotonic()
         while any(self.status()[key] != value for key, value in wanted.items()):
             assert time.monotonic() - started < seconds, (self.status(), wanted)
@@ -56,7 +56,7 @@ def clear_stop(page: ViserPage, truth: Truth) -> None:
 def prepare(page: ViserPage, truth: Truth) -> None:
     take(page)
     if truth.status()["stopped"] is not None:
-        # The window before went while its arm still moved.
+        # The previous window closed while the arm was moving.
         clear_stop(page, truth)
     go_home(page, truth)
 
@@ -67,7 +67,7 @@ def joints(page: ViserPage) -> Any:
 
 
 def take(page: ViserPage) -> None:
-    """The window before may still count as there, or just not any more."""
+    """Take the arm. The previous window may still hold it, or may have just lost it."""
 
     def taken() -> bool:
         page.page.evaluate(
@@ -80,7 +80,7 @@ def take(page: ViserPage) -> None:
 
 
 def bar(page: ViserPage, part: str) -> str:
-    """What the bar shows there."""
+    """Return the text of a part of the bar."""
     return page.page.inner_text(f"#{part}")
 
 
