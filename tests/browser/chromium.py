@@ -96,7 +96,7 @@ def find() -> Path | None:
 
 
 def version(path: Path) -> str:
-    """Return the version text of the browser at ``path``. Raises BrowserError if it does not run."""
+    """Return the version text of the browser. Raises BrowserError if it does not run."""
     try:
         answer = subprocess.run(
             [str(path), "--version"], capture_output=True, text=True, timeout=60, check=True

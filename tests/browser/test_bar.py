@@ -22,7 +22,7 @@ SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
 
 @pytest.fixture
 def sized(window: ViserPage) -> Iterator[Page]:
-    """A window whose size and colours may be changed."""
+    """Return a window whose size and colours may be changed."""
     before = window.page.viewport_size
     assert before is not None
     yield window.page
@@ -32,7 +32,7 @@ def sized(window: ViserPage) -> Iterator[Page]:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_stop_is_always_there_and_the_biggest(
+def test_stop_is_always_visible_and_the_largest_button(
     page: ViserPage, sized: Page, truth: Truth, artefacts: Path, size: str, scheme: str
 ) -> None:
     width, height = SIZES[size]
@@ -40,7 +40,7 @@ def test_stop_is_always_there_and_the_biggest(
     sized.set_viewport_size({"width": width, "height": height})
 
     def areas() -> dict[str, float]:
-        """Of all that can be pressed in the bar and lies wholly in the window."""
+        """Return the areas of all buttons of the bar; -1 for one outside the window."""
         found: dict[str, float] = page.page.evaluate(
             """() => {
               const inside = ({left, top, right, bottom}) =>
@@ -78,7 +78,7 @@ def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None
     for _ in range(6):
         page.page.keyboard.press("Tab")
         order.append(page.page.evaluate("() => document.activeElement.id"))
-    # In between, what may be done about who drives.
+    # The buttons of the lease, which have no id, lie in between.
     buttons = ["instruments-button", "objects-button", "jog-button", "help-button"]
     assert [each for each in order if each] == ["stop", *buttons, "scene"]
     page.page.click("#help-button")
@@ -94,18 +94,20 @@ def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None
 
 def test_the_page_is_small() -> None:
     assert sum(path.stat().st_size for path in STATIC.iterdir() if path.is_file()) < 75_000
-    # These come when they are first wanted.
+    # The instruments are loaded on first use.
     assert sum(path.stat().st_size for path in (STATIC / "instruments").iterdir()) < 70_000
 
 
-def test_a_link_lets_in_and_leaves_no_trace(browser: Any, tmp_path: Path, artefacts: Path) -> None:
+def test_access_link_signs_in_and_leaves_no_trace(
+    browser: Any, tmp_path: Path, artefacts: Path
+) -> None:
     file = AccessFile.create(tmp_path / "access.json")
     token = file.give("Anna", Role.VIEWER, time.time() + 600.0)
     with AppServer((*APP, "--access", str(file.path))) as server:
         context = browser.new_context()
-        asked: list[str] = []
+        requested: list[str] = []
         page = context.new_page()
-        page.on("request", lambda request: asked.append(request.url))
+        page.on("request", lambda request: requested.append(request.url))
         page.goto(server.url)
         page.wait_for_selector("#gate:not([hidden])")
         page.screenshot(path=artefacts / "gateway-gate.png")
@@ -113,10 +115,10 @@ def test_a_link_lets_in_and_leaves_no_trace(browser: Any, tmp_path: Path, artefa
         page.goto(f"{server.url}/#{token}")
         page.locator("#name", has_text="Anna").wait_for()
         assert page.url == f"{server.url}/"
-        assert not [url for url in asked if token in url.partition("#")[0]]
+        assert not [url for url in requested if token in url.partition("#")[0]]
         assert page.evaluate("() => document.cookie") == ""
         assert page.locator("#acts button").count() == 0
-        # The next visit needs no link.
+        # The next visit does not need the access link.
         again = context.new_page()
         again.goto(server.url)
         again.locator("#name", has_text="Anna").wait_for()

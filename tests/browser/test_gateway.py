@@ -22,12 +22,12 @@ from tests.gateway.client import enter, page_name, websocket
 from tests.gateway.slow_link import SlowLink
 
 STOPS = 50 if "KATANA450_LONG" in os.environ else 3
-"""In each of four situations; all of them with `make test-long`."""
+"""Number of stops in each of four situations; more with `make test-long`."""
 
 
 @contextmanager
 def crowd(server: AppServer, size: int) -> Iterator[None]:
-    """So many viewers, each of whom takes in all there is to see."""
+    """Connect ``size`` viewers, each of which receives the whole scene."""
     over = threading.Event()
 
     async def watch() -> None:
@@ -54,7 +54,7 @@ def crowd(server: AppServer, size: int) -> Iterator[None]:
 def test_stop_works_under_any_load(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
-    """Clicked while a key jogs, by keys in a drag, from the far end of a thin line."""
+    """Stop by a click during a jog, by keys during a drag, and over a slow connection."""
     took: list[float] = []
 
     def stopped() -> None:
@@ -104,7 +104,7 @@ def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, trut
         page.page.keyboard.press("Space")
         truth.wait(mood="stopped")
         reset_by_key(page, truth)
-        # The hand that held the handle goes on, and moves nothing.
+        # The drag continues and moves nothing.
         grip.sweep(0.05, 5)
         page.page.wait_for_timeout(300)
         assert [page.slider_value(f"Axis {axis}") for axis in range(1, 6)] == q
@@ -117,20 +117,20 @@ def test_command_from_before_a_stop_moves_nothing_after_it(page: ViserPage, trut
 
 
 def reset_by_key(page: ViserPage, truth: Truth) -> None:
-    """The mouse is busy."""
+    """Clear the stop by a key, because the mouse is in use."""
     page.page.wait_for_selector("#clear-stop:not([hidden])")
     page.page.focus("#clear-stop")
     page.page.keyboard.press("Enter")
     truth.wait(stopped=None)
 
 
-def test_the_arm_goes_from_hand_to_hand(
+def test_arm_is_handed_over(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage, artefacts: Path
 ) -> None:
     other = open_page(server.url, nodes=("/arm", MOVE))
     me, they = (bar(each, "name").partition(",")[0] for each in (page, other))
     other.wait_until(lambda: bar(other, "holder") == f"{me} drives", "who drives")
-    # A control of who does not drive springs back, and says why.
+    # A control of a person who does not drive springs back, and the reason is shown.
     before = other.slider_value("Axis 1")
     other.drag_slider("Axis 1", 40.0)
     other.wait_until(lambda: bar(other, "toast") == f"{me} holds the arm: ask for it.", "why not")
@@ -147,20 +147,20 @@ def test_the_arm_goes_from_hand_to_hand(
     other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
     other.press_in_bar("Release")
     page.wait_until(lambda: bar(page, "holder") == "Nobody drives", "nobody to drive")
-    # Who touches a control first has it.
+    # The first person who uses a control drives.
     other.drag_slider("Axis 1", 10.0)
     other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
     assert other.errors == []
 
 
-def test_a_page_that_is_loaded_anew_still_drives(new_page: ViserPage) -> None:
+def test_reloaded_page_still_drives(new_page: ViserPage) -> None:
     name = bar(new_page, "name")
     new_page.page.reload()
     new_page.page.locator("#holder", has_text="You drive").wait_for()
     assert bar(new_page, "name") == name
 
 
-def test_a_thin_line_shows_few_pictures_but_no_old_ones(
+def test_slow_connection_shows_few_but_no_old_frames(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
     with SlowLink(server.port, 1e9) as line:
@@ -174,8 +174,8 @@ def test_a_thin_line_shows_few_pictures_but_no_old_ones(
         line.rate = THIN
 
         def turns(each: ViserPage, since: float) -> list[tuple[float, float]]:
-            told = each.messages("SetOrientationMessage", node=node, since=since)
-            return [(m.time, 2.0 * np.arctan2(m.body["wxyz"][3], m.body["wxyz"][0])) for m in told]
+            sent = each.messages("SetOrientationMessage", node=node, since=since)
+            return [(m.time, 2.0 * np.arctan2(m.body["wxyz"][3], m.body["wxyz"][0])) for m in sent]
 
         since = time.time()
         for degrees in (150.0, -150.0, 150.0, -150.0):
@@ -190,7 +190,7 @@ def test_a_thin_line_shows_few_pictures_but_no_old_ones(
         rested = time.monotonic() - rested
         near, seen = turns(page, since), turns(far, since)
         line.rate = 1e9
-    # When was the near window where the far one is? On a line without memory: a moment ago.
+    # The age of a far frame is the time since the near window showed the same angle.
     ages = []
     times, angles = (np.array(each) for each in zip(*near, strict=True))
     for at, angle in seen:

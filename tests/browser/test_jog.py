@@ -48,7 +48,7 @@ def test_a_held_key_moves_the_tool_along_one_axis(
         return np.array_equal(tool_point(page), before)
 
     page.wait_until(rests, "the tool to rest")
-    # viser has the same keys for its camera.
+    # viser uses the same keys for its camera.
     assert np.allclose(camera(page), looked, atol=1e-6)
 
 
@@ -90,9 +90,7 @@ GAMEPAD = """() => {
 }"""
 
 
-def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
-    page: ViserPage, truth: Truth
-) -> None:
+def test_gamepad_moves_only_with_its_shoulder_button(page: ViserPage, truth: Truth) -> None:
     page.page.evaluate(GAMEPAD)
     page.page.click("#jog-button")
     start = tool_point(page)[:3, 3]
@@ -104,7 +102,7 @@ def test_a_gamepad_moves_only_while_its_shoulder_button_is_held(
     wait_moved(page, start, 1, 1)
     page.page.evaluate("() => { pad.buttons[4].pressed = false }")
     truth.wait(mood="ok")
-    # Its B is STOP, and it is pulled out while it pushes.
+    # Button B is STOP. The gamepad is also unplugged while its stick is deflected.
     page.page.evaluate("() => { pad.buttons[5].pressed = true }")
     page.page.wait_for_timeout(200)
     page.page.evaluate("() => { navigator.getGamepads = () => [] }")
@@ -148,12 +146,12 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     page.press_in_bar("Connect a SpaceMouse")
     page.page.get_by_role("button", name="Synthetic SpaceMouse").wait_for()
     start = tool_point(page)[:3, 3]
-    # To the left, with the cap held: it reports all the time.
+    # The cap is pushed to the left; a held SpaceMouse reports all the time.
     page.page.evaluate(
         "() => { window.held = setInterval(() => device.push(1, [-350, 0, 0]), 16) }"
     )
     wait_moved(page, start, 1, 1)
-    # The cable comes out in mid-push: no report says that it is let go.
+    # The cable is unplugged during a push, so no report announces the release.
     page.page.evaluate("() => clearInterval(held)")
     truth.wait(mood="ok")
     page.page.evaluate("() => device.press(1)")

@@ -1,4 +1,4 @@
-"""A page whose server is killed, whose line falls silent, or that is reloaded in mid-drag."""
+"""A page after the loss of its server, with a silent connection, or reloaded during a drag."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         server.kill()
         killed = time.monotonic()
         page.page.wait_for_selector("#banner.lost")
-        told = time.monotonic() - killed
+        noticed = time.monotonic() - killed
         page.keep(artefacts / "gateway-lost.png")
         assert "Offline" in bar(page, "link")
         assert bar(page, "headline") == "No connection"
-        assert told < 1.0
+        assert noticed < 1.0
         robot.since = time.time()
         server.restart()
         back = time.monotonic()
         page.page.wait_for_selector("#banner", state="hidden")
         page.wait_until(lambda: page.connected, "viser to come back")
-        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state to be told")
-        print(f"told after {told:.2f} s, back after {time.monotonic() - back:.2f} s")
+        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
+        print(f"noticed after {noticed:.2f} s, back after {time.monotonic() - back:.2f} s")
         page.wait_ready(("/arm", MOVE))
         robot.settle()
-        # viser starts from its first view, and the camera is brought back from there.
+        # viser starts with its first view; then the camera is restored.
         page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
         page.page.wait_for_timeout(1500)
         assert np.allclose(camera(page), looked, atol=2e-3)
@@ -62,14 +62,14 @@ LATE_RESET = """() => {
     away ||= distance > 0.05;
     if (!away || distance > 1e-3) return;
     clearInterval(timer);
-    // viser has told by then that the camera is back.
+    // By then viser has reported the restored camera.
     setTimeout(() => {
       __viserMutable.resetCameraPose(false);
       window.wasReset = true;
     }, 300);
   }, 10);
 }"""
-"""Do once more what viser does when the scene is there, but after the camera was brought back."""
+"""Script that repeats viser's reset of the camera after the camera was restored."""
 
 
 def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
@@ -86,7 +86,7 @@ def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
         page.wait_until(lambda: page.frame.evaluate("wasReset"), "the reset", seconds=60.0)
         page.page.wait_for_timeout(2000)
         assert np.allclose(camera(page), looked, atol=2e-3)
-        # Who turns the camera then has it.
+        # A person who then turns the camera keeps that view.
         page.page.mouse.down()
         page.page.mouse.move(300, 500, steps=5)
         page.page.mouse.up()
@@ -106,7 +106,7 @@ def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) ->
         took = truth.wait(1.0, mood="stopped")
         assert "fell silent while the arm moved" in truth.status()["stopped"]
         page.page.wait_for_selector("#banner:not([hidden])", timeout=2500)
-        # What is true of a line that is only silent, and nothing shifts the scene in the hand.
+        # The banner describes a silent connection, and nothing shifts the scene.
         assert bar(page, "banner") == "The arm does not answer. The picture is old."
         assert scene.bounding_box() == place
         truth.wait(5.0, holder=None)
@@ -118,10 +118,10 @@ def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) ->
 
 
 SLOW = 0.05
-"""Fraction of full speed at which the arm still moves when a page is back."""
+"""Fraction of full speed at which the arm still moves after the reload."""
 
 
-def test_reload_in_mid_drag_stops_the_arm_and_says_why(
+def test_reload_during_a_drag_stops_the_arm_with_a_reason(
     open_page: OpenPage, artefacts: Path
 ) -> None:
     with AppServer(ATTENTIVE_APP) as server:
@@ -136,7 +136,7 @@ def test_reload_in_mid_drag_stops_the_arm_and_says_why(
         truth.wait(moving=True, stopped=None)
         name = truth.status()["holder"]
         goal = truth.status()["goal"]
-        # The hand still holds the handle: its drag never ends.
+        # The mouse button stays pressed, so the drag never ends.
         page.page.reload(wait_until="commit")
         truth.wait(5.0, stop="confirmed")
         lost = f"{name} lost the connection while the arm moved."
@@ -152,7 +152,7 @@ def test_reload_in_mid_drag_stops_the_arm_and_says_why(
         page.keep(artefacts / "reloaded-in-mid-drag.png")
         page.page.wait_for_timeout(1500)
         assert truth.status()["q"] == rest
-        # Clearing the stop begins no motion either.
+        # Clear stop starts no motion either.
         page.page.locator("#clear-stop").click()
         truth.wait(stopped=None)
         page.page.wait_for_timeout(1500)

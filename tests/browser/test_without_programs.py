@@ -1,4 +1,4 @@
-"""The page of a server without the extension ``programs``: whole, and silent about programs."""
+"""The page of a server without the extension ``programs`` works and offers no programs."""
 
 from __future__ import annotations
 
