@@ -39,7 +39,7 @@ export class Command {
     else this.#ticket = ticket;
   }
 
-  // Drop all requests after a refusal or a loss of the connection. A new server counts tickets anew.
+  // Drop all requests after a refusal or a loss of the connection. A new server counts tickets from the start.
   forget() {
     clearTimeout(this.#timer);
     this.#timer = null;

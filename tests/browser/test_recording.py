@@ -61,9 +61,9 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
     options = json.dumps({"draws": False, "fullQuality": False})
     context.add_init_script(f"window.harness = {options};\n{scripts}")
     page = context.new_page()
-    asked: list[str] = []
+    requested: list[str] = []
     errors: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
+    page.on("request", lambda request: requested.append(request.url))
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:
         page.goto(f"{recording.as_uri()}?fixedDpr=0.5")
@@ -81,7 +81,7 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
             assert t == pytest.approx(fraction * SECONDS, abs=0.15)
             assert pan(page) == pytest.approx(TURN * t / SECONDS, abs=0.02)
         assert not errors
-        assert all(url.startswith(("file:", "blob:", "data:")) for url in asked)
+        assert all(url.startswith(("file:", "blob:", "data:")) for url in requested)
     finally:
         context.close()
 

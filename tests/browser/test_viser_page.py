@@ -274,7 +274,9 @@ def test_page_plays_the_recording_that_its_address_names(
 ) -> None:
     with part("playbackPath"):
         page = open_page(server.url, nodes=NODES, script=script())
-        asked: list[str] = []
-        page.page.on("request", lambda request: asked.append(request.url))
+        requested: list[str] = []
+        page.page.on("request", lambda request: requested.append(request.url))
         page.page.goto(f"{server.url}/?playbackPath=/run.viser")
-        page.wait_until(lambda: f"{server.url}/run.viser" in asked, "the recording to be asked for")
+        page.wait_until(
+            lambda: f"{server.url}/run.viser" in requested, "the recording to be requested"
+        )

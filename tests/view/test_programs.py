@@ -33,13 +33,13 @@ class ProgramRunner:
     def __init__(self) -> None:
         self.progress: Progress | None = None
         self.program: Program | None = None
-        self.asked: list[tuple[str, ProgramOrder | None]] = []
+        self.requests: list[tuple[str, ProgramOrder | None]] = []
 
     def plan(self, text: str, then: ProgramOrder | None, _actor: Actor) -> None:
-        self.asked.append((text, then))
+        self.requests.append((text, then))
 
     def steer(self, order: ProgramOrder, _actor: Actor) -> None:
-        self.asked.append(("", order))
+        self.requests.append(("", order))
 
 
 @pytest.fixture
@@ -91,10 +91,10 @@ def test_panel_previews_steers_and_teaches(
     for label in ("Wait", "Run", "End"):
         panel._orders.value = label  # type: ignore[misc]  # as above
         panel._order(ANNA)
-    assert [order for _, order in program_runner.asked] == [
+    assert [order for _, order in program_runner.requests] == [
         ProgramOrder.RUN, ProgramOrder.PAUSE, ProgramOrder.RUN, ProgramOrder.END
     ]  # fmt: skip
-    assert parse(program_runner.asked[0][0]).name == "Circle with gripper"
+    assert parse(program_runner.requests[0][0]).name == "Circle with gripper"
 
     for label in ("Add pose", "Add pose", "Save"):
         panel._teach.value = label  # type: ignore[misc]  # as above

@@ -65,7 +65,7 @@ def test_texts_and_kinds_match() -> None:
 
 
 @pytest.mark.parametrize(
-    ("finding", "said"),
+    ("finding", "expected"),
     [
         (Finding(Reason.OUT_OF_REACH, 0.032), "32 mm out of reach."),
         (Finding(Reason.OUT_OF_REACH, 0.0013), "1.3 mm out of reach."),
@@ -80,8 +80,8 @@ def test_texts_and_kinds_match() -> None:
         ),
     ],
 )
-def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, said: str) -> None:
-    assert sentence(with_findings(state, finding)) == said
+def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, expected: str) -> None:
+    assert sentence(with_findings(state, finding)) == expected
 
 
 @pytest.mark.parametrize("priority", Priority)
@@ -114,19 +114,21 @@ def test_contact_is_reported_with_both_parts_and_the_distance(state: State) -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "expected"),
     [("pan_link", "shoulder"), ("forearm_link", "forearm"), ("table", "table"), ("cup_2", "cup 2")],
 )
-def test_parts_have_plain_names(name: str, said: str) -> None:
-    assert part(name) == said
+def test_parts_have_plain_names(name: str, expected: str) -> None:
+    assert part(name) == expected
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "expected"),
     [((1.2, 0.6), "2.0"), ((1.2, 0.03), "40"), ((1.2, 1e-9), "∞"), ((1.2, 0.0), "∞")],
 )
-def test_the_condition_has_no_digits_of_rounding(values: tuple[float, float], said: str) -> None:
-    assert condition(np.array(values)) == said
+def test_the_condition_has_no_digits_of_rounding(
+    values: tuple[float, float], expected: str
+) -> None:
+    assert condition(np.array(values)) == expected
 
 
 def test_nearest_limit_is_reported_with_its_axis() -> None:
@@ -134,7 +136,7 @@ def test_nearest_limit_is_reported_with_its_axis() -> None:
 
 
 @pytest.mark.parametrize(
-    ("position_error", "rotation_error", "parts", "said"),
+    ("position_error", "rotation_error", "parts", "expected"),
     [
         (0.0, 0.0, None, "nothing"),
         (0.0123, 0.0, None, "12 mm"),
@@ -148,26 +150,26 @@ def test_branch_cells_have_three_texts(
     position_error: float,
     rotation_error: float,
     parts: tuple[str, str] | None,
-    said: str,
+    expected: str,
 ) -> None:
     contact = None if parts is None else Contact(parts, 0.001, np.zeros((2, 3)), np.eye(3)[2])
     cost = BranchMetrics(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
     choice = BranchOption(cost, contact)
-    assert branch_cells(choice) == (said, "90°, 1.3 s", "0.151")
+    assert branch_cells(choice) == (expected, "90°, 1.3 s", "0.151")
     assert len(BRANCH_HEADINGS) == 1 + len(branch_cells(choice))
 
 
 def test_two_reasons_make_one_sentence(state: State) -> None:
-    said = sentence(
+    text = sentence(
         with_findings(
             state,
             Finding(Reason.OUT_OF_REACH, 0.032),
             Finding(Reason.AXIS_LIMIT, math.radians(7.75), 1),
         )
     )
-    assert said == "32 mm out of reach; axis 2 at its limit of 7.75°."
+    assert text == "32 mm out of reach; axis 2 at its limit of 7.75°."
 
 
 def test_state_without_findings_has_no_sentence(state: State) -> None:
@@ -182,7 +184,7 @@ def test_no_negative_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    ("robot", "said"), [("katana450", "Katana450"), ("youbot_arm", "Youbot arm"), ("", "")]
+    ("robot", "expected"), [("katana450", "Katana450"), ("youbot_arm", "Youbot arm"), ("", "")]
 )
-def test_a_page_is_named_after_its_robot(robot: str, said: str) -> None:
-    assert title(robot) == said
+def test_a_page_is_named_after_its_robot(robot: str, expected: str) -> None:
+    assert title(robot) == expected

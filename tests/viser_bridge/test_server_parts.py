@@ -82,19 +82,19 @@ def test_server_has_a_websocket_server(server: viser.ViserServer) -> None:
 
 def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> None:
     async def trial() -> None:
-        heard: list[tuple[Any, Any]] = []
+        received: list[tuple[Any, Any]] = []
         websocket = server._websock_server
         pass_on = websocket._handle_incoming_message
 
         async def handle(client_id: Any, message: Any) -> None:
-            heard.append((client_id, message))
+            received.append((client_id, message))
             await pass_on(client_id, message)
 
         websocket._handle_incoming_message = handle  # type: ignore[method-assign]
         async with browser(server) as socket:
             await socket.send(msgspec.msgpack.encode(CAMERA))
             await until(server.get_clients, "a client for the first camera")
-            ((client_id, message),) = heard
+            ((client_id, message),) = received
             assert isinstance(message, wire.ViewerCameraMessage)
             assert client_id in server.get_clients()
 
@@ -104,10 +104,10 @@ def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> Non
 
 def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> None:
     async def trial() -> None:
-        heard: list[Any] = []
+        received: list[Any] = []
 
         async def handle(_client_id: Any, message: Any) -> None:
-            heard.append(message)
+            received.append(message)
 
         def meet(connection: Any) -> None:
             connection._handle_incoming_message = handle
@@ -115,7 +115,7 @@ def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> N
         server._websock_server.on_client_connect(meet)
         async with browser(server) as socket:
             await socket.send(msgspec.msgpack.encode(CAMERA))
-            await until(lambda: heard, "the message")
+            await until(lambda: received, "the message")
 
     with part("_handle_incoming_message"):
         run(trial())
@@ -164,7 +164,7 @@ def test_producer_of_frames_can_be_replaced(
     server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server.scene.add_frame("/frame")
-    heard: list[str] = []
+    received: list[str] = []
 
     async def produce(
         line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None
@@ -173,15 +173,15 @@ def test_producer_of_frames_can_be_replaced(
         windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
         try:
             async for window in windows:
-                heard.extend(type(message).__name__ for message in window)
+                received.extend(type(message).__name__ for message in window)
         finally:
             await windows.aclose()
 
     async def trial() -> None:
         monkeypatch.setattr(_infra, "_message_producer", produce)
         async with browser(server):
-            await until(lambda: "ReplayDoneMessage" in heard, "the scene")
-        assert "FrameMessage" in heard
+            await until(lambda: "ReplayDoneMessage" in received, "the scene")
+        assert "FrameMessage" in received
 
     with part("_message_producer"), part("window_generator"):
         run(trial())
