@@ -27,8 +27,9 @@ from typing import NamedTuple
 
 from playwright.sync_api import Browser
 
+from tests.browser.camera import Drawing
 from tests.browser.chromium import launched
-from tests.browser.page import Drawing, ViserPage
+from tests.browser.page import ViserPage
 from tests.browser.server import APP, BARE_APP, AppServer
 from tests.gateway.client import SUBPROTOCOL, ask, enter, page_name, websocket
 

@@ -18,8 +18,9 @@ from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
+from tests.browser.camera import Camera, Drawing
 from tests.browser.chromium import launched
-from tests.browser.page import Camera, Drawing, ViserPage
+from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 
 IMAGES = Path(__file__).with_name("images")

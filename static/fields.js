@@ -1,5 +1,5 @@
-// Number boxes of viser's panel. viser sends each keystroke, and the arm would go to 5, 50 and 500.
-// Here what is typed is a draft that viser does not see before Enter or before the box is left.
+// Number boxes of viser's panel. viser sends each keystroke, so the arm would move to 5, 50 and 500.
+// Here typed text is a draft, which viser gets on Enter or when the box is left.
 "use strict";
 const Fields = (() => {
   const UNFINISHED = /^-?\.?$/;
@@ -23,7 +23,7 @@ const Fields = (() => {
     return { label, low: low ?? -Infinity, high: high ?? Infinity, step };
   }
 
-  // Why the draft cannot be sent; empty when it can.
+  // Return why the draft cannot be sent; empty if it can.
   function objection(field) {
     const { low, high } = range(field);
     const value = field.value.trim() === "" ? NaN : Number(field.value);
@@ -45,7 +45,7 @@ const Fields = (() => {
     if (!changed(field)) return mark(field, false);
     const why = objection(field);
     mark(field, why);
-    if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}, and was not sent.`);
+    if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}. It was not sent.`);
     sending = true;
     Viser.type(field, field.value);
     sending = false;
@@ -53,7 +53,7 @@ const Fields = (() => {
 
   function leave(field) {
     box = null;
-    // A value typed before a stop must not be newer than the Clear stop that was clicked to leave the box.
+    // A value typed before a stop must not be sent after Clear stop, which was clicked to leave the box.
     if (!stopped()) commit(field);
     if (stopped() || field.getAttribute("aria-invalid")) restore(field);
   }
@@ -77,18 +77,18 @@ const Fields = (() => {
   on("change", (event) => {
     if (!isBox(event.target)) return;
     event.stopImmediatePropagation();
-    // A tool for the blind can set a value without the focus.
+    // Assistive technology can set a value without the focus.
     if (event.target !== box) commit(event.target);
   });
   on("focusin", ({ target }) => isBox(target) && (box = target));
-  // When the window loses the focus, the box keeps it, and the draft stays one.
+  // When the window loses the focus, the box keeps it, and the draft remains.
   on("focusout", ({ target }) => isBox(target) && document.activeElement !== target && leave(target));
-  // The buttons beside the box go on from what is typed, and the scene does not take the focus.
+  // The buttons beside the box start from the typed value. A click in the scene does not move the focus.
   on("pointerdown", ({ target }) => box && target !== box && !stopped() && commit(box));
   on("keydown", (event) => {
     if (!isBox(event.target)) return;
     if (event.key === "Enter") commit(event.target);
-    // Both stop the arm as well, as everywhere.
+    // Both keys also stop the arm.
     else if (event.key === "Escape" || event.key === " ") restore(event.target);
     else if (event.key in STEPS) {
       event.preventDefault();
@@ -98,7 +98,7 @@ const Fields = (() => {
   });
 
   return {
-    // Keep what the server says of the controls.
+    // Store the ranges and steps of the controls from messages of the server.
     hear: (messages) => Viser.keepControls(controls, messages),
     // `say` shows a sentence to the person.
     begin: (say) => (tell = say),

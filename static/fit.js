@@ -1,20 +1,20 @@
-// Keep arm and gizmo in the picture. Where the view that was asked for would cut them off, look the
-// same way from farther off; again whenever the picture changes its size, unless the person has turned
-// the camera since.
+// Keep arm and gizmo in the picture. If the requested view would cut them off, look in the same
+// direction from farther away. Fit again when the picture changes its size, unless the person has
+// turned the camera since.
 "use strict";
 const Fit = (() => {
-  const FILLED = 0.9; // of the picture's width and height that arm and gizmo may take
-  const SAME = 1e-3; // m between two views that are one
+  const FILLED = 0.9; // maximum fraction of the picture's width and height for arm and gizmo
+  const SAME = 1e-3; // m, below which two views count as equal
   const AGAIN = 200; // ms
-  const STEADY = 3; // times in a row that as many shapes are there: all are loaded
+  const STEADY = 3; // equal counts of shapes in a row after which all count as loaded
   const TRIES = 100;
   const NODES = ["/arm", "/target/move"];
 
   const given = new URLSearchParams(location.search).has("initialCameraPosition");
-  let base = null; // {position, look_at} as asked for; m, in viser's world
-  let put = null; //  the same, as it was fitted
+  let base = null; // requested {position, look_at}; m, in viser's world
+  let put = null; //  the same, fitted
   let chosen = false;
-  let riding = false; // on the tool, with a new view at every step
+  let riding = false; // the camera is on the tool and gets a new view at every step
   let begun = false;
 
   const { viewer, node } = Viser;
@@ -23,7 +23,7 @@ const Fit = (() => {
   const same = (a, b) =>
     ["position", "look_at"].every((key) => a[key].every((x, i) => Math.abs(x - b[key][i]) < SAME));
 
-  // The corners of the boxes round all shapes of arm and gizmo, in viser's world.
+  // Return the corners of the bounding boxes of all shapes of arm and gizmo, in viser's world.
   function corners() {
     const found = [];
     const inverse = root().clone().invert();
@@ -44,7 +44,7 @@ const Fit = (() => {
     return found;
   }
 
-  // The view along the same direction, no nearer than `view`, that has all `points` in the picture.
+  // Return the view in the same direction, no nearer than `view`, with all `points` in the picture.
   function fitted(view, points) {
     const { camera, canvas } = viewer();
     const [eye, target] = [vector(view.position), vector(view.look_at)];
@@ -53,8 +53,8 @@ const Fit = (() => {
     const up = right.clone().cross(forward);
     const high = FILLED * Math.tan((camera.fov * Math.PI) / 360);
     const wide = (high * canvas.clientWidth) / canvas.clientHeight;
-    // A point is in the picture when |its way right or up| <= slope * its depth, both from the eye.
-    // Of each side of the picture the outermost point counts.
+    // A point is in the picture if |offset right or up| <= slope * depth, both from the eye.
+    // On each side of the picture the outermost point counts.
     const outermost = (axis, slope) =>
       [1, -1].map((sign) => Math.max(...points.map((p) => sign * axis.dot(p) - slope * forward.dot(p))));
     const sides = [[right, wide], [up, high]].map(([axis, slope]) => [axis, slope, ...outermost(axis, slope)]);
@@ -88,7 +88,7 @@ const Fit = (() => {
   }
 
   return {
-    // Note the views that the server asks for, and fit those that a person chose before viser sees them.
+    // Note the views that the server sets, and fit views that a person chose before viser gets them.
     hear(messages) {
       const [position, target] = Viser.viewsIn(messages);
       if (position?.initial ?? target?.initial) {
@@ -103,9 +103,9 @@ const Fit = (() => {
         target.look_at = put.look_at;
       }
     },
-    // The person has chosen the view of this name.
+    // Note that the person has chosen the view of this name.
     choose: (view) => (riding = view === "Tool"),
-    // The scene is there, but for shapes that are still being unpacked.
+    // Begin to fit as soon as all shapes are loaded; the rest of the scene is there.
     begin() {
       if (begun) return;
       begun = true;

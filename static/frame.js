@@ -1,13 +1,13 @@
-// In viser's page, before its own script. It says which page around it this is, tells the gateway
-// what is on the screen, keeps the camera over a lost connection, gives the scene its theme, and hands
-// keys to the page.
+// Runs in viser's page before viser's own script. It names the surrounding page, reports the frames on
+// the screen to the gateway, keeps the camera over a lost connection, sets the theme of the scene and
+// passes keys to the page.
 "use strict";
 (() => {
-  const TELL_EVERY = 50; // ms
+  const REPORT_EVERY = 50; // ms
   const AGAIN = 100; // ms
-  const TRIES = 100; // to bring the camera back
-  const STEADY = 1000; // ms that viser has to look there before it is done
-  // Of each theme: what the floor's message holds, and the file of the sky.
+  const TRIES = 100; // attempts to restore the camera
+  const STEADY = 1000; // ms for which viser must keep the restored camera
+  // The properties of the floor and the file of the sky, for each theme.
   const ROOMS = JSON.parse(document.currentScript.dataset.rooms);
   const page = new URLSearchParams(location.search).get("page");
   const outer = window.parent === window ? null : window.parent;
@@ -20,34 +20,34 @@
     input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
   document.adoptedStyleSheets.push(sheet);
 
-  let camera = null; // where this person last looked from
-  let kept = null; //   the same, from when the line is back until viser looks from there again
+  let camera = null; // this person's last view
+  let kept = null; //   the view to restore after a reconnection; null when done
   let tries = 0;
-  let there = null; //  when viser began to look there, ms; null while it looks elsewhere
-  const room = new Map(); //   the last message of each kind that the theme decides on
+  let there = null; //  ms, since when viser has the kept view; null while it has another
+  const room = new Map(); //   the last message of each type that depends on the theme
   let seen = 0;
-  let told = 0;
-  let telling = false;
+  let reported = 0;
+  let reporting = false;
 
-  function tell(line) {
-    if (telling) return;
-    telling = true;
+  function report(line) {
+    if (reporting) return;
+    reporting = true;
     const soon = () => {
       const count = seen;
       setTimeout(() => {
-        telling = false;
-        told = performance.now();
+        reporting = false;
+        reported = performance.now();
         line.say({ type: "Seen", count });
-        if (seen > count) tell(line);
-      }, Math.max(0, told + TELL_EVERY - performance.now()));
+        if (seen > count) report(line);
+      }, Math.max(0, reported + REPORT_EVERY - performance.now()));
     };
-    // After the frame is drawn; a page that nobody sees draws none.
+    // Report after the frame is drawn. A hidden page draws none.
     if (document.hidden) soon();
     else requestAnimationFrame(soon);
   }
 
-  // viser starts from its first view whenever the line is back, and once more when it has drawn the
-  // scene, which on a slow page comes later than our camera. So the camera is set until it stays.
+  // viser sets its first view after a reconnection, and again when it has drawn the scene, which on a
+  // slow page is after our camera is set. Therefore the camera is set until it stays.
   function restore(line) {
     if (kept && performance.now() - (there ?? Infinity) > STEADY) kept = null;
     if (kept && there === null && (tries += 1) > TRIES) kept = null;
@@ -56,15 +56,15 @@
     setTimeout(() => restore(line), AGAIN);
   }
 
-  // A person who turns the camera meanwhile has it.
+  // A person who turns the camera meanwhile keeps that view.
   for (const kind of ["pointerdown", "wheel"])
     window.addEventListener(kind, ({ target }) => tries && target?.tagName === "CANVAS" && (kept = null), {
       capture: true,
       passive: true,
     });
 
-  // The server gives every window the light theme. Each is changed to its own here, before viser sees
-  // it: no answer of the server has to be waited for, which a slow page would miss.
+  // The server sends every window the light theme. It is changed to the window's theme here, before
+  // viser gets it. This needs no answer of the server, which a slow page would miss.
   function dress(messages) {
     for (const message of Viser.paint(messages, ROOMS[Theme.name()])) room.set(message.type, message);
   }
@@ -106,7 +106,7 @@
     hears(messages, line) {
       Fields.hear(messages);
       seen += 1;
-      tell(line);
+      report(line);
       const ready = Viser.replayed(messages);
       dress(messages);
       Fit.hear(messages);

@@ -1,13 +1,13 @@
-// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates. Whatever is let go,
-// unplugged or out of sight counts as nothing, and without a new message the arm stands anyway.
+// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates. An input that is released,
+// unplugged or in a hidden tab counts as zero, and without new messages the arm comes to rest.
 "use strict";
 const Jog = (() => {
   const EVERY = 40; // ms
   const LINEAR = 0.25; // m/s at full deflection
   const ANGULAR = 1.2; // rad/s
-  const DEAD = 0.12; // fraction of a stick's way that counts as nothing
-  const MOUSE_FULL = 350; // what a SpaceMouse reports at full deflection
-  const MOUSE_FRESH = 150; // ms; it reports all the time while it is held
+  const DEAD = 0.12; // fraction of a stick's travel that counts as zero
+  const MOUSE_FULL = 350; // value of a SpaceMouse at full deflection
+  const MOUSE_FRESH = 150; // ms for which a report is valid; it reports all the time while held
   // x, y, z, pitch, roll
   const KEYS = {
     KeyW: [0, 1], KeyS: [0, -1], KeyA: [1, 1], KeyD: [1, -1], KeyR: [2, 1], KeyF: [2, -1],
@@ -44,7 +44,7 @@ const Jog = (() => {
       button.classList.toggle("on", holds.has(button.dataset.hold));
   }
 
-  // True when the key was one of ours.
+  // Return whether the key is one of KEYS and was handled.
   function key(event) {
     if (!open || !(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
     if (event.type === "keydown") keys.add(event.code);
@@ -109,7 +109,7 @@ const Jog = (() => {
     const old = performance.now() - mouse.at > MOUSE_FRESH;
     const rates = old ? none() : mouse.rates;
     if (reportId === 1) {
-      // Its x is to the right, y towards the person, z down.
+      // The axes of the device: x to the right, y towards the person, z down.
       [rates[0], rates[1], rates[2]] = [-number(2), -number(0), -number(4)].map(bent);
       if (data.byteLength >= 12) [rates[3], rates[4]] = [-number(6), -number(8)].map(bent);
     } else if (reportId === 2) [rates[3], rates[4]] = [-number(0), -number(2)].map(bent);

@@ -1,9 +1,9 @@
-// The page's line to the gateway, in a worker, where a busy page and a hidden tab do not slow it.
+// The page's connection to the gateway, in a worker, so that a busy page or a hidden tab cannot slow it.
 "use strict";
-const BEAT = 100; // ms; app/katana450/arm/control/lease.py counts on it
-const AGAIN = 400; // ms
-const GIVE_UP = 3000; // ms for a connection to open, or of silence on one that is open
-const AHEAD = 3; // states asked for and not yet come: a slow line is asked less often
+const HEARTBEAT = 100; // ms; app/katana450/arm/control/lease.py expects it
+const AGAIN = 400; // ms before the next attempt to connect
+const GIVE_UP = 3000; // ms, timeout for opening a connection and for silence on an open one
+const AHEAD = 3; // maximum of unanswered queries: fewer states are requested on a slow connection
 
 let url = null;
 let socket = null;
@@ -11,7 +11,7 @@ let count = 0;
 let heard = 0;
 let opened = 0;
 const heartbeats = new Map();
-let pace = null; // of asking for states, while somebody looks at them
+let pace = null; // timer of the queries for states, while they are shown
 const looks = new Map();
 
 function connect() {
@@ -53,7 +53,7 @@ function look() {
   if (say({ do: "query", id })) looks.set(id, performance.now());
 }
 
-// Without an arm yet there is none to be shown.
+// Pass on the answer to a query. It is no state while there is no arm yet.
 function shown(message) {
   const took = performance.now() - looks.get(message.id);
   looks.delete(message.id);
@@ -70,7 +70,7 @@ setInterval(() => {
   const now = performance.now();
   const open = socket.readyState === WebSocket.OPEN;
   if (now - (open ? heard : opened) > GIVE_UP) {
-    // The browser itself would wait for minutes.
+    // The browser's own timeout is several minutes.
     const old = socket;
     socket = null;
     old.close();
@@ -81,7 +81,7 @@ setInterval(() => {
     say({ do: "heartbeat", n: count });
     postMessage({ silent: now - heard });
   }
-}, BEAT);
+}, HEARTBEAT);
 
 onmessage = ({ data }) => {
   if (data.open) {

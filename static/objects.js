@@ -1,13 +1,14 @@
-// Objects of any shape: a file is read over there, told what it is, and stands before the arm.
+// Objects and scenes from files: the server reads a file, and the object is placed before the arm.
 "use strict";
 const Objects = (() => {
   const API = "api/v1/";
+  const UNREACHABLE = "The server does not answer. Try again.";
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   /** @type {(request: object) => void} */
   let say = () => {};
-  let file = null; // the last that was chosen
-  let placed = null; // and the name it stands under
+  let file = null; // the last file that was chosen
+  let placed = null; // the name of its object
 
   function tell(words, bad) {
     const line = byId("read");
@@ -15,7 +16,7 @@ const Objects = (() => {
     line.classList.toggle("bad", Boolean(bad));
   }
 
-  // What is sent, and the answer; what is refused is told where it was asked.
+  // Send `body` and return the answer. A refusal is shown in the sheet, and null is returned.
   async function ask(path, body) {
     /** @type {NodeListOf<HTMLButtonElement | HTMLSelectElement>} */
     const busy = document.querySelectorAll("#objects button, #objects select");
@@ -26,7 +27,7 @@ const Objects = (() => {
       if (answer.ok) return JSON.parse(text);
       tell(text.startsWith("{") ? JSON.parse(text).why : text, true);
     } catch {
-      tell("The server cannot be reached.", true);
+      tell(UNREACHABLE, true);
     } finally {
       for (const each of busy) each.disabled = false;
     }
@@ -40,7 +41,7 @@ const Objects = (() => {
     if (byId("unit").value) query.set("unit", byId("unit").value);
     const mesh = await ask(`mesh?${query}`, file);
     if (!mesh) return;
-    // Another unit is for the object that stands there already.
+    // A changed unit applies to the object that is already placed.
     placed = again && placed ? placed : mesh.name;
     say({ do: "place", name: placed, shape: "mesh", mesh: mesh.key });
     tell(`${placed}: ${mesh.text}`);
@@ -56,19 +57,19 @@ const Objects = (() => {
 
   async function save() {
     const answer = await fetch(`${API}scene`).catch(() => null);
-    if (!answer?.ok) return tell(answer ? (await answer.json()).why : "The server cannot be reached.", true);
+    if (!answer?.ok) return tell(answer ? (await answer.json()).why : UNREACHABLE, true);
     const link = document.createElement("a");
     link.href = URL.createObjectURL(await answer.blob());
     link.download = "scene.zip";
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    tell("Saved: scene.zip holds scene.yaml and the files of its objects.");
+    tell("Saved. scene.zip contains scene.yaml and the files of its objects.");
   }
 
   function chosen(input, use) {
     input.addEventListener("change", () => {
       const [first] = input.files;
-      // So that the same file can be chosen again.
+      // Cleared, so that the same file can be chosen again.
       input.value = "";
       if (first) use(first);
     });

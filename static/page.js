@@ -1,13 +1,13 @@
-// The bar: STOP, who drives, what the arm does, how good the line is.
+// The bar: STOP, the driver, the status of the arm and the quality of the connection.
 "use strict";
 (() => {
-  const STALE = 1.0; // s after which a picture must not pass for the present
-  const SLOW = 150; // ms of a round trip
-  const QUIET = 1000; // ms without a word after which the line counts as bad
-  const ANSWER = 250; // ms that a STOP may take before it is sent another way too
+  const STALE = 1.0; // s, age from which a picture is marked as old
+  const SLOW = 150; // ms, round trip from which a connection counts as slow
+  const QUIET = 1000; // ms without a message after which a connection counts as bad
+  const ANSWER = 250; // ms without an answer after which a STOP is also sent over HTTP
   const TOAST = 4000; // ms
-  const NOT_YOU = 4401;
-  const QUIETLY = "quietly"; // the id of what is asked again until it is had
+  const SIGN_IN = 4401; // close code: the page has to sign in again
+  const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
   const OPEN = "katana450.instruments.open";
   const ORDERS = { pause: "Pause", resume: "Resume", end: "End" };
 
@@ -23,34 +23,34 @@
   const say = (message) => worker.postMessage({ say: message });
   let status = null;
   let up = false;
-  let since = performance.now(); // when the line was last lost
+  let since = performance.now(); // time of the last loss of the connection
   let silent = 0;
   let trip = null;
   let asking = null;
   let press = null;
 
-  // A page that is loaded anew is the same page; a second tab is another.
+  // A reloaded page keeps its name; a second tab gets another.
   function name() {
     /** @type {any[]} */
     const [entry] = performance.getEntriesByType("navigation");
     const again = entry?.type === "reload";
     const old = again && sessionStorage.getItem("page");
-    const fresh = unheardOf();
+    const fresh = randomName();
     sessionStorage.setItem("page", old || fresh);
     return old || fresh;
   }
 
-  function unheardOf() {
+  function randomName() {
     const bytes = crypto.getRandomValues(new Uint8Array(16));
     return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
   }
 
   // STOP
 
-  // A press is told until it is heard, and counts once: on a thin line the last telling may come
-  // after the stop was cleared.
+  // A press is sent until it is answered. It counts once, because on a slow connection its last
+  // message may arrive after the stop was cleared.
   function stop() {
-    press = unheardOf();
+    press = randomName();
     say({ do: "stop", press });
     Jog.quiet();
     stopButton.classList.add("asked");
@@ -72,14 +72,14 @@
     draw();
   }
 
-  // At once, not when the finger is lifted; a click without a pointer is the Enter key.
+  // Stop at the press, not at the release. A click without a pointer is the Enter key.
   stopButton.addEventListener("pointerdown", (event) => {
     event.preventDefault();
     stop();
   });
   stopButton.addEventListener("click", (event) => event.detail === 0 && stop());
 
-  // In both documents. Space and Esc do nothing but stop, wherever the focus is.
+  // Called for keys in both documents. Space and Esc only stop the arm, whatever has the focus.
   function key(event) {
     const ends = event.key === " " || event.key === "Escape";
     if (ends && event.type === "keydown" && !event.repeat) stop();
@@ -95,7 +95,7 @@
   }
 
   function blur() {
-    // The focus may only have gone from one of the two documents to the other.
+    // The focus may only have moved between the two documents.
     setTimeout(() => document.hasFocus() || Jog.quiet());
   }
 
@@ -103,7 +103,7 @@
   window.addEventListener("blur", blur);
   window.katana = { key, blur, toast };
 
-  // What is shown
+  // Display
 
   const text = (id, words) => {
     const element = byId(id);
@@ -120,22 +120,22 @@
   }
 
   function acts() {
-    const { mine, holder, role, asked, asking: wanting, others } = status;
+    const { mine, holder, role, asked, asking: requests, others } = status;
     if (role === "viewer") return [];
-    // Only who drives is shown requests: in person, or by a program, which ends when the arm is given away.
-    const whom = (name) => (wanting.length > 1 ? ` ${name}` : "");
-    const buttons = wanting.flatMap(({ number, name }) => [
+    // Requests are shown only to the driver and to the owner of a driving program, which ends when the arm is given away.
+    const whom = (name) => (requests.length > 1 ? ` ${name}` : "");
+    const buttons = requests.flatMap(({ number, name }) => [
       act(mine ? `Give to ${name}` : `Allow${whom(name)}`, { do: "give", to: number }, true),
       act(`Refuse${whom(name)}`, { do: "decline", to: number }),
     ]);
     if (mine) {
-      const more = others.filter(({ number }) => !wanting.some((each) => each.number === number));
+      const more = others.filter(({ number }) => !requests.some((each) => each.number === number));
       if (more.length) buttons.push(handOver(more));
-      return [...buttons, act("Let go", { do: "release_lease" })];
+      return [...buttons, act("Release", { do: "release_lease" })];
     }
     if (holder === null) return [act("Take", { do: "acquire" }, true)];
-    if (wanting.length) return buttons;
-    const free = [asked ? act("Ask no more", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
+    if (requests.length) return buttons;
+    const free = [asked ? act("Withdraw", { do: "withdraw" }) : act("Request", { do: "ask" }, true)];
     if (role === "admin") free.push(act("Take over", { do: "take" }));
     return free;
   }
@@ -155,17 +155,18 @@
     body.dataset.mood = status.mood;
     text("headline", status.headline);
     text("why", [status.taken, status.why, status.stopped, status.until].filter(Boolean).join(" "));
-    // A press is done once the arm itself has shown that it is stopped.
+    // A press is complete when the arm's state shows the stop.
     stopButton.classList.toggle("asked", asking !== null || status.stop === "requested");
     byId("objects-button").hidden = status.role === "viewer";
     byId("clear-stop").hidden = !status.stopped || !status.may_clear_stop;
-    const { mine, holder, windows, asking: wanting } = status;
-    const wants = wanting.length ? `${wanting.map(({ name }) => name).join(", ")} asks for it` : "";
+    const { mine, holder, windows, asking: requests } = status;
+    const names = requests.map(({ name }) => name).join(", ");
+    const request = requests.length ? `${names} ${requests.length > 1 ? "ask" : "asks"} for it` : "";
     text("holder", mine ? "You drive" : holder === null ? "Nobody drives" : `${holder} drives`);
-    // Programs count too.
+    // Programs are included.
     const connected = windows > 1 ? `, ${windows} connected` : "";
-    text("name", wants || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
-    const key = JSON.stringify([mine, holder, status.asked, wanting, status.others]);
+    text("name", request || `${status.name}${status.role === "viewer" ? ", watching" : ""}${connected}`);
+    const key = JSON.stringify([mine, holder, status.asked, requests, status.others]);
     if (key !== drawnActs) {
       drawnActs = key;
       byId("acts").replaceChildren(...acts());
@@ -182,11 +183,11 @@
     speedOutput.value = `${percent} %`;
   }
 
-  // What the arm does now cannot be told from here.
+  // Without a connection the state of the arm is unknown.
   function unknown() {
     if (!status) return;
     body.dataset.mood = "starting";
-    text("headline", "Out of touch");
+    text("headline", "No connection");
     text("why", "");
   }
 
@@ -197,20 +198,20 @@
     const line = byId("link");
     line.className = lost ? "lost" : bad || age >= 0.4 || trip > SLOW ? "slow" : "";
     const old = age >= 0.3 ? `, ${age.toFixed(1)} s old` : "";
-    line.lastElementChild.textContent = lost ? "No line" : trip === null ? "" : `${Math.round(trip)} ms${old}`;
+    line.lastElementChild.textContent = lost ? "Offline" : trip === null ? "" : `${Math.round(trip)} ms${old}`;
     body.classList.toggle("stale", lost || bad);
     const banner = byId("banner");
     banner.hidden = !(lost || bad) || (lost && !status);
     banner.className = lost ? "lost" : "";
     const words = lost
       ? asking !== null
-        ? "No line to the arm: your STOP goes out as soon as it is back."
-        : "No line to the arm: what you see is old. Trying to get it back."
+        ? "No connection to the arm. Your STOP is sent as soon as it is back."
+        : "No connection to the arm. The picture is old. Reconnecting."
       : silent > QUIET
-        ? "Nothing heard from the arm: what you see is old."
+        ? "The arm does not answer. The picture is old."
         : trip > SLOW
-          ? "The line is slow: what you see is old."
-          : "The line is quick, but what you see is old: this device may draw too slowly.";
+          ? "The connection is slow. The picture is old."
+          : "The picture is old, although the connection is fast: this device may draw too slowly.";
     if (!banner.hidden && banner.textContent !== words) banner.textContent = words;
   }
 
@@ -231,14 +232,14 @@
       trip = null;
       unknown();
       Jog.quiet();
-      if (data.code === NOT_YOU) enter().catch(() => {});
+      if (data.code === SIGN_IN) enter().catch(() => {});
     } else if (data.trip !== undefined) trip = trip === null ? data.trip : 0.8 * trip + 0.2 * data.trip;
     else if (data.silent !== undefined) silent = data.silent;
     else if (data.unsaid === "stop") insist();
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) toast(data.heard.why);
     else if (data.heard?.is === "status") {
-      // Only what is new of it.
+      // The message has only the changes.
       status = { ...status, ...data.heard };
       draw();
     }
@@ -249,7 +250,7 @@
   // The rest of the bar
 
   byId("clear-stop").addEventListener("click", () => say({ do: "clear_stop" }));
-  // Below the bar and not modal: STOP must be there for a mouse and a finger too.
+  // Below the bar and not modal, so that mouse and finger can press STOP.
   const [help, helpButton] = [byId("help"), byId("help-button")];
   helpButton.addEventListener("click", () => {
     if (help.open) return help.close();
@@ -262,7 +263,7 @@
     byId(`${id}-button`).setAttribute("aria-expanded", String(shown));
     if (id === "jog") Jog.show(shown);
   }
-  // Both lie in the same corner.
+  // Both sheets lie in the same corner.
   for (const [id, other] of [["jog", "objects"], ["objects", "jog"]])
     byId(`${id}-button`).addEventListener("click", () => {
       show(other, false);
@@ -275,12 +276,12 @@
   Jog.begin({ say, stop });
   Objects.begin({ say });
 
-  // The instruments, which come when they are first wanted.
+  // The instruments, which are loaded on first use
 
   const kept = storage();
   let panel = null;
 
-  // A browser may refuse to keep anything.
+  // A browser may refuse to store anything.
   function storage() {
     try {
       return window.localStorage;
@@ -304,9 +305,9 @@
     showInstruments(byId("instruments-button").getAttribute("aria-expanded") !== "true"),
   );
 
-  // Coming in
+  // Sign-in
 
-  // A link carries its token behind the #, which browsers send to nobody; it goes by POST, once.
+  // An access link has its token behind the #, which browsers do not send. It is sent once, by POST.
   async function enter() {
     const token = location.hash.slice(1);
     if (token) history.replaceState(null, "", location.pathname + location.search);
@@ -318,7 +319,7 @@
 
   enter().then((mayEnter) => {
     if (!mayEnter) return;
-    // Nothing else of the address: viser's page obeys some of its parameters to the server's harm.
+    // Pass on no other parameters: some parameters of viser's page could harm the server.
     const query = [...new URLSearchParams(location.search)].filter(([key]) => Viser.PARAMETER.test(key));
     scene.src = `viser/?${new URLSearchParams([["page", page], ...query])}`;
     const { protocol, host } = location;

@@ -1,5 +1,5 @@
-// viser's panel on a narrow screen. viser lays it over the scene; here it is a sheet below the scene,
-// which keeps the rest of the height, and it starts folded.
+// viser's panel on a narrow screen. viser lays it over the scene. Here it is a sheet below the scene,
+// which gets the remaining height, and it starts folded.
 "use strict";
 (() => {
   const { NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT } = Viser;
@@ -13,7 +13,7 @@
   }`);
   document.adoptedStyleSheets.push(sheet);
 
-  let folded = null; // the panel that was folded already; a person may open it
+  let folded = null; // handle of the panel that was already folded; a person may open it
   const fold = () => {
     /** @type {HTMLElement | null} */
     const handle = document.querySelector(PANEL_HANDLE);

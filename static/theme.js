@@ -1,5 +1,5 @@
-// Light or dark, for both documents of a tab and before either draws: as chosen in this tab, else as
-// the system has it.
+// The light or dark theme, for both documents of a tab, set before either draws. It is the one chosen
+// in this tab, otherwise that of the system.
 "use strict";
 const Theme = (() => {
   const KEPT = "katana450.theme";
@@ -14,12 +14,12 @@ const Theme = (() => {
   function apply() {
     const html = document.documentElement;
     html.dataset.theme = name().toLowerCase();
-    // The ground of a document that has no styles yet.
+    // The background of a document without styles.
     html.style.colorScheme = html.dataset.theme;
     follow(name());
   }
   system.addEventListener("change", apply);
-  // The other document of the tab has chosen.
+  // The other document of the tab has changed the theme.
   window.addEventListener("storage", apply);
   apply();
 
@@ -29,7 +29,7 @@ const Theme = (() => {
       sessionStorage.setItem(KEPT, chosen);
       apply();
     },
-    // `listener` is called with the name of each theme from now on.
+    // Call `listener` with the name of each theme from now on.
     follow: (listener) => (follow = listener),
   };
 })();

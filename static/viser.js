@@ -1,32 +1,32 @@
-// viser's page as it is built: its names, elements and messages, none of which viser promises to keep.
-// docs/viser.md lists each one with the test that shows it. Loading this file changes nothing.
+// The structure of viser's page: its names, elements and messages, which are private parts of viser.
+// docs/viser.md lists each one with its test. Loading this file changes nothing.
 "use strict";
 const Viser = (() => {
-  // Parameters of its address that set its camera and its resolution.
+  // Parameters of the page's address that set camera and resolution.
   const PARAMETER = /^(initialCamera(Position|LookAt|Up|Fov|Near|Far)|fixedDpr)$/;
   const NUMBER_BOX = "input.mantine-NumberInput-input";
-  // Below this width its panel lies over the scene; the box and the handle of that panel, and its content.
+  // Below this width the panel lies over the scene. Selectors of the panel's box, handle and content.
   const NARROW = "(max-width: 36em)";
   const PANEL = '.mantine-Paper-root[style*="position: fixed"]';
   const PANEL_HANDLE = `${PANEL} [style*="height: 3.5em"]`;
   const PANEL_CONTENT = `${PANEL} [style*="width: 20em"]`;
-  // It draws faintly until the light of the room is loaded. Where drawing takes as long as that it
-  // loses count and leaves the picture faint for good. It also starts light, whatever the theme.
+  // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
+  // miscounts and the picture stays faint. It also starts with the light theme.
   const STEADY = `canvas { opacity: 1 !important }
     html[data-theme=dark]:not([data-mantine-color-scheme=dark]) #root { opacity: 0 }`;
   const [CONNECTED, BATCH, SEND, SERVER] = ["connected", "message_batch", "send", "set_server"];
 
   const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
-  const groups = new Map(); // the labels of the rows of buttons, by their ids
+  const groups = new Map(); // labels of the rows of buttons, by id
   const viewer = () => window.__viserMutable;
 
-  // It looks for its server again only while it has the focus.
+  // viser's page reconnects only while it has the focus.
   const keepFocus = () => (document.hasFocus = () => true);
 
-  // The policy of its page lets no text become code. It tries that once, for clouds of splats, which
-  // are not used here; the console need not show it.
+  // The policy of the page forbids to run text as code. viser tries it once, for clouds of splats,
+  // which are not used here. This function keeps the error off the console.
   function forgoCode() {
-    const refusal = new EvalError("No text becomes code here.");
+    const refusal = new EvalError("Running text as code is not allowed.");
     const Code = window.Function;
     const NoCode = function () {
       throw refusal;
@@ -39,9 +39,9 @@ const Viser = (() => {
     );
   }
 
-  // Its socket lives in a worker. `server` returns the address for it; `sends` sees each message of the
-  // page and returns whether it is sent; `connected` and `hears` come before the page hears the same.
-  // Each gets a line: `say` sends a message to the server, `show` gives messages to the page.
+  // viser's socket is in a worker. `server` returns the address for it. `sends` gets each message of
+  // the page and returns whether it is sent. `connected` and `hears` are called before the page gets
+  // the same event. A line has `say`, which sends to the server, and `show`, which shows to the page.
   function tap({ server, sends, connected, hears }) {
     const Plain = window.Worker;
     window.Worker = class extends Plain {
@@ -53,7 +53,7 @@ const Viser = (() => {
 
       constructor(...args) {
         super(...args);
-        // Before viser's own listener, which is set later.
+        // This listener runs before viser's own, which is set later.
         this.addEventListener("message", ({ data }) => {
           if (data?.type === CONNECTED) {
             groups.clear();
@@ -74,30 +74,30 @@ const Viser = (() => {
     };
   }
 
-  // The view that `message` of the page tells the server; null for another message.
+  // Return the view in `message` of the page; null for another message.
   const viewOf = (message) => (message.type === "ViewerCameraMessage" ? message : null);
 
-  // The {label, value} of the row of buttons that `message` of the page presses; null for another message.
+  // Return {label, value} of the button that `message` of the page presses; null for another message.
   const choiceOf = ({ uuid, updates }) =>
     groups.has(uuid) ? { label: groups.get(uuid), value: updates.value } : null;
 
-  // The last messages of the server that place and turn the camera; each may be missing.
+  // Return the server's last messages that place and turn the camera; each may be missing.
   const viewsIn = (messages) =>
     ["SetCameraPositionMessage", "SetCameraLookAtMessage"].map((type) =>
       messages.findLast((each) => each.type === type),
     );
 
-  // Messages that make the page look as `viewOf` has told.
+  // Return messages that give the page's camera a view of `viewOf`.
   const viewing = ({ position, look_at, up_direction }) => [
     { type: "SetCameraUpDirectionMessage", position: up_direction, initial: false },
     { type: "SetCameraLookAtMessage", look_at, initial: false },
     { type: "SetCameraPositionMessage", position, initial: false },
   ];
 
-  // Whether all that the server had shown before is in `messages` or came earlier.
+  // Return whether the server's whole scene has arrived with `messages`.
   const replayed = (messages) => messages.some(({ type }) => type === "ReplayDoneMessage");
 
-  // Change `messages` to a theme: {dark, sky} and the properties of the floor. Return those changed.
+  // Change `messages` to a theme {dark, sky, properties of the floor}. Return the changed messages.
   function paint(messages, { sky, dark, ...floor }) {
     return messages.filter((message) => {
       if (message.type === "ThemeConfigurationMessage") message.dark_mode = dark;
@@ -109,7 +109,7 @@ const Viser = (() => {
     });
   }
 
-  // Keep what `messages` of the server say of number controls, by their ids.
+  // Store the properties of number controls from `messages` of the server, by id.
   function keepControls(controls, messages) {
     for (const { uuid, props, updates } of messages) {
       if (props && "step" in props) controls.set(uuid, { ...props });
@@ -117,7 +117,7 @@ const Viser = (() => {
     }
   }
 
-  // The control of a number box: its id, its label, and the number of the box among its boxes.
+  // Return id and label of the control of a number box, and the index of the box in it.
   function controlOf(box) {
     const row = box.closest(":has(label[for])");
     const label = row?.querySelector("label[for]");
@@ -125,12 +125,12 @@ const Viser = (() => {
     return { id: label?.htmlFor, label: label?.textContent ?? "", index };
   }
 
-  // Fill a number box; the page does not notice, which compares with what it wrote last by the
-  // element's own property.
+  // Fill a number box without the page's notice. The page compares the value with its own last one by
+  // the element's own property.
   const fill = (box, text) => write.call(box, text);
 
-  // Fill a number box as if the text were typed. Emptied first: the page takes what differs from
-  // before for a single edit at the caret.
+  // Fill a number box as if the text were typed. The box is emptied first, because the page takes the
+  // difference for a single edit at the caret.
   function type(box, text) {
     for (const part of ["", text]) {
       fill(box, part);
@@ -141,11 +141,11 @@ const Viser = (() => {
   return {
     PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, STEADY,
     keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, paint, keepControls, controlOf, fill, type,
-    // {camera, canvas, cameraControl} of three.js once the page draws.
+    // Return {camera, canvas, cameraControl} of three.js once the page draws.
     viewer,
-    // The three.js object of a node; "" is viser's world.
+    // Return the three.js object of a node; "" is viser's world.
     node: (name) => viewer().nodeRefFromName[name],
-    // The value that the page shows in a number box.
+    // Return the value that the page shows in a number box.
     shownIn: (box) => box.defaultValue,
   };
 })();

@@ -1,4 +1,4 @@
-// The cards in their places, and the hands that arrange them.
+// The board with all cards, which a person can arrange.
 import { Card } from "./card.js";
 import * as layouts from "./layout.js";
 import { html, set } from "./shape.js";
@@ -11,9 +11,9 @@ export class Board {
   #chips;
   #lifted = null; // {card, over} while one is dragged
   #arranging = false;
-  #told = html("p", { class: "told", role: "status" });
+  #status = html("p", { class: "told", role: "status" });
 
-  // kept: the storage of the browser, null if it has none.
+  // kept: the storage of the browser; null if there is none.
   constructor(catalogue, kept) {
     this.#catalogue = catalogue;
     this.#kept = kept;
@@ -33,14 +33,14 @@ export class Board {
       { class: "list", role: "group", "aria-label": "Instruments to show", hidden: "" },
       ...this.#chips.values(),
       reset,
-      this.#told,
+      this.#status,
     );
     this.grid = html("div", { class: "grid" });
     this.#follow();
     this.#place();
   }
 
-  // What can be seen just now.
+  // Return the instruments that are visible in the window.
   get visible() {
     return [...this.#cards.values()]
       .filter(({ element, seen }) => !element.hidden && seen)
@@ -51,7 +51,7 @@ export class Board {
     return this.#catalogue;
   }
 
-  // While cards are arranged they do nothing else.
+  // Switch the arrange mode, in which instruments are inactive.
   arrange(on) {
     this.#arranging = on;
     this.list.hidden = !on;
@@ -73,7 +73,7 @@ export class Board {
       card.place(place);
       set(this.#chips.get(place.id), "aria-pressed", place.shown);
     });
-    // What is put elsewhere loses the focus on the way.
+    // A moved element loses the focus.
     if (focus !== document.activeElement && this.grid.contains(focus)) focus.focus();
   }
 
@@ -103,7 +103,7 @@ export class Board {
     this.#set(layouts.nudged(this.#layout, id, by));
     const shown = this.#layout.filter((place) => place.shown);
     const place = shown.findIndex((each) => each.id === id) + 1;
-    this.#told.textContent = `${this.#cards.get(id).instrument.title}: place ${place} of ${shown.length}`;
+    this.#status.textContent = `${this.#cards.get(id).instrument.title}: place ${place} of ${shown.length}`;
   }
 
   #lift(card, event) {
@@ -112,7 +112,7 @@ export class Board {
     card.grip.focus();
     this.#lifted = { card, over: card };
     card.element.classList.add("lifted");
-    // The grid has the pointer: a card that is moved would lose it.
+    // The grid captures the pointer, because a moved card would lose it.
     this.grid.setPointerCapture(event.pointerId);
   }
 
@@ -122,7 +122,7 @@ export class Board {
       /** @type {HTMLElement | null | undefined} */
       const found = document.elementFromPoint(clientX, clientY)?.closest(".card");
       const over = found && this.#cards.get(found.dataset.id);
-      // Once a card that it has passed: the same may lie under the hand again.
+      // Move only once past each card, because the same card may then lie under the pointer again.
       if (!over || over === this.#lifted.over) return;
       this.#lifted.over = over;
       if (over !== this.#lifted.card)

@@ -1,17 +1,17 @@
-// The frame of an instrument: its name, and while cards are arranged, handles to do so.
+// The frame of an instrument: its name and, in arrange mode, controls for place and size.
 import { html, set } from "./shape.js";
 
 const KEYS = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 };
 const SIZES = { small: "Small", wide: "Wide", large: "Large", broad: "Full width" };
 
 export class Card {
-  // on: {lift(card, event), nudge(id, by), grow(id), hide(id)}, what a person may do with it.
+  // on: {lift(card, event), nudge(id, by), grow(id), hide(id)}, called when a person arranges the card.
   constructor(instrument, on) {
     const { id, title, sizes } = instrument;
     this.instrument = instrument;
     this.seen = true;
     this.grip = tool(`Move ${title}`, "⠿", "Drag, or arrow keys");
-    this.#size = tool(`Size of ${title}`, "", "Another size");
+    this.#size = tool(`Size of ${title}`, "", "Change the size");
     this.#size.hidden = sizes.length < 2;
     const hide = tool(`Hide ${title}`, "×", "Hide");
     const action = instrument.plot ? [instrument.plot.action] : [];

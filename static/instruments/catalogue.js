@@ -1,4 +1,4 @@
-// Every instrument there is for an arm: what it is called, how it is made, what it shows of a state.
+// All instruments of an arm, with their titles, elements and the values that they show of a state.
 import { DEGREES, MM, readings } from "./channels.js";
 import { Command } from "./command.js";
 import { Bars, Gauge } from "./gauge.js";
@@ -12,7 +12,7 @@ const ONE = ["small", "large"];
 const ROW = ["wide", "large", "broad"];
 const BIG = ["broad", "large", "wide"];
 
-// [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}]
+// Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
 export function instruments(arm, gripper, { say, history, groups, view }) {
   return [...knobs(arm, gripper, say), ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
 }
@@ -81,7 +81,7 @@ function gauges(arm) {
     },
     (_, loop) => (loop ? [loop.late_p99 * MS, `${loop.lost} lost`] : [null]),
   );
-  // The others are of a tool, which a mechanism of joints alone has not.
+  // The other gauges need a tool, which a mechanism of joints does not have.
   if (arm.joints_only) return [rates, late];
   return [
     gauge(
@@ -92,7 +92,7 @@ function gauges(arm) {
         zones: [{ below: 6, tone: "bad" }, { below: 20, tone: "warn" }],
       },
       ({ margins: { clearance, parts } }) =>
-        parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not looked at"],
+        parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not checked"],
     ),
     rates,
     gauge(

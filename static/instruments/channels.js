@@ -1,13 +1,13 @@
-// What of a state is kept over time, in the units people read.
+// The channels of the history: values of a state in display units.
 export const DEGREES = 180 / Math.PI;
 export const MM = 1000;
 
-// How each joint's numbers are read: {of, unit, mark}.
+// Return {of, unit, mark} for each joint: factor to display units, unit, and its mark after numbers.
 export function readings(arm) {
   return arm.slides.map((slides) => (slides ? { of: MM, unit: "mm", mark: " mm" } : { of: DEGREES, unit: "deg", mark: "°" }));
 }
 
-// {channels, groups}: each group is a list of numbers of channels. gripper: {percent(angle)} or null.
+// Return {channels, groups}; a group is a list of channel indices. gripper: {percent(angle)} or null.
 export function channelsOf(arm, gripper) {
   const channels = [];
   const groups = {};

@@ -1,19 +1,19 @@
-// What one knob asks for: not more often than the arm can use, the last word always, and what has
-// become of it.
+// The requests of one knob: limited in rate, but the last one is always sent, and followed until the
+// state includes them.
 const EVERY = 40; // ms
-const HEED = 300; // ms that a request without a ticket may take to be seen in the state
+const HEED = 300; // ms after which a state includes a request without a ticket
 
 export class Command {
   #say;
   #request;
-  #wanted = null;
+  #value = null;
   #timer = null;
   #sent = 0;
-  #open = 0; // requests that are not answered yet
+  #open = 0; // number of unanswered requests
   #ticket = 0;
   #until = 0;
 
-  // id: of its requests. request: of a value, the message without the id.
+  // id: id of the requests. request: returns the message for a value, without the id.
   constructor(id, request, say) {
     this.id = id;
     this.#request = request;
@@ -21,7 +21,7 @@ export class Command {
   }
 
   send(value) {
-    this.#wanted = value;
+    this.#value = value;
     if (this.#timer === null)
       this.#timer = setTimeout(() => this.#now(), Math.max(0, this.#sent + EVERY - performance.now()));
   }
@@ -30,7 +30,7 @@ export class Command {
     this.#timer = null;
     this.#sent = performance.now();
     this.#open += 1;
-    this.#say({ ...this.#request(this.#wanted), id: this.id });
+    this.#say({ ...this.#request(this.#value), id: this.id });
   }
 
   done({ ticket }) {
@@ -39,14 +39,14 @@ export class Command {
     else this.#ticket = ticket;
   }
 
-  // Refused, or the line is gone: nothing is wanted any more. Another server counts anew.
+  // Drop all requests after a refusal or a loss of the connection. A new server counts tickets from the start.
   forget() {
     clearTimeout(this.#timer);
     this.#timer = null;
     this.#open = this.#ticket = this.#until = 0;
   }
 
-  // Whether a state knows all that was asked; until then its goal is an older one.
+  // Return whether `state` includes all requests; until then its goal is older.
   heededIn(state) {
     const underWay = this.#timer !== null || this.#open > 0 || performance.now() < this.#until;
     return !underWay && state.ticket >= this.#ticket;

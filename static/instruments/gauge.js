@@ -1,4 +1,4 @@
-// Gauges: a number on an arc with its zones, and a row of bars for several of one kind.
+// Gauges: a number on an arc with zones, and rows of bars for several numbers of one kind.
 import { arc, clamp, html, set, svg, write } from "./shape.js";
 
 const RING = 44;
@@ -9,8 +9,8 @@ export class Gauge {
   #options;
   #parts;
 
-  // text: of the value. zones: [{below | above, tone}], the first that fits counts. origin: where
-  // the arc begins, low unless told.
+  // text: returns the text of a value. zones: [{below | above, tone}], of which the first match counts.
+  // origin: the value where the arc begins, low by default.
   constructor(options) {
     this.#options = options;
     const { title, low, high, zones = [], unit } = options;
@@ -43,13 +43,13 @@ export class Gauge {
     );
   }
 
-  // value: null when there is none.
+  // Show `value` with a note; null if there is no value.
   show(value, note = " ") {
     const { text, low, origin = low, zones = [] } = this.#options;
-    const { way, value: shown, note: said } = this.#parts;
+    const { way, value: shown, note: below } = this.#parts;
     const words = value === null ? "–" : text(value);
     write(shown, words);
-    write(said, note);
+    write(below, note);
     const fits = ({ below = -Infinity, above = Infinity }) => value !== null && (value < below || value > above);
     set(this.element, "data-tone", zones.find(fits)?.tone ?? "ok");
     const ends = [origin, value ?? origin].map((each) => this.#turn(each));
@@ -68,7 +68,7 @@ export class Bars {
   #rows;
   #text;
 
-  // rows: [{label, limit}]; each bar goes either way from the middle, to its limit.
+  // rows: [{label, limit}]; each bar extends from the middle to either side, up to its limit.
   constructor({ title, rows, text, unit }) {
     this.#text = text;
     this.#rows = rows.map(({ label, limit }) => {

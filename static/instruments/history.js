@@ -1,15 +1,15 @@
-// What was measured of late: a ring of samples, each a time and a number a channel.
-const CAPACITY = 18_000; // ten minutes at 30 Hz
-const AT_REST = 0.1; // s after which a state is no late one, but that of an arm that rests
-const ANEW = 1.0; // s that no clock goes back unless its server was started anew
-export const GAP = 1.0; // s without a sample that a line does not bridge
+// The history: a ring buffer of recent samples, each with a time and a number per channel.
+const CAPACITY = 18_000; // samples, ten minutes at 30 Hz
+const AT_REST = 0.1; // s, age from which a state is that of an arm at rest and not a late one
+const RESTART = 1.0; // s by which the clock goes back only if the server was restarted
+export const GAP = 1.0; // s without a sample, above which a line is interrupted
 
 export class History {
   #times = new Float64Array(CAPACITY);
   #columns;
-  #count = 0; // samples ever taken in; the last CAPACITY of them are there
+  #count = 0; // number of all samples; the last CAPACITY of them are stored
 
-  // channels: [{label, unit, of(state)}]; a number that is missing is NaN.
+  // channels: [{label, unit, of(state)}]; a missing number is NaN.
   constructor(channels) {
     this.channels = channels;
     this.#columns = channels.map(() => new Float64Array(CAPACITY));
@@ -17,7 +17,7 @@ export class History {
 
   take(state) {
     const t = state.sent - state.t > AT_REST ? state.sent : state.t;
-    if (t < this.newest - ANEW) this.#count = 0;
+    if (t < this.newest - RESTART) this.#count = 0;
     if (t <= this.newest) return;
     const slot = this.#count % CAPACITY;
     this.#times[slot] = t;
@@ -45,7 +45,7 @@ export class History {
     return this.#columns[channel][n % CAPACITY];
   }
 
-  // The first sample that is not before t.
+  // Return the first sample that is not before t.
   at(t) {
     let [low, high] = [this.first, this.end];
     while (low < high) {
@@ -56,7 +56,7 @@ export class History {
     return low;
   }
 
-  // The sample nearest to t; -1 when there is none.
+  // Return the sample nearest to t; -1 if there is none.
   nearest(t) {
     const n = this.at(t);
     if (n > this.first && (n === this.end || t - this.time(n - 1) < this.time(n) - t)) return n - 1;

@@ -1,32 +1,32 @@
-// A knob: an arc for what can be had, a pointer for the goal, a mark for where the arm is.
+// A knob: an arc for the range, a pointer for the goal, a mark for the value of the arm.
 import { arc, clamp, html, onDial, set, svg, write } from "./shape.js";
 
 const RING = 47;
-const MOST = 330; // degrees that a dial may go round
-const DEAF = 10; // px round the middle where a direction means nothing
+const MAX_TURN = 330; // degrees, maximum range of a dial
+const DEAD = 10; // px, radius round the middle where the direction is ignored
 const FINE = 0.1; // fraction of a step with Shift
 const PAGE = 10; // steps
-const SHAKEN = 600; // ms
+const SHAKEN = 600; // ms for which a refused knob is marked
 
 export class Knob {
   #range;
   #text;
   #step;
   #command;
-  #turn; // of a value: degrees on the dial
-  #held = null; // {pointer, angle, value} while a hand is on it
+  #turn; // {of, back}: value to degrees on the dial, and degrees to value
+  #held = null; // {pointer, angle} during a drag
   #goal = null;
   #now = null;
   #parts = {};
 
-  // low, high, step: of the value. full: degrees on the dial that a unit of it takes, none for as
-  // many as fit. text: of a value. command: what it is sent by.
+  // low, high, step: range and step of the value. full: degrees on the dial per unit; without it the
+  // range fills the dial. text: returns the text of a value. command: the Command that sends values.
   constructor({ title, low, high, step, full, text, command }) {
     this.#range = [low, high];
     this.#step = step;
     this.#text = text;
     this.#command = command;
-    const scale = Math.min(full ?? Infinity, (full ? MOST : 270) / (high - low));
+    const scale = Math.min(full ?? Infinity, (full ? MAX_TURN : 270) / (high - low));
     const middle = full ? 0 : (low + high) / 2;
     this.#turn = { of: (value) => (value - middle) * scale, back: (degrees) => degrees / scale };
     const limits = [low, high].map((limit) => onDial(RING, this.#turn.of(limit)));
@@ -59,7 +59,7 @@ export class Knob {
     this.#listen();
   }
 
-  // Where the goal and the arm are in `state`.
+  // Show the goal and the value of the arm in `state`.
   take(state, goal, now) {
     this.#now = now;
     if (this.#held === null && this.#command.heededIn(state)) this.#goal = goal;
@@ -73,25 +73,25 @@ export class Knob {
     setTimeout(() => this.element.classList.remove("refused"), SHAKEN);
   }
 
-  // Back to what is: the hand is off, and nothing is asked any more.
+  // Return to the state of the arm: end the drag and drop pending requests.
   spring() {
     this.#held = null;
     this.#command.forget();
     this.dial.classList.remove("held");
   }
 
-  #wish(value) {
+  #request(value) {
     const [low, high] = this.#range;
-    const wanted = clamp(value, low, high);
-    if (wanted === this.#goal) return;
-    this.#goal = wanted;
-    this.#command.send(wanted);
+    const target = clamp(value, low, high);
+    if (target === this.#goal) return;
+    this.#goal = target;
+    this.#command.send(target);
     this.#draw();
   }
 
   #notch(count, fine) {
     const by = this.#step * (fine ? FINE : 1);
-    if (this.#goal !== null) this.#wish(Math.round((this.#goal + count * by) / by) * by);
+    if (this.#goal !== null) this.#request(Math.round((this.#goal + count * by) / by) * by);
   }
 
   #listen() {
@@ -99,7 +99,7 @@ export class Knob {
     const angle = ({ clientX, clientY }) => {
       const { left, top, width, height } = dial.getBoundingClientRect();
       const [x, y] = [clientX - left - width / 2, clientY - top - height / 2];
-      return Math.hypot(x, y) < DEAF ? null : (Math.atan2(x, -y) * 180) / Math.PI;
+      return Math.hypot(x, y) < DEAD ? null : (Math.atan2(x, -y) * 180) / Math.PI;
     };
     dial.addEventListener("pointerdown", (event) => {
       if (event.button || this.#goal === null || this.#held) return;
@@ -107,21 +107,21 @@ export class Knob {
       dial.classList.add("held");
       this.#held = { pointer: event.pointerId, angle: angle(event) };
     });
-    // It turns by as much as the hand goes round, so a mere touch moves nothing.
+    // The knob turns by the same angle as the pointer, so a mere touch moves nothing.
     dial.addEventListener("pointermove", (event) => {
       if (event.pointerId !== this.#held?.pointer) return;
       const [before, now] = [this.#held.angle, angle(event)];
       this.#held.angle = now ?? before;
       if (before === null || now === null) return;
       const by = ((now - before + 540) % 360) - 180;
-      this.#wish(this.#goal + this.#turn.back(by) * (event.shiftKey ? FINE : 1));
+      this.#request(this.#goal + this.#turn.back(by) * (event.shiftKey ? FINE : 1));
     });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
       dial.addEventListener(end, () => {
         this.#held = null;
         dial.classList.remove("held");
       });
-    // Only with the focus: who scrolls past must not move the arm.
+    // The wheel works only with the focus, so that scrolling past does not move the arm.
     dial.addEventListener(
       "wheel",
       (event) => {
@@ -131,7 +131,7 @@ export class Knob {
       },
       { passive: false },
     );
-    // Home and End would send the arm to a limit at a single key.
+    // Home and End are left out: a single key would move the arm to a limit.
     const keys = {
       ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: PAGE, PageDown: -PAGE,
     };
@@ -146,13 +146,13 @@ export class Knob {
     const { way, pointer, mark, goal, now } = this.#parts;
     if (this.#goal === null) return;
     const [to, from] = [this.#goal, this.#now].map(this.#turn.of);
-    const [wished, is] = [this.#goal, this.#now].map(this.#text);
+    const [target, is] = [this.#goal, this.#now].map(this.#text);
     set(pointer, "transform", `rotate(${to.toFixed(2)})`);
     set(mark, "transform", `rotate(${from.toFixed(2)})`);
     set(way, "d", Math.abs(to - from) < 0.2 ? "" : arc(RING, from, to));
-    write(goal, wished);
-    write(now, wished === is ? "" : is);
+    write(goal, target);
+    write(now, target === is ? "" : is);
     set(this.dial, "aria-valuenow", this.#goal.toFixed(2));
-    set(this.dial, "aria-valuetext", wished === is ? wished : `${wished}, now ${is}`);
+    set(this.dial, "aria-valuetext", target === is ? target : `${target}, now ${is}`);
   }
 }

@@ -1,20 +1,20 @@
-// Which instruments are shown, in what order and how large. A layout is a list of places
-// {id, size, shown} with each instrument once; a change gives a new one.
+// The layout: which instruments are shown, in which order and size. A layout is an immutable list of
+// places {id, size, shown}, one for each instrument.
 const KEY = "katana450.instruments";
 const VERSION = 1;
 
-// catalogue: [{id, sizes, shown}], each in its first size unless somebody says otherwise.
+// Return the initial layout of a catalogue [{id, sizes, shown}], each instrument in its first size.
 export function initial(catalogue) {
   return catalogue.map(({ id, sizes, shown }) => ({ id, size: sizes[0], shown }));
 }
 
-// What was kept, as far as it makes sense; of an instrument that it does not know the initial place.
+// Return the stored layout. Invalid places and missing instruments get their initial ones.
 export function read(storage, catalogue) {
   let kept = null;
   try {
     kept = JSON.parse(storage?.getItem(KEY) ?? "null");
   } catch {
-    // Somebody else wrote there, or half of it is lost.
+    // The stored text is damaged or from another program.
   }
   if (kept?.version !== VERSION || !Array.isArray(kept.places)) return initial(catalogue);
   const known = new Map(catalogue.map((each) => [each.id, each]));
@@ -33,11 +33,11 @@ export function write(storage, layout) {
   try {
     storage?.setItem(KEY, JSON.stringify({ version: VERSION, places: layout }));
   } catch {
-    // No room, or not allowed: it lasts as long as the page.
+    // Storage is full or not allowed: the layout lasts as long as the page.
   }
 }
 
-// `id` in the place of `other`, on the side it comes from.
+// Move `id` to the place of `other`; the instruments between shift by one.
 export function moved(layout, id, other) {
   const [from, to] = [id, other].map((name) => layout.findIndex((place) => place.id === name));
   if (from < 0 || to < 0 || from === to) return layout;
@@ -46,7 +46,7 @@ export function moved(layout, id, other) {
   return after;
 }
 
-// `id` past the next shown one before or behind it.
+// Move `id` past the next shown instrument before (by -1) or after it (by 1).
 export function nudged(layout, id, by) {
   const shown = layout.filter((place) => place.shown);
   const other = shown[shown.findIndex((place) => place.id === id) + by];

@@ -1,4 +1,4 @@
-// The front panel: it asks for states while it is open, keeps them for a while and shows them.
+// The instrument panel: it queries states while it is open, stores them for a time and shows them.
 import { Board } from "./board.js";
 import { instruments } from "./catalogue.js";
 import { channelsOf } from "./channels.js";
@@ -6,9 +6,9 @@ import { History } from "./history.js";
 import { html, set, write } from "./shape.js";
 
 const HZ = 30;
-const LOOK_EVERY = 1000; // ms; the control loop says no more often how late it is
+const LOOK_EVERY = 1000; // ms; the control loop reports its lateness at this interval
 const SPANS = { 10: "10 s", 30: "30 s", 120: "2 min" };
-const OLD = 1.0; // s after which what is shown must not pass for the present
+const OLD = 1.0; // s, age from which values are marked as old
 const STYLE = "static/instruments/instruments.css";
 
 export class Panel {
@@ -24,10 +24,10 @@ export class Panel {
   #took = 0;
   #timer = null;
   #frame = null;
-  #age = html("span", { class: "age", title: "How old what you see is, at most" });
+  #age = html("span", { class: "age", title: "Maximum age of the values" });
   #body = html("div", { class: "body" }, html("p", { class: "note" }, "Waiting for the arm."));
 
-  // line: {say, watch, kept, quietly}, the page's own way to the server and what it can keep.
+  // line: {say, watch, kept, quietly}, the page's connection to the server and its storage.
   constructor(root, line) {
     this.#root = root;
     this.#line = line;
@@ -46,7 +46,7 @@ export class Panel {
     this.#draw();
   }
 
-  // Whatever comes over the page's line.
+  // Handle each event of the page's connection.
   hear({ heard, took, link }) {
     if (link === "down") this.#spring();
     if (heard?.is === "arm" && !this.#board) this.#build(heard);
@@ -99,13 +99,13 @@ export class Panel {
       choice.addEventListener("change", () => this.#look({ span: Number(span) }));
       return html("label", {}, choice, html("span", {}, label));
     });
-    const pause = toggle("Pause", "Hold the plots still; what comes meanwhile is kept", (on) =>
+    const pause = toggle("Pause", "Stop the plots; new values are still stored", (on) =>
       this.#look({ end: on ? (this.#history?.newest ?? null) : null }),
     );
     const arrange = toggle("Arrange", "Move, resize, show and hide instruments", (on) => this.#board?.arrange(on));
     return html(
       "div",
-      { class: "toolbar", role: "group", "aria-label": "Of all plots and cards" },
+      { class: "toolbar", role: "group", "aria-label": "Plots and cards" },
       html("fieldset", { class: "choice", "aria-label": "Time that plots show" }, ...spans),
       pause, this.#age, arrange,
     );

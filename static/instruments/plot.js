@@ -1,15 +1,15 @@
-// A plot of some channels over the last seconds, with a cursor to read it, and as CSV.
+// A plot of some channels over the last seconds, with a cursor for reading and export as CSV.
 import { GAP } from "./history.js";
 import { digits, scale } from "./scale.js";
 import { clamp, html, set, signed, write } from "./shape.js";
 
 const MARGIN = { left: 42, right: 8, top: 8, bottom: 18 }; // px
-const LINE_HEIGHT = 24; // px between lines across, about; and one for each so many seconds:
-const APART = { 10: 2, 30: 5, 120: 20 };
-const LABEL_WIDTH = 56; // px for the time below a line; the outermost ones are not centred
+const LINE_HEIGHT = 24; // px between horizontal lines, about
+const APART = { 10: 2, 30: 5, 120: 20 }; // s between vertical lines, for each span
+const LABEL_WIDTH = 56; // px for the time below a line; the outermost labels are not centred
 const COLOURS_KEPT = 500; // ms
-const SERIES = 5; // colours in instruments.css; more lines have them again
-const READ_BY = 0.01; // fraction of the width a key moves the cursor
+const SERIES = 5; // number of colours in instruments.css; further lines repeat them
+const READ_BY = 0.01; // fraction of the width by which a key moves the cursor
 
 export class Plot {
   #history;
@@ -26,8 +26,8 @@ export class Plot {
   /** @type {any} */
   #colours = { at: -Infinity };
 
-  // channels: their numbers in the history. view: {span, end} [s] of all plots, end null while they
-  // run. least: what the height stands for at least. decimals: of the read-out.
+  // channels: indices in the history. view: {span, end} [s] of all plots; end is null while they run.
+  // least: minimum range of the vertical axis. decimals: decimals of the read-out.
   constructor({ id, title, history, channels, view, least, decimals }) {
     this.#history = history;
     this.#channels = channels;
@@ -51,7 +51,7 @@ export class Plot {
     this.#listen();
   }
 
-  // Something else than time has changed.
+  // Draw again, because something other than time has changed.
   refresh() {
     this.#stale = true;
   }
@@ -59,7 +59,7 @@ export class Plot {
   draw() {
     const now = performance.now();
     const { width, height } = this.#size;
-    // A picture that would move by less than half a dot is left as it is.
+    // A plot that would move by less than half a pixel is not drawn again.
     if (!this.#stale && now - this.#drawn < (500 * this.#view.span) / Math.max(1, width)) return;
     if (!width || !height) return;
     this.#stale = false;
@@ -108,7 +108,7 @@ export class Plot {
     });
   }
 
-  // Canvas knows no variables of CSS, but elements that have taken them on do.
+  // A canvas cannot use CSS variables, so the colours are read from elements that use them.
   #palette(now) {
     if (now - this.#colours.at < COLOURS_KEPT) return this.#colours;
     const { color, borderTopColor, fontFamily } = getComputedStyle(this.#canvas);
@@ -180,19 +180,19 @@ export class Plot {
     }
     pen.textBaseline = "alphabetic";
     const room = ((box.right - box.left) * APART[span]) / span;
-    const told = APART[span] * Math.ceil(LABEL_WIDTH / room);
+    const labelled = APART[span] * Math.ceil(LABEL_WIDTH / room);
     for (let back = 0; back <= span; back += APART[span]) {
       const at = Math.round(box.right - ((box.right - box.left) * back) / span) - 0.5;
       pen.moveTo(at, box.top);
       pen.lineTo(at, box.bottom);
-      if (back % told) continue;
+      if (back % labelled) continue;
       pen.textAlign = back === 0 ? "right" : back === span ? "left" : "center";
       pen.fillText(back > 0 ? `−${back} s` : end === null ? "now" : "paused", at, box.bottom + 14);
     }
     pen.stroke();
   }
 
-  // Of more samples than dots, the lowest and the highest of each few.
+  // If there are more samples than pixels, draw the minimum and the maximum of each few.
   #trace(pen, channel, colour, from, to, x, y) {
     const history = this.#history;
     const first = Math.max(history.first, history.at(from) - 1);

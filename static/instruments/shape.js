@@ -1,4 +1,4 @@
-// Elements of HTML and SVG in a line, round scales, and numbers as people read them.
+// Functions that create HTML and SVG elements, draw round scales and format numbers.
 const SVG = "http://www.w3.org/2000/svg";
 
 export function html(tag, attributes = {}, ...children) {
@@ -15,7 +15,7 @@ function filled(element, attributes, children) {
   return element;
 }
 
-// Only what is new is written: thirty times a second that is most of what a card costs.
+// Write only changes: at 30 updates a second, writing is most of the cost of a card.
 export function set(element, name, value) {
   const text = String(value);
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
@@ -25,7 +25,7 @@ export function write(element, words) {
   if (element.textContent !== words) element.textContent = words;
 }
 
-// A point on a dial: degrees clockwise from the top.
+// Return the point on a dial at `degrees`, clockwise from the top.
 export function onDial(radius, degrees) {
   const angle = (degrees * Math.PI) / 180;
   return [radius * Math.sin(angle), -radius * Math.cos(angle)];
@@ -42,7 +42,7 @@ export function arc(radius, from, to) {
 
 export const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
-// A true minus sign, and never "−0".
+// Return `value` with a true minus sign, and never "−0".
 export function signed(value, digits = 1) {
   const text = value.toFixed(digits);
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");

@@ -31,13 +31,13 @@ FLAGS = (
     "--disable-quic",
     "--disable-gpu-compositing",
     "--force-device-scale-factor=1",
-    # A page behind another must go on drawing and keep its timers.
+    # A page behind another must still draw and keep its timers.
     "--disable-background-timer-throttling",
     "--disable-renderer-backgrounding",
     "--disable-backgrounding-occluded-windows",
 )
-# Software renderers, the faster first. Mesa's llvmpipe draws about twice as fast as SwiftShader,
-# but is there on Linux with Mesa alone.
+# Software renderers, the fastest first. Mesa's llvmpipe draws about twice as fast as SwiftShader,
+# but exists only on Linux with Mesa.
 RENDERERS = {
     "llvmpipe": ("--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"),
     "SwiftShader": ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
@@ -46,7 +46,7 @@ HAS_WEBGL = "() => document.createElement('canvas').getContext('webgl2') !== nul
 
 
 class BrowserError(RuntimeError):
-    """No browser to test with; the message says what to install or to set."""
+    """Raised without a usable browser; the message names what to install or to set."""
 
 
 class Installer(NamedTuple):
@@ -78,16 +78,16 @@ INSTALLERS = {
 
 
 def find() -> Path | None:
-    """Path of the browser named by the environment, else of the first known one installed.
+    """Return the path of the browser in the environment, otherwise of the first installed one.
 
-    Raises BrowserError if the environment names a file that is not there.
+    Raises BrowserError if the environment names a missing file.
     """
     named = os.environ.get(ENVIRONMENT_VARIABLE)
     if named:
         path = shutil.which(named)
         if path is None:
             raise BrowserError(
-                f"{ENVIRONMENT_VARIABLE}={named} is no program that can be run: "
+                f"{ENVIRONMENT_VARIABLE}={named} is not a program that can be run: "
                 "set it to the path of a Chromium or Chrome, or unset it"
             )
         return Path(path)
@@ -96,34 +96,31 @@ def find() -> Path | None:
 
 
 def version(path: Path) -> str:
-    """What the browser at path says of itself.
-
-    Raises BrowserError if it does not run.
-    """
+    """Return the version text of the browser. Raises BrowserError if it does not run."""
     try:
         answer = subprocess.run(
             [str(path), "--version"], capture_output=True, text=True, timeout=60, check=True
         )
     except (OSError, subprocess.SubprocessError) as error:
-        said = (getattr(error, "stderr", None) or str(error)).strip()
+        reason = (getattr(error, "stderr", None) or str(error)).strip()
         raise BrowserError(
-            f"{path} does not run ({said}): reinstall it, or set {ENVIRONMENT_VARIABLE} "
+            f"{path} does not run ({reason}): reinstall it, or set {ENVIRONMENT_VARIABLE} "
             "to the path of another Chromium or Chrome"
         ) from error
     return answer.stdout.strip()
 
 
 def ensure() -> Path:
-    """Path of a browser that runs, installed first if there is none.
+    """Return the path of a browser that runs; install one if there is none.
 
-    Raises BrowserError with what a person has to do if that cannot be done from here.
+    Raises BrowserError with a remedy if the installation is not possible.
     """
     path = find()
     if path is None:
         _install()
         path = find()
     if path is None:
-        raise BrowserError(f"the installation brought none of {', '.join(NAMES)}. {_remedy()}")
+        raise BrowserError(f"the installation provided none of {', '.join(NAMES)}. {_remedy()}")
     version(path)
     return path
 
@@ -131,7 +128,7 @@ def ensure() -> Path:
 def _install() -> None:
     manager = next((name for name in INSTALLERS if shutil.which(name)), None)
     if manager is None:
-        raise BrowserError(f"no Chromium was found, nor a way to install one. {_remedy()}")
+        raise BrowserError(f"no Chromium and no package manager were found. {_remedy()}")
     installer = INSTALLERS[manager]
     prefix: tuple[str, ...] = ()
     if installer.needs_root and os.geteuid() != 0:
@@ -159,9 +156,9 @@ def _remedy() -> str:
 
 @contextmanager
 def launched() -> Iterator[Browser]:
-    """A headless browser that draws WebGL 2 in software, closed at the end.
+    """Launch a headless browser that draws WebGL 2 in software, and close it at the end.
 
-    Raises BrowserError if there is none, or if none of RENDERERS draws.
+    Raises BrowserError if there is no browser, or if none of RENDERERS works.
     """
     path = ensure()
     with sync_playwright() as playwright:
@@ -181,7 +178,7 @@ def _launch(playwright: Playwright, path: Path) -> Browser:
             browser = playwright.chromium.launch(
                 executable_path=path,
                 args=[*FLAGS, *flags],
-                # The same renderer with and without a graphics card.
+                # Use the same renderer with and without a graphics card.
                 env={**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"},
             )
         except Error as error:
@@ -197,7 +194,7 @@ def _launch(playwright: Playwright, path: Path) -> Browser:
 
 
 def main() -> None:
-    """Print the browser that tests will use, installing it if need be."""
+    """Print the browser that tests use; install one if there is none."""
     try:
         path = ensure()
         print(f"Browser for the tests: {path} ({version(path)})")

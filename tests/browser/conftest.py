@@ -1,4 +1,4 @@
-"""One browser for all tests here, windows on servers, and pictures of what failed."""
+"""One browser for all tests here, windows on servers, and pictures of failed tests."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from playwright.sync_api import Error as PlaywrightError
 
 from tests.browser.chromium import launched
 from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth, prepare
 
 THREAD_SECONDS = 5.0
 ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
@@ -29,7 +31,7 @@ class Windows:
 
     @contextmanager
     def open(self, url: str, **options: Any) -> Iterator[ViserPage]:
-        """A window for as long as the block lasts; options as ViserPage.open has them."""
+        """Open a window for the duration of the block; options are those of ViserPage.open."""
         page = ViserPage.open(self._browser, url, **options)
         self._pages.append(page)
         try:
@@ -46,7 +48,7 @@ class Windows:
             (ARTEFACTS / f"{stem}-{number}.log").write_text(errors, encoding="utf-8")
             try:
                 page.screenshot(ARTEFACTS / f"{stem}-{number}.png")
-            except PlaywrightError as error:  # the page may have crashed, which is the news
+            except PlaywrightError as error:  # the page may have crashed
                 print(f"window {number} gave no picture: {error}")
 
 
@@ -54,20 +56,20 @@ WINDOWS = pytest.StashKey[Windows]()
 
 
 class OpenPage(Protocol):
-    """Opens a window that closes with the test; options as ViserPage.open has them."""
+    """Opens a window that closes with the test; options are those of ViserPage.open."""
 
     def __call__(self, url: str, **options: Any) -> ViserPage: ...
 
 
-# Playwright keeps an asyncio loop running in this thread, in which no other test can run one. So
-# the browser ends with this folder's tests, not with the session.
+# Playwright keeps an asyncio loop running in this thread, so no other test can run one there.
+# Therefore the browser ends with the tests of this folder, not with the session.
 @pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """A headless browser that draws WebGL in software."""
+    """Launch a headless browser that draws WebGL in software."""
     before = set(threading.enumerate())
     with launched() as browser:
         yield browser
-    # asyncio waits for the browser's process in a thread that ends a moment after it.
+    # asyncio waits for the browser's process in a thread that ends shortly after it.
     for thread in set(threading.enumerate()) - before:
         thread.join(THREAD_SECONDS)
     left = set(threading.enumerate()) - before
@@ -76,7 +78,7 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="package")
 def windows(browser: Browser, request: pytest.FixtureRequest) -> Windows:
-    """Opens windows for fixtures that outlive a test; when a test fails, each is saved."""
+    """Return the windows of fixtures that outlive a test; each is saved when a test fails."""
     windows = Windows(browser)
     request.session.stash[WINDOWS] = windows
     return windows
@@ -84,7 +86,7 @@ def windows(browser: Browser, request: pytest.FixtureRequest) -> Windows:
 
 @pytest.fixture
 def open_page(windows: Windows) -> Iterator[OpenPage]:
-    """Opens windows that close with the test."""
+    """Return a function that opens windows, which close with the test."""
     with ExitStack() as stack:
 
         def open_page(url: str, **options: Any) -> ViserPage:
@@ -93,9 +95,45 @@ def open_page(windows: Windows) -> Iterator[OpenPage]:
         yield open_page
 
 
+@pytest.fixture(scope="module")
+def server() -> Iterator[AppServer]:
+    with AppServer() as server:
+        yield server
+
+
+@pytest.fixture
+def truth(server: AppServer) -> Truth:
+    return Truth(server)
+
+
+@pytest.fixture(scope="module")
+def window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
+        yield page
+
+
+@pytest.fixture
+def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
+    """Return a window whose person drives, with the arm in the ready posture."""
+    prepare(window, truth)
+    yield window
+    if window.page.get_attribute("#jog-button", "aria-expanded") == "true":
+        window.page.click("#jog-button")
+    assert window.errors == []
+
+
+@pytest.fixture
+def new_page(server: AppServer, open_page: OpenPage, truth: Truth) -> Iterator[ViserPage]:
+    """Return a new window whose person drives, for a single test."""
+    page = open_page(server.url, nodes=("/arm", MOVE))
+    prepare(page, truth)
+    yield page
+    assert page.errors == []
+
+
 @pytest.fixture(scope="session")
 def artefacts() -> Path:
-    """Folder for pictures and other evidence, outside version control."""
+    """Return the folder for pictures and logs, outside version control."""
     ARTEFACTS.mkdir(exist_ok=True)
     return ARTEFACTS
 
@@ -104,7 +142,7 @@ def artefacts() -> Path:
 def pytest_runtest_makereport(
     item: pytest.Item,
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Save what the windows show at the moment a test fails."""
+    """Save pictures of the windows when a test fails."""
     report = yield
     if report.failed and (windows := item.session.stash.get(WINDOWS, None)):
         windows.save(re.sub(r"[^\w.-]+", "-", f"{item.path.stem}-{item.name}").strip("-"))

@@ -1,4 +1,4 @@
-"""A hand on a gizmo: the mouse holds one handle and moves it by metres or radians."""
+"""A grip on a gizmo: the mouse holds one handle and moves it by metres or radians."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class Grip(ABC):
-    """Context manager that presses the mouse on a handle and releases it at the end.
+    """A context manager that presses the mouse on a handle and releases it at the end.
 
     `hit` (3,) is where the press meets the handle and `matrix` (4,4) the handle's pose, both in
     three.js's world. Raises AssertionError if the press does not start a drag.
@@ -35,15 +35,15 @@ class Grip(ABC):
 
     @abstractmethod
     def _point_at(self, value: float) -> Array:
-        """Point (3,) of three.js's world that the mouse must point at to reach the value."""
+        """Return the point (3,) of three.js's world to which the mouse must point for the value."""
 
     def to(self, value: float) -> None:
-        """Move the handle to a value counted from where it was taken."""
+        """Move the handle to a value relative to the start of the grip."""
         self._mouse.move(*self._page.project_three(self._point_at(value)))
         self._value = value
 
     def sweep(self, value: float, steps: int) -> None:
-        """Move the handle to a value in equal steps from where it is."""
+        """Move the handle to a value in equal steps from its present one."""
         for step in np.linspace(self._value, value, steps + 1)[1:]:
             self.to(float(step))
 
@@ -81,7 +81,7 @@ class Grip(ABC):
 
 
 class ArrowGrip(Grip):
-    """Holds an arrow, which lies along y of its own frame; values are metres."""
+    """A grip on an arrow, which lies along y of its own frame; values are in metres."""
 
     def _point_at(self, value: float) -> Array:
         # drei moves the control by the point of this line that is nearest to the mouse's ray.
@@ -90,10 +90,10 @@ class ArrowGrip(Grip):
 
 
 class RingGrip(Grip):
-    """Holds a ring in the x-y plane of its own frame; values are radians about z."""
+    """A grip on a ring in the x-y plane of its own frame; values are radians about z."""
 
     def _point_at(self, value: float) -> Array:
-        # drei counts the angle in the ring's plane from the point that the press met.
+        # drei measures the angle in the ring's plane from the pressed point.
         x, y, _ = self._axes.T @ (self._hit - self._origin)
         angle = math.atan2(y, x) + value
         in_plane = np.array([math.cos(angle), math.sin(angle), 0.0]) * math.hypot(x, y)

@@ -1,4 +1,4 @@
-"""A viser page in a real browser, driven by mouse and read through three.js and the wire."""
+"""A viser page in a real browser, driven by mouse and read through three.js and its messages."""
 
 from __future__ import annotations
 
@@ -9,11 +9,8 @@ import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal, Self
-from urllib.parse import urlencode
 
 import imageio.v3 as imageio
 import numpy as np
@@ -22,70 +19,29 @@ from numpy.typing import ArrayLike, NDArray
 from playwright.sync_api import Browser, Frame, Locator, Page
 from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
+from tests.browser.camera import Camera, Drawing
 from tests.browser.grip import ArrowGrip, Grip, RingGrip
+from tests.browser.message import Message
 
 Matrix = NDArray[np.floating[Any]]
 Pixel = tuple[float, float]
 Axis = Literal["x", "y", "z"]
 
 SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("record.js", "scene.js"))
-# Wide enough for viser to dock its panel beside the scene.
+# Large enough for viser to dock its panel beside the scene.
 WINDOW = (1280, 800)
 READY_SECONDS = 60.0  # a software renderer compiles shaders for up to 22 s
 POLL_MILLISECONDS = 20.0
 THROTTLE_MILLISECONDS = 50.0
 DRAG_STEPS = 8
-COARSE = 0.5  # pixels drawn for one of the window: a software renderer is four times as fast
-
-
-class Drawing(StrEnum):
-    """When a window draws, which without a graphics card is most of what a browser does."""
-
-    PICTURES = "pictures"
-    """For pictures of it alone. Else all but the drawing is done, frame by frame."""
-    BEST = "best"
-    """Likewise, with reflections, shadows, smooth edges and every pixel."""
-    ALWAYS = "always"
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Where the browser looks from: viser's world, metres, `fov` vertical in radians."""
-
-    position: tuple[float, float, float] = (0.75, -0.7, 0.65)
-    look_at: tuple[float, float, float] = (0.2, 0.0, 0.22)
-    fov: float = 0.7
-
-    def query(self, pixels: float) -> str:
-        """The camera as viser's page takes it in its address.
-
-        `pixels` are drawn for each of the window's along either side.
-        """
-        values = {
-            "initialCameraPosition": ",".join(map(str, self.position)),
-            "initialCameraLookAt": ",".join(map(str, self.look_at)),
-            "initialCameraFov": str(self.fov),
-            # Else viser draws in fewer pixels whenever the machine is slow.
-            "fixedDpr": str(pixels),
-        }
-        return urlencode(values, safe=",")
-
-
-@dataclass(frozen=True)
-class Message:
-    """A decoded viser message: `time` in seconds since the epoch, as `time.time()` has it."""
-
-    time: float
-    type: str
-    body: dict[str, Any]
+COARSE = 0.5  # drawn pixels per pixel of the window: a software renderer is four times as fast
 
 
 class ViserPage:
     """One browser window on a viser server, bare or in the frame of the app's page.
 
-    ``page`` is the window and ``frame`` the document that viser fills. Nodes are named as in
-    viser's scene. Poses are 4x4 matrices, metres, radians; pixels are counted from the window's top
-    left corner.
+    ``page`` is the window and ``frame`` the document of viser. Nodes have their names in viser's
+    scene. Poses are 4x4 matrices in metres; pixels are relative to the window's top left corner.
     """
 
     def __init__(self, page: Page, frame: Frame, errors: list[str]) -> None:
@@ -109,8 +65,8 @@ class ViserPage:
     ) -> Self:
         """Open `url` in a window of its own and wait until the scene can be used.
 
-        `nodes` must be there besides whatever the server has sent by then. With `own_camera` the
-        page looks from where it would for a person. `script` runs first in both documents;
+        `nodes` must exist in addition to the nodes that the server has sent by then. With
+        `own_camera` the page uses its own initial camera. `script` runs first in both documents;
         `context_options` are Playwright's.
         """
         camera = camera or Camera()
@@ -146,16 +102,16 @@ class ViserPage:
     def wait_until(
         self, condition: Callable[[], object], what: str, *, seconds: float = 10.0
     ) -> None:
-        """Return when the condition holds; raise AssertionError naming `what` if it never does."""
+        """Wait for the condition; raise AssertionError with `what` after `seconds`."""
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, f"waited {seconds:g} s for {what}"
             self.page.wait_for_timeout(POLL_MILLISECONDS)
 
     def wait_ready(self, nodes: Sequence[str] = (), *, seconds: float = READY_SECONDS) -> None:
-        """Return when connected, with all nodes mounted in their poses and a frame drawn of them.
+        """Wait until the page is connected and a frame with all nodes in their poses is drawn.
 
-        Raises AssertionError that names what is missing.
+        Raises AssertionError with the missing parts.
         """
         deadline = time.monotonic() + seconds
         while missing := self.frame.evaluate("(names) => harness.missing(names)", list(nodes)):
@@ -167,39 +123,39 @@ class ViserPage:
         self.wait_drawn()
 
     def wait_drawn(self) -> None:
-        """Return when one more frame is drawn, with every message that had come before it."""
+        """Wait for one more frame, which includes every message that came before."""
         self.frame.evaluate("() => harness.drawn()")
 
     def wait_lost(self, *, seconds: float = 10.0) -> None:
-        """Return when the page has noticed that the server is away."""
+        """Wait until the page has noticed the loss of its server."""
         self.wait_until(lambda: not self.connected, "the page to lose its server", seconds=seconds)
 
     @property
     def connected(self) -> bool:
-        """Whether the page's socket is open."""
+        """True while the page's socket is open."""
         state: str | None = self.frame.evaluate("() => harness.links.at(-1)?.type ?? null")
         return state == "connected"
 
-    # The wire
+    # Messages
 
     def messages(
         self, kind: str, *, node: str | None = None, since: float = 0.0, last: int | None = None
     ) -> list[Message]:
-        """Messages of one type that the server sent, in order.
+        """Return the messages of one type from the server, in order.
 
-        `node` takes those about one scene node, `since` (as of `time.time()`) leaves older ones
-        out, `last` takes that many of the newest.
+        `node` selects those about one scene node, `since` (as `time.time()`) those that are not
+        older, and `last` that number of the newest.
         """
         return self._recorded("received", kind, node, since, last)
 
     def sent(self, kind: str, *, since: float = 0.0) -> list[Message]:
-        """Messages of one type that the page sent, likewise."""
+        """Return the messages of one type from the page, in order."""
         return self._recorded("sent", kind, None, since, None)
 
     def _recorded(
         self, log: str, kind: str, node: str | None, since: float, last: int | None
     ) -> list[Message]:
-        # Chosen in the page: a long record takes long to carry over.
+        # Selected in the page, because the transfer of a long record takes long.
         found = self.frame.evaluate(
             """([log, type, node, since, last]) => {
                 const found = harness[log].filter((each) => each.type === type
@@ -211,11 +167,10 @@ class ViserPage:
         return [Message(each["time"], each["type"], each["body"]) for each in found]
 
     def last_pose(self, node: str, *, since: float = 0.0) -> Matrix:
-        """T_parent_node as the server last sent it (4,4).
+        """Return T_parent_node (4, 4) as the server sent it last.
 
-        viser sends no pose of a node that stays where it was made, in its parent's. Nor does it
-        send a gizmo's pose back to the page that drags it. Raises LookupError if the server made
-        no such frame nor sent a pose of it.
+        viser sends no pose for a node that stays in its initial pose, and none for a gizmo to the
+        page that drags it. Raises LookupError if the server sent neither the frame nor a pose.
         """
         position, wxyz, made = (
             self.messages(kind, node=node, since=since, last=1)
@@ -230,18 +185,18 @@ class ViserPage:
     # The scene
 
     def node_pose(self, node: str) -> Matrix:
-        """T_world_node as three.js drew it (4,4), with every message handled that had come."""
+        """Return T_world_node (4, 4) as drawn by three.js, after all messages that have come."""
         poses = self.frame.evaluate("(name) => harness.poses(name)", node)
         T_three_world, T_three_node = _matrix(poses["root"]), _matrix(poses["node"])
         return np.linalg.solve(T_three_world, T_three_node)
 
     def project(self, point: ArrayLike) -> Pixel:
-        """Pixel at which the browser draws a point (3,) of viser's world, in metres."""
+        """Return the pixel of a point (3,) [m] of viser's world."""
         view = self.frame.evaluate("() => harness.view()")
         return self._pixel(view, _matrix(view["root"]) @ [*np.asarray(point, float), 1.0])
 
     def project_three(self, point: ArrayLike) -> Pixel:
-        """Pixel at which the browser draws a point (3,) of three.js's world, in metres."""
+        """Return the pixel of a point (3,) [m] of three.js's world."""
         return self._pixel(self.frame.evaluate("() => harness.view()"), np.append(point, 1.0))
 
     def look_from(self, camera: Camera) -> None:
@@ -257,7 +212,7 @@ class ViserPage:
         return self._in_window((left + (1 + x) / 2 * width, top + (1 - y) / 2 * height))
 
     def _in_window(self, pixel: Sequence[float]) -> Pixel:
-        """The pixel of the window that is ``pixel`` of viser's document."""
+        """Return the pixel of the window for ``pixel`` of viser's document."""
         left, top = 0.0, 0.0
         if self.frame.parent_frame is not None:
             box = self.frame.frame_element().bounding_box()
@@ -268,24 +223,24 @@ class ViserPage:
     # Dragging in the scene
 
     def grip_arrow(self, node: str, axis: Axis) -> Grip:
-        """Take hold of the arrow along a control's own axis; values are metres along it."""
+        """Return a grip on the arrow along a control's own axis; values are in metres."""
         spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, "arrow", axis])
         matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
         return ArrowGrip(self, node, self._in_window(spot["pixel"]), hit, matrix)
 
     def grip_ring(self, node: str, axis: Axis) -> Grip:
-        """Take hold of the ring about a control's own axis; values are radians about it."""
+        """Return a grip on the ring about a control's own axis; values are in radians."""
         spot = self.frame.evaluate("(which) => harness.grip(...which)", [node, "ring", axis])
         matrix, hit = _matrix(spot["matrix"]), np.array(spot["hit"])
         return RingGrip(self, node, self._in_window(spot["pixel"]), hit, matrix)
 
     def drag_arrow(self, node: str, axis: Axis, metres: float, *, steps: int = DRAG_STEPS) -> None:
-        """Drag a control along one of its own axes and let go."""
+        """Drag a control along one of its own axes and release it."""
         with self.grip_arrow(node, axis) as grip:
             grip.sweep(metres, steps)
 
     def drag_ring(self, node: str, axis: Axis, radians: float, *, steps: int = DRAG_STEPS) -> None:
-        """Turn a control about one of its own axes, right-handed, and let go."""
+        """Turn a control about one of its own axes, right-handed, and release it."""
         with self.grip_ring(node, axis) as grip:
             grip.sweep(radians, steps)
 
@@ -299,12 +254,12 @@ class ViserPage:
         return self.frame.locator(f'[id="{self._label(label).get_attribute("for")}"]')
 
     def slider_value(self, label: str) -> float:
-        """Value that a slider shows, in its own unit."""
+        """Return the value that a slider shows, in its own unit."""
         thumb = self._labelled(label).get_by_role("slider")
         return float(thumb.get_attribute("aria-valuenow") or "nan")
 
     def slider_values(self) -> dict[str, float]:
-        """What every slider shows, by its label."""
+        """Return the values of all sliders by label."""
         shown: dict[str, float] = self.frame.evaluate(
             """() => {
                 const sliders = [...document.querySelectorAll("[role=slider]")];
@@ -318,7 +273,7 @@ class ViserPage:
         return shown
 
     def drag_slider(self, label: str, value: float, *, steps: int = DRAG_STEPS) -> float:
-        """Drag a slider's thumb to a value as nearly as pixels allow; return what it then shows."""
+        """Drag a slider's thumb to a value, as exactly as pixels allow; return the shown value."""
         slider = self._labelled(label)
         slider.scroll_into_view_if_needed()
         thumb = slider.get_by_role("slider")
@@ -337,24 +292,24 @@ class ViserPage:
         return self.slider_value(label)
 
     def number_box(self, label: str, *, index: int = 0) -> Locator:
-        """The box for a number beside a label, or one of several boxes there."""
+        """Return the number box beside a label, or one of several boxes."""
         row = self._label(label).locator("xpath=ancestor::*[.//input][1]")
         return row.locator("input:not([type=hidden])").nth(index)
 
     def type_number(self, label: str, value: float, *, index: int = 0) -> None:
-        """Type a number into the box beside a label, or into one of several boxes there."""
+        """Type a number into the box beside a label, or into one of several boxes."""
         box = self.number_box(label, index=index)
         box.fill(str(value))
         box.press("Enter")
-        # viser holds changes back and forgets all but the newest of any control.
+        # viser delays changes and keeps only the newest of each control.
         self.page.wait_for_timeout(2 * THROTTLE_MILLISECONDS)
 
     def chosen(self, label: str) -> str:
-        """What a list to choose from shows."""
+        """Return the chosen option of a list."""
         return self._labelled(label).input_value()
 
     def choose(self, label: str, option: str) -> None:
-        """Choose from a list."""
+        """Choose an option of a list."""
         self._labelled(label).click()
         self.frame.get_by_role("option", name=option, exact=True).click()
 
@@ -367,31 +322,31 @@ class ViserPage:
         self.page.get_by_role("button", name=label, exact=True).click()
 
     def text_of(self, selector: str) -> str:
-        """Text that the first element for a CSS selector shows."""
+        """Return the text of the first element for a CSS selector."""
         return self.frame.locator(selector).first.inner_text()
 
     def panel_text(self) -> str:
-        """All text that viser shows, the panel's and that of its messages."""
+        """Return all text that viser shows, in the panel and in notifications."""
         return self.text_of("body")
 
     # Evidence
 
     def picture(self) -> NDArray[np.uint8]:
-        """Colours of the window (height, width, 3), indexed by pixels as `project` gives them."""
+        """Return the colours of the window (height, width, 3), indexed by pixels of `project`."""
         return np.asarray(imageio.imread(self._png(), extension=".png")[..., :3])
 
     def keep(self, path: Path) -> None:
-        """Write a PNG for people to look at, if KATANA450_PICTURES is set: each takes seconds."""
+        """Write a PNG for people if KATANA450_PICTURES is set; each takes seconds."""
         if "KATANA450_PICTURES" in os.environ:
             self.screenshot(path)
 
     def scene_picture(self) -> NDArray[np.uint8]:
-        """Colours of the scene alone (height, width, 3), whatever the page around it does."""
+        """Return the colours (height, width, 3) of the scene without the surrounding page."""
         with self._drawing():
             return np.asarray(imageio.imread(self._canvas(), extension=".png")[..., :3])
 
     def screenshot(self, path: Path) -> Path:
-        """Write a PNG of the window, or of the scene alone if the window cannot be had."""
+        """Write a PNG of the window, or only of the scene if the window cannot be captured."""
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(self._png())
         return path
@@ -399,10 +354,10 @@ class ViserPage:
     def _png(self) -> bytes:
         with self._drawing():
             try:
-                # Given a path, Playwright would write it from a thread that it never ends.
+                # With a path, Playwright would write the file in a thread that it never ends.
                 return self.page.screenshot(timeout=20_000)
             except PlaywrightTimeoutError:
-                # The browser waits for a frame in vain while shaders compile; the canvas does not.
+                # While shaders compile, the browser gets no frame; the canvas can be read anyway.
                 return self._canvas()
 
     def _canvas(self) -> bytes:
@@ -411,7 +366,7 @@ class ViserPage:
 
     @contextmanager
     def _drawing(self) -> Iterator[None]:
-        """What is shown meanwhile is drawn."""
+        """Draw every frame within the block."""
         before = self.frame.evaluate("() => harness.draw(true)")
         self.wait_drawn()
         try:
@@ -421,7 +376,7 @@ class ViserPage:
 
 
 def _viser_frame(page: Page) -> Frame:
-    """The document that viser fills: the page itself, or a frame in it."""
+    """Return the document of viser: the page itself, or a frame in it."""
     element = page.query_selector("iframe#scene")
     if element is None:
         return page.main_frame

@@ -1,4 +1,4 @@
-// Runs in every frame before any script of the page. `harness` holds the options already.
+// Runs in every frame before all scripts of the page. `harness` already contains the options.
 (() => {
   "use strict";
   const MAX_NUMBERS = 64; // longer arrays (meshes, images) are recorded by their length
@@ -21,11 +21,11 @@
     log.push({ time: harness.now(), type: message.type, body: plain(message) });
   }
 
-  // viser's socket lives in a worker, which hands decoded messages to the page.
+  // viser's socket is in a worker, which passes decoded messages to the page.
   window.Worker = class extends Worker {
     constructor(...args) {
       super(...args);
-      // Before the page's own listener, which is set after construction.
+      // This listener runs before the page's own, which is set after construction.
       this.addEventListener("message", ({ data }) => {
         if (data?.type === "message_batch")
           for (const message of data.messages) note(harness.received, message);
@@ -39,7 +39,7 @@
     }
   };
 
-  // Software rendering is slow: no antialiasing, and no drawing but where asked.
+  // Software rendering is slow: no antialiasing, and drawing only on request.
   harness.draw = (draws) => {
     const before = harness.draws;
     harness.draws = draws;
@@ -56,7 +56,7 @@
     });
     if (gl === null || gl.recorded) return gl;
     gl.recorded = true;
-    // What lights the scene is drawn once, beside the canvas, and would be missed in a picture.
+    // The light of the scene is drawn once, outside the canvas, and would be missing in a picture.
     let beside = false;
     const bindFramebuffer = gl.bindFramebuffer;
     gl.bindFramebuffer = (target, framebuffer) => {

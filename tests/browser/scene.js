@@ -1,4 +1,4 @@
-// What the page shows: nodes, poses, the camera, and which handle lies under a pixel.
+// Functions that read the page: nodes, poses, the camera, and the handle under a pixel.
 (() => {
   "use strict";
   const FRAME_LIMIT = 30000; // ms; a software renderer compiles its shaders for seconds
@@ -12,7 +12,7 @@
     return object;
   }
 
-  // Names that keep the scene from being usable; empty when it is.
+  // Return the names of missing nodes or parts; empty when the scene can be used.
   harness.missing = (names) => {
     if (!viewer()?.cameraControl || !window.__viserSceneTree) return ["viser"];
     if (harness.links.at(-1)?.type !== "connected") return ["connection"];
@@ -26,7 +26,7 @@
     });
   };
 
-  // Resolves after one more frame, with every message handled that is here by now.
+  // Resolve after one more frame, in which all messages that have come are handled.
   harness.drawn = () =>
     new Promise((resolve, reject) => {
       const { scene } = viewer();
@@ -44,7 +44,7 @@
       viewer().requestRender();
     });
 
-  // Column-major 4x4 matrices into three.js's world: of the node and of viser's world.
+  // Return column-major 4x4 matrices into three.js's world, of the node and of viser's world.
   harness.poses = async (name) => {
     await harness.drawn();
     const [object, root] = [node(name), node("")];
@@ -52,7 +52,7 @@
     return { node: object.matrixWorld.toArray(), root: root.matrixWorld.toArray() };
   };
 
-  // The camera's column-major matrices and its picture's place on the page, in pixels.
+  // Return the camera's column-major matrices, and the rectangle of its picture on the page [px].
   harness.view = () => {
     const { camera, canvas } = viewer();
     const { left, top, width, height } = canvas.getBoundingClientRect();
@@ -64,7 +64,7 @@
     };
   };
 
-  // Both in viser's world.
+  // Turn the camera; both arguments are in viser's world.
   harness.lookFrom = (position, target) => {
     const { camera, cameraControl } = viewer();
     const three = (point) =>
@@ -79,7 +79,7 @@
     return [left + ((1 + ndc.x) / 2) * width, top + ((1 - ndc.y) / 2) * height];
   }
 
-  // The object whose pointerdown handler a press at this pixel calls, and where the ray meets it.
+  // Return the object whose pointerdown handler a press at this pixel calls, and the point it hits.
   function pressed([x, y]) {
     const { camera, canvas } = viewer();
     if (document.elementFromPoint(x, y) !== canvas) return null;
@@ -107,7 +107,7 @@
     return { kind: "plane", axis: axisOf(group.matrix, 2), owner: inner.children[0] };
   }
 
-  // Points on the handle in its own coordinates, those with most room around them first.
+  // Return points on the handle in its own coordinates, those with the most space around them first.
   function spots({ kind, owner }) {
     const point = (x, y, z) => node("").position.clone().set(x, y, z);
     if (kind === "arrow") {
@@ -121,7 +121,7 @@
       .map((i) => point(starts.getX(i), starts.getY(i), starts.getZ(i)));
   }
 
-  // Where to press to take a handle: the pixel, the point met and the handle's matrix.
+  // Return where to press for a handle: the pixel, the point that is hit and the handle's matrix.
   harness.grip = async (name, kind, axis) => {
     await harness.drawn();
     const handles = node(name).children[0].children.map(describe);

@@ -1,4 +1,4 @@
-"""A server run as a person runs it: a process of its own that can be killed and started again."""
+"""A server in a process of its own, which can be killed and started again."""
 
 from __future__ import annotations
 
@@ -20,27 +20,26 @@ from typing import Self
 from katana450.platform_support import without_interrupts
 
 ROOT = Path(__file__).resolve().parents[2]
-# A machine that runs tests and draws their pictures without a graphics card starves its browsers;
-# what they have to say of being alive comes late then.
+# A machine that draws without a graphics card delays its browsers, and their heartbeats come late.
+# APP therefore has longer timeouts than ATTENTIVE_APP, which has the default ones.
 ATTENTIVE_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
 APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")
 
-# Below the ports that systems hand to outgoing connections, so that none of those can take the
-# port while a killed server is away.
+# Below the ports of outgoing connections, so that none of those takes the port of a killed server.
 PORTS = range(8200, 8300)
 READY = re.compile(r"is ready: (https?://\S+)")
 KEPT_LINES = 400
 
 
 class ServerError(RuntimeError):
-    """The server did not start or stop; the message ends with what it printed."""
+    """Raised if the server does not start or stop; the message ends with its output."""
 
 
 def free_port() -> int:
-    """A port of PORTS on which nobody listens. Raises ServerError if all are taken."""
+    """Return a free port of PORTS. Raises ServerError if all are in use."""
     for attempt in range(len(PORTS)):
-        # Each process begins at a place of its own, so that parallel runs seldom meet.
+        # Each process begins at another port, so that parallel runs rarely collide.
         port = PORTS[(37 * os.getpid() + attempt) % len(PORTS)]
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -53,11 +52,11 @@ def free_port() -> int:
 
 
 class AppServer:
-    """Context manager around a server process.
+    """A context manager around a server process.
 
-    `command` holds ``{port}`` where the port belongs, and the process prints a line
-    ``… is ready: URL`` once it can be used. `seconds` limits each start and each stop. The process
-    starts in `folder`.
+    `command` contains ``{port}`` in place of the port. The process prints a line
+    ``… is ready: URL`` when it can be used. `seconds` is the timeout of each start and each stop.
+    The process starts in `folder`.
     """
 
     def __init__(
@@ -92,24 +91,24 @@ class AppServer:
 
     @property
     def output(self) -> str:
-        """The last lines that the process printed, in both streams."""
+        """Last lines that the process printed, in both streams."""
         return "\n".join(self._lines)
 
     @property
     def running(self) -> bool:
-        """Whether the process lives."""
+        """True while the process runs."""
         return self._process is not None and self._process.poll() is None
 
     @property
     def pid(self) -> int:
-        """The process's number. Raises ServerError if it does not run."""
+        """Id of the process. Raises ServerError if it does not run."""
         if self._process is None:
             raise ServerError(f"{self._name} does not run")
         return self._process.pid
 
     @property
     def front(self) -> int:
-        """The number of the process that people speak to, as Linux lists it: a child."""
+        """Id of the front end, a child process, as Linux lists it."""
         (front,) = (
             int(child)
             for children in Path(f"/proc/{self.pid}/task").glob("*/children")
@@ -121,10 +120,10 @@ class AppServer:
     def start(self) -> None:
         """Start the process and return when it is ready.
 
-        Raises ServerError if it dies first, takes longer than allowed or serves elsewhere.
+        Raises ServerError if it ends first, exceeds the timeout or serves at another address.
         """
         if self.running:
-            raise ServerError(f"{self._name} runs already")
+            raise ServerError(f"{self._name} is already running")
         self._process = subprocess.Popen(
             self._command,
             cwd=self._folder,
@@ -134,10 +133,10 @@ class AppServer:
             text=True,
             encoding="utf-8",
             errors="replace",
-            # Its own group, so that kill() also ends what it started.
+            # A process group of its own, so that kill() also ends its children.
             **without_interrupts(),
         )
-        # A pipe that nobody reads fills up and stops the writer.
+        # The output must be read: a full pipe blocks the writer.
         ready: SimpleQueue[str | None] = SimpleQueue()
         self._reader = threading.Thread(target=self._read, args=(self._process, ready), daemon=True)
         self._reader.start()
@@ -157,7 +156,7 @@ class AppServer:
         raise ServerError(f"{self._name} {reason}. It printed:\n{self.output or '(nothing)'}")
 
     def stop(self) -> None:
-        """End the process as Ctrl-C does. Raises ServerError if it has to be killed instead."""
+        """End the process as Ctrl-C does. Raises ServerError if it has to be killed."""
         if self._process is not None and self.running:
             if sys.platform == "win32":
                 self._process.send_signal(signal.CTRL_BREAK_EVENT)
@@ -174,17 +173,17 @@ class AppServer:
         self._collect()
 
     def close(self) -> None:
-        """The same as `stop`, for `contextlib.closing`."""
+        """End the process as `stop` does, for `contextlib.closing`."""
         self.stop()
 
     def kill(self) -> None:
-        """End the process and its children at once, without a farewell (SIGKILL)."""
+        """End the process and its children immediately (SIGKILL)."""
         if self._process is not None and self.running:
             self._process.kill()
         self._collect()
 
     def restart(self) -> None:
-        """Start anew on the same port; kills first if the process still runs."""
+        """Start again on the same port; kill the process first if it still runs."""
         self.kill()
         self.start()
 
@@ -193,7 +192,7 @@ class AppServer:
         return f"`{' '.join(self._command)}`"
 
     def _read(self, process: subprocess.Popen[str], ready: SimpleQueue[str | None]) -> None:
-        """Keep what the process prints; put its address once known, and None at its end."""
+        """Store the output of the process; put its address when known, and None at its end."""
         assert process.stdout is not None
         with process.stdout as stream:
             for line in stream:
@@ -205,7 +204,7 @@ class AppServer:
     def _collect(self) -> None:
         if self._process is not None:
             self._process.wait()
-            # On Windows the children see that the process has ended, and end too.
+            # On Windows the children end when the process has ended.
             if sys.platform != "win32":
                 with suppress(ProcessLookupError):
                     os.killpg(self._process.pid, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""The app through a real browser: what a person does with a mouse, and what the browser is sent."""
+"""The app in a real browser: actions with the mouse, and the messages that the browser gets."""
 
 from __future__ import annotations
 
@@ -32,18 +32,21 @@ FAINTEST = """() => {
 }"""
 MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
 
-# A dragged handle lands within a pixel of where it was meant: 1 mm from this far away.
-ON_ITS_WAY = 600.0  # ms; more than a loaded machine takes from a hand to a slider
+ON_ITS_WAY = 600.0  # ms; more than a loaded machine takes from the mouse to a slider
+# A dragged handle is within a pixel of its target: 1 mm at this distance.
 PIXEL = 2e-3
 
 
 class Robot:
-    """What a page shows and was sent of the arm."""
+    """The arm as a page shows it and as the messages describe it.
+
+    Attributes:
+        since: only messages from this time on count, because another server may have sent before.
+    """
 
     def __init__(self, page: ViserPage) -> None:
         self.page = page
         self.since = 0.0
-        """Only what was sent from this time on counts: another server may have spoken before."""
         described = load()
         self._arm = described.require_arm()
         self.path: dict[str, str] = {}
@@ -53,16 +56,16 @@ class Robot:
 
     @property
     def q(self) -> FloatArray:
-        """The joints [rad] that the sliders report."""
+        """Joint angles [rad] that the sliders show."""
         shown = self.page.slider_values()
         return np.radians([shown[label] for label in AXES])
 
     def reported(self, tool: str = "tcp") -> FloatArray:
-        """The tool's pose in the base frame by the product of exponentials of those joints."""
+        """Return the tool's pose in the base frame, computed from the sliders."""
         return self._arm.T_base_shoulder @ forward(self._arm.chain_to(tool), self.q)
 
     def sent(self, link: str = "tcp") -> FloatArray:
-        """The link's pose in the base frame as the frames on the wire add up to it."""
+        """Return the link's pose in the base frame, composed of the poses in messages."""
         parts = self.path[link].split("/")
         T = np.eye(4)
         for end in range(3, len(parts) + 1):
@@ -70,15 +73,15 @@ class Robot:
         return T
 
     def drawn(self, link: str = "tcp") -> FloatArray:
-        """The link's pose in the base frame as three.js drew it."""
+        """Return the link's pose in the base frame as drawn by three.js."""
         return np.array(self.page.node_pose(self.path[link]))
 
     def gizmo(self) -> FloatArray:
-        """Where the handle is drawn, (3,) [m] in the base frame."""
+        """Return the drawn position (3,) [m] of the gizmo in the base frame."""
         return np.array(self.page.node_pose(MOVE)[:3, 3])
 
     def settle(self) -> None:
-        """Wait until the arm is where the sliders say, and check that all accounts agree."""
+        """Wait until the arm has the angles of the sliders, and check that all poses agree."""
 
         def arrived() -> bool:
             return np.allclose(self.sent(), self.reported(), atol=1e-6)
@@ -86,18 +89,18 @@ class Robot:
         def rests() -> bool:
             if "Moving" in self.text() or not arrived():
                 return False
-            # What the hand did last may still be on its way to the arm.
+            # The last action of the mouse may still be in transit to the arm.
             before = self.q
             self.page.page.wait_for_timeout(ON_ITS_WAY)
             return np.array_equal(before, self.q) and arrived()
 
-        self.page.wait_until(rests, "the arm to arrive where the sliders say", seconds=30.0)
+        self.page.wait_until(rests, "the arm to arrive at the angles of the sliders", seconds=30.0)
         self.page.wait_drawn()
         assert np.allclose(self.drawn(), self.reported(), atol=1e-5)
         assert np.allclose(self.gizmo(), self.reported()[:3, 3], atol=1e-5)
 
     def text(self) -> str:
-        """The status and its sentence."""
+        """Return the status and its sentence."""
         return self.page.text_of(".k450 .status")
 
 
@@ -115,7 +118,7 @@ def window(server: AppServer, windows: Windows) -> Iterator[Robot]:
 
 @pytest.fixture
 def robot(window: Robot) -> Iterator[Robot]:
-    """A window on the running app, the arm at home."""
+    """Return a window of the running app, with the arm in the ready posture."""
     go_home(window)
     yield window
     assert window.page.errors == []
@@ -123,7 +126,7 @@ def robot(window: Robot) -> Iterator[Robot]:
 
 def go_home(robot: Robot) -> None:
     def there() -> bool:
-        # A machine that starves browser and server of time stops the arm, rightly.
+        # On an overloaded machine the arm stops, as it should.
         if robot.page.page.get_attribute("body", "data-mood") == "stopped":
             robot.page.press_in_bar("Clear stop")
             robot.page.page.wait_for_timeout(500)
@@ -139,11 +142,11 @@ def pitch_of(T: FloatArray) -> float:
     return math.asin(-T[2, 0])
 
 
-def test_the_picture_is_clear_while_viser_would_have_it_faint(robot: Robot) -> None:
+def test_picture_is_opaque_while_viser_would_draw_it_faintly(robot: Robot) -> None:
     assert robot.page.frame.evaluate(FAINTEST) == "1"
 
 
-def test_the_arm_follows_the_arrow_it_is_dragged_by(robot: Robot, artefacts: Path) -> None:
+def test_arm_follows_the_dragged_arrow(robot: Robot, artefacts: Path) -> None:
     start = robot.drawn()
     robot.page.drag_arrow(MOVE, "z", 0.06)
     robot.settle()
@@ -154,7 +157,7 @@ def test_the_arm_follows_the_arrow_it_is_dragged_by(robot: Robot, artefacts: Pat
     robot.page.keep(artefacts / "app-arrow.png")
 
 
-def test_dragged_sideways_the_tool_turns_with_the_arm_and_nothing_is_lost(robot: Robot) -> None:
+def test_tool_turns_with_the_arm_in_a_sideways_drag(robot: Robot) -> None:
     start = robot.drawn()
     robot.page.drag_arrow(MOVE, "y", 0.12)
     robot.settle()
@@ -201,14 +204,14 @@ def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot) -> None:
     robot.page.drag_slider("Axis 1", 120.0)
     robot.settle()
     turns = robot.page.messages("SetOrientationMessage", node=node, since=since)
-    # q and -q are one turn.
+    # q and -q are the same rotation.
     halves = [math.atan2(m.body["wxyz"][3], m.body["wxyz"][0]) for m in turns]
     angles = 2.0 * np.unwrap(halves, period=math.pi)
     steps, whole = np.abs(np.diff(angles)), abs(angles[-1] - angles[0])
     speed = load().require_arm().chain.speed[0]
     took = turns[-1].time - turns[0].time
     assert len(turns) > 20
-    # Frames jitter on their way; over all of them the speed is the joint's, and none is a leap.
+    # Frames jitter. Over all of them the speed is that of the joint, and no step is too large.
     assert whole / took <= speed * 1.1
     assert steps.max() < 0.25 * whole
 
@@ -224,7 +227,7 @@ def test_the_gripper_slider_moves_both_fingers(robot: Robot) -> None:
 
 
 def finger_turn(robot: Robot, link: str) -> float:
-    """The finger's turn about z [rad] as last sent, once it has come to rest."""
+    """Return the finger's angle about z [rad] as sent last, after it has come to rest."""
     seen: list[float] = []
 
     def resting() -> bool:
@@ -236,20 +239,20 @@ def finger_turn(robot: Robot, link: str) -> float:
     return seen[-1]
 
 
-def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
+def test_target_out_of_reach_is_shown_by_ghost_colour_and_sentence(
     robot: Robot, artefacts: Path
 ) -> None:
     page = robot.page
     with page.grip_arrow(MOVE, "x") as grip:
         grip.sweep(0.4, 8)
 
-        def told() -> bool:
+        def explained() -> bool:
             gap = float(np.linalg.norm(robot.gizmo() - robot.drawn()[:3, 3]))
             return f"{1e3 * gap:.0f} mm out of reach" in robot.text()
 
-        page.wait_until(told, "how far the arm ends from the handle")
+        page.wait_until(explained, "the distance of the arm from the handle")
         page.keep(artefacts / "app-out-of-reach.png")
-    # Let go, the handle comes back to the tool, and the reason stays to be read.
+    # After the release the handle returns to the tool, and the reason remains.
     page.wait_until(
         lambda: np.allclose(robot.gizmo(), robot.drawn()[:3, 3], atol=1e-5), "the handle to return"
     )
@@ -261,7 +264,7 @@ def test_out_of_reach_the_ghost_the_colour_and_a_sentence_tell(
     ]
     assert GHOST_COLOURS[Status.LIMITED] in colours
     assert ghost_is_shown(robot)
-    # At the goal, with the reason gone, there is no ghost any more.
+    # At the goal the reason and the ghost disappear.
     go_home(robot)
     page.wait_until(lambda: not ghost_is_shown(robot), "the ghost to go")
     assert "On target" in robot.text()
@@ -272,14 +275,14 @@ def ghost_is_shown(robot: Robot) -> bool:
     return bool(last.body["visible"])
 
 
-def test_before_the_table_the_arm_stops_says_why_and_is_tinted(
+def test_arm_stops_before_the_table_with_reason_and_warning_colour(
     robot: Robot, artefacts: Path
 ) -> None:
     robot.page.drag_slider("Axis 2", 5.0)
     robot.page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
-    said = robot.text()
-    assert "finger and table" in said
-    finger = "left" if "Left" in said else "right"
+    reason = robot.text()
+    assert "finger and table" in reason
+    finger = "left" if "Left" in reason else "right"
     coat = f"{robot.path[f'finger_{finger}_link']}/contact0"
     robot.page.node_pose(coat)
     robot.page.wait_drawn()
@@ -290,7 +293,7 @@ def test_before_the_table_the_arm_stops_says_why_and_is_tinted(
     assert not last.body["visible"]
 
 
-def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None:
+def test_typed_pose_reports_the_impossible_yaw(robot: Robot) -> None:
     page = robot.page
     for label, values in (("x, y, z", (350.0, 0.0, 0.0)), ("r, p, y", (0.0, 30.0, 23.0))):
         for index, value in enumerate(values):
@@ -304,7 +307,7 @@ def test_a_typed_pose_says_which_yaw_five_axes_cannot_give(robot: Robot) -> None
     assert f"{off:.0f}° off" in robot.text()
 
 
-def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(
+def test_browsers_show_the_same_arm_and_drive_it_in_turn(
     robot: Robot, server: AppServer, open_page: OpenPage
 ) -> None:
     other = Robot(open_page(server.url, nodes=("/arm", MOVE)))
@@ -312,23 +315,23 @@ def test_every_browser_sees_the_same_arm_and_may_move_it_by_turns(
     robot.settle()
     other.settle()
     assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
-    # Who does not hold the arm moves nothing, and the handle comes back.
+    # A person without the lease moves nothing, and the handle returns.
     other.page.drag_arrow(MOVE, "z", 0.05)
     other.page.wait_until(
         lambda: np.allclose(other.gizmo(), robot.gizmo(), atol=1e-5), "the handle to come back"
     )
     other.settle()
-    robot.page.press_in_bar("Let go")
+    robot.page.press_in_bar("Release")
     other.page.drag_arrow(MOVE, "z", 0.05)
     other.settle()
     robot.settle()
-    other.page.press_in_bar("Let go")
+    other.page.press_in_bar("Release")
     assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
     assert other.page.errors == []
 
 
 def come_back(robot: Robot, server: AppServer) -> None:
-    """Start the server anew, wait for the page, and see that nothing of the old motion is left."""
+    """Restart the server, wait for the page, and check that the old motion has ended."""
     robot.page.wait_lost()
     robot.since = time.time()
     server.restart()
@@ -339,7 +342,7 @@ def come_back(robot: Robot, server: AppServer) -> None:
 
 
 @pytest.mark.long
-def test_killed_in_mid_drag_the_app_comes_back_whole_and_at_rest(open_page: OpenPage) -> None:
+def test_app_killed_during_a_drag_restarts_at_rest(open_page: OpenPage) -> None:
     with AppServer() as server:
         robot = Robot(open_page(server.url, nodes=("/arm", MOVE)))
         robot.page.drag_slider("Axis 1", 70.0)

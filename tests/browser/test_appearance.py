@@ -1,4 +1,4 @@
-"""Cameras and themes: what is seen changes in one window, and nothing else changes."""
+"""Cameras and themes change only the display of one window."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ MOVE = "/target/move"
 
 
 def seen_from(page: ViserPage) -> tuple[FloatArray, FloatArray]:
-    """Where the camera stands and where it looks, in the base frame."""
-    told = page.sent("ViewerCameraMessage")[-1].body
-    return np.array(told["position"]), np.array(told["look_at"])
+    """Return position and target of the camera in the base frame [m]."""
+    view = page.sent("ViewerCameraMessage")[-1].body
+    return np.array(view["position"]), np.array(view["look_at"])
 
 
 def wait_for_look(page: ViserPage, position: FloatArray, target: FloatArray) -> None:
@@ -38,7 +38,7 @@ def wait_for_look(page: ViserPage, position: FloatArray, target: FloatArray) -> 
 
 @pytest.fixture(scope="module")
 def pair(windows: Windows) -> Iterator[tuple[ViserPage, ViserPage]]:
-    """Two windows of one server."""
+    """Return two windows of one server."""
     with (
         AppServer() as server,
         windows.open(server.url, nodes=("/arm", MOVE)) as page,
@@ -72,7 +72,7 @@ def test_each_window_looks_from_where_its_person_asks(
         lambda: np.allclose(seen_from(page)[1], on_tool(np.zeros(5)), atol=1e-3),
         "the camera to ride along",
     )
-    # The handle of the stretched arm would be cut off at the edge: the same way, from farther off.
+    # The gizmo of the stretched arm would be cut off: same direction, from farther away.
     page.click_button(Preset.SIDE.value)
     side = np.array(CAMERA_POSES[Preset.SIDE].position)
 
@@ -113,7 +113,7 @@ def test_a_window_is_as_its_system_until_its_person_chooses(
     chose, other = pair
 
     def themes(window: ViserPage) -> tuple[str, str]:
-        """Of the page, and of viser's in it."""
+        """Return the theme of the page and that of viser's page in it."""
         return (
             window.page.evaluate("() => document.documentElement.dataset.theme"),
             window.frame.evaluate("() => document.documentElement.dataset.mantineColorScheme"),

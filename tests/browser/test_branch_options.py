@@ -1,4 +1,4 @@
-"""Branches, readings and the velocity ellipsoid through the page."""
+"""Branches, priorities and the velocity ellipsoid on the page."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
         yield page
 
 
-def test_a_person_looks_at_the_branches_and_takes_one(
+def test_branches_are_shown_and_one_is_taken(
     page: ViserPage, arm: MountedArm, artefacts: Path
 ) -> None:
     chain = arm.chain
@@ -48,7 +48,7 @@ def test_a_person_looks_at_the_branches_and_takes_one(
     def now(key: str) -> str:
         return page.text_of(f".k450 [data-now={key}]")
 
-    # At rest: the read-out says how near the next singularity and limit are.
+    # At rest the read-out shows the distances to singularity and limit.
     distances = limit_distances(chain, READY)
     axis = int(distances.argmin())
     assert now("limit") == limit_text(axis, distances[axis])
@@ -69,7 +69,7 @@ def test_a_person_looks_at_the_branches_and_takes_one(
         (arm.T_base_shoulder @ forward(chain, READY))[:3, 3],
         atol=1e-5,
     )
-    # Looking moved nothing.
+    # The view of the branches moved nothing.
     assert [page.slider_value(f"Axis {i}") for i in range(1, 6)] == [
         round(math.degrees(angle), 6) for angle in READY
     ]
@@ -83,17 +83,17 @@ def test_a_person_looks_at_the_branches_and_takes_one(
 
 
 def moves(server: AppServer) -> bool:
-    """Whether the arm moves, or a way for it is being worked out."""
-    told = json.loads(ask(f"{server.url}/api/v1/state", Cookie=enter(server.url))[2])
-    return bool(told["moving"])
+    """Return whether the arm moves or plans a motion."""
+    state = json.loads(ask(f"{server.url}/api/v1/state", Cookie=enter(server.url))[2])
+    return bool(state["moving"])
 
 
-def test_a_person_clicks_the_ghost_of_a_branch(
+def test_click_on_a_ghost_takes_its_branch(
     page: ViserPage, server: AppServer, artefacts: Path
 ) -> None:
     page.click_button("Home")
     page.wait_until(lambda: page.slider_value("Axis 3") > 0.0, "the sliders at home")
-    # Told together with the sliders: by now it does not say so of the posture before.
+    # Sent together with the sliders, so it now belongs to the new posture.
     page.wait_until(lambda: "On target" in page.panel_text(), "the arm at home", seconds=20.0)
     page.choose("Ghosts", "front-down")
     elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
@@ -102,12 +102,12 @@ def test_a_person_clicks_the_ghost_of_a_branch(
     before = page.slider_value("Axis 3")
 
     def clicked() -> bool:
-        # A browser without time for it loses a click, and a person clicks again.
+        # An overloaded browser can lose a click, so click again.
         page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
         page.page.wait_for_timeout(3000)
         return moves(server) or page.slider_value("Axis 3") * before < 0.0
 
-    page.wait_until(clicked, "the click to be heard", seconds=40.0)
+    page.wait_until(clicked, "the effect of the click", seconds=40.0)
     page.wait_until(
         lambda: page.slider_value("Axis 3") * before < 0.0, "the other elbow", seconds=30.0
     )

@@ -1,4 +1,4 @@
-"""The two demos as a person runs them: chosen in the panel, looked at, run, stopped, taken over."""
+"""The two demos on the page: chosen in the panel, previewed, run, stopped and taken over."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.long
 MOVE = "/target/move"
 CIRCLE, POUR = "Circle with gripper", "Pour"
 WATER = 200.0
-"""[ml] In the cup at first."""
+"""Initial amount of water in the cup [ml]."""
 
 LINE = """(name) => {
     let starts = null;
@@ -35,7 +35,7 @@ LINE = """(name) => {
 
 
 class Stage:
-    """A page with the panel of programs open, and what the server itself says."""
+    """A page with the panel of programs open, and the state of its server."""
 
     def __init__(self, page: ViserPage, arm: Client) -> None:
         self.page = page
@@ -54,16 +54,16 @@ class Stage:
         return state
 
     def wait_for(self, status: str) -> answers.State:
-        """Until the program is so."""
+        """Wait until the program has this progress."""
         return self.wait(lambda state: program(state).status == status)
 
     def shown(self, node: str) -> bool:
-        """Whether the server has the page show it."""
-        said = self.page.messages("SetSceneNodeVisibilityMessage", node=node, last=1)
-        return bool(said) and bool(said[0].body["visible"])
+        """Return whether the server has made the node visible."""
+        sent = self.page.messages("SetSceneNodeVisibilityMessage", node=node, last=1)
+        return bool(sent) and bool(sent[0].body["visible"])
 
     def line(self, node: str) -> FloatArray:
-        """(N, 3) [m] where the pieces of a line begin, as they are drawn."""
+        """Return the first points (N, 3) [m] of the drawn pieces of a line."""
         self.page.wait_drawn()
         return np.array(self.page.frame.evaluate(LINE, node)).reshape(-1, 3)
 
@@ -73,7 +73,7 @@ def program(state: answers.State) -> answers.Progress:
 
 
 def at_rest(stage: Stage) -> FloatArray:
-    """The joints of an arm that stands, looked at for a while."""
+    """Return the joint angles after a check that the arm rests for some time."""
     before = stage.wait(lambda state: not state.moving and max(map(abs, state.qd)) == 0.0)
     time.sleep(0.3)
     after = stage.arm.query(answers.State)
@@ -92,9 +92,7 @@ def stage(windows: Windows) -> Iterator[Stage]:
         assert page.errors == []
 
 
-def test_a_circle_is_looked_at_run_and_traced(
-    stage: Stage, arm: MountedArm, artefacts: Path
-) -> None:
+def test_circle_is_previewed_run_and_traced(stage: Stage, arm: MountedArm, artefacts: Path) -> None:
     page = stage.page
     page.choose("Script", CIRCLE)
     page.click_button("Preview")
@@ -118,7 +116,7 @@ def test_a_circle_is_looked_at_run_and_traced(
     away = stage.line("/path/traced") - centre[:3]
     assert np.abs(np.linalg.norm(away, axis=1) - 0.1).max() < 1e-5
     assert np.abs(away[:, 0]).max() < 1e-5
-    # All round, however few pictures a busy machine draws.
+    # The whole circle, even if a busy machine draws few frames.
     quarters = np.floor(2.0 / np.pi * np.arctan2(away[:, 2], away[:, 1]))
     assert len(np.unique(quarters)) == 4
 
@@ -133,7 +131,7 @@ def test_the_arm_is_taken_from_a_program(stage: Stage) -> None:
     assert stage.arm.query(answers.State).holder != program(state).name
 
 
-def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -> None:
+def test_water_is_kept_after_a_stop_during_a_pour(stage: Stage, artefacts: Path) -> None:
     def water() -> answers.Water:
         found = stage.arm.query(answers.State).water
         assert found is not None
@@ -155,7 +153,7 @@ def test_stop_in_mid_pour_and_the_water_behaves(stage: Stage, artefacts: Path) -
     assert "STOP" in program(state).why
     assert state.stopped is not None
     stopped = at_rest(stage)
-    # What the tilt cannot hold still runs out, and lands.
+    # Water that the tilted cup cannot hold still runs out and lands.
     stage.wait(lambda state: state.water is not None and state.water.air_ml == 0.0)
     time.sleep(0.3)
     after = water()
@@ -185,7 +183,7 @@ def test_the_whole_pour(open_page: OpenPage, artefacts: Path) -> None:
         assert state.water is not None
         assert state.water.basin_ml >= 0.99 * WATER
         assert state.water.spilled_ml == 0.0
-        # Until it is poured on purpose the surface comes to the lip from below.
+        # Before the intended pour, the surface reaches the lip from below.
         assert least >= 0.0
         assert state.holder is None
         stage.page.screenshot(artefacts / "demo-poured.png")

@@ -13,7 +13,7 @@ from katana450.settings import Settings
 from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import Truth, clear_stop, prepare
+from tests.browser.session import Truth, clear_stop, prepare
 
 MOVE = "/target/move"
 READY = Settings().ready
@@ -39,7 +39,7 @@ def window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
 
 @pytest.fixture
 def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
-    """A window whose person drives, the arm at home and no box in focus."""
+    """Return a window whose person drives, with the arm in the ready posture and no box focused."""
     window.frame.evaluate("() => document.activeElement.blur()")
     prepare(window, truth)
     yield window
@@ -47,7 +47,7 @@ def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
 
 
 class Watch:
-    """Counts what the page sends to the panel's controls."""
+    """Records the values that the page sends for controls."""
 
     def __init__(self, page: ViserPage) -> None:
         self._page = page
@@ -58,14 +58,14 @@ class Watch:
 
     @property
     def sent(self) -> list[object]:
-        """The values sent since the watch began."""
+        """Return the values sent since the start of the watch."""
         self._page.page.wait_for_timeout(BETWEEN_KEYS)
         newer = self._page.sent("GuiUpdateMessage")[self._before :]
         return [each.body["updates"]["value"] for each in newer]
 
 
 def type_slowly(page: ViserPage, box: Locator, text: str) -> None:
-    """Replace what the box holds, key by key, as a person does."""
+    """Replace the text of the box key by key, as a person does."""
     box.click()
     box.press("Control+a")
     for key in text:
@@ -74,7 +74,7 @@ def type_slowly(page: ViserPage, box: Locator, text: str) -> None:
 
 
 def first_joint(truth: Truth) -> float:
-    """The first joint of the arm [deg], as the server says."""
+    """Return the first joint angle [deg] from the server."""
     return math.degrees(truth.status()["q"][0])
 
 
@@ -116,7 +116,7 @@ def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth
     box.press("Enter")
     page.wait_until(lambda: "500 is not between -173.35 and 165.65" in toast(page), "the reason")
     assert watch.sent == []
-    # One key less is a value that the axis can have.
+    # With one digit less the value is in the range.
     box.press("Backspace")
     assert not marked(box)
     type_slowly(page, box, "5-0")
@@ -134,7 +134,7 @@ def test_leaving_the_box_sends_the_value(page: ViserPage) -> None:
     type_slowly(page, page.number_box("Axis 1"), "12.5")
     page.page.keyboard.press("Tab")
     assert watch.sent == [12.5]
-    # What is typed counts before the button pressed next.
+    # The typed value is sent before the effect of the next button.
     type_slowly(page, page.number_box("Speed"), "60")
     page.click_button("Home")
     assert watch.sent == [12.5, 60, "Home"]
@@ -148,7 +148,7 @@ def test_escape_restores_the_value_and_stops_the_arm(page: ViserPage, truth: Tru
     box.press("Escape")
     assert box.input_value() == home
     truth.wait(mood="stopped")
-    # A value typed and not sent must not follow Clear stop.
+    # A typed value that was not sent must not be sent after Clear stop.
     type_slowly(page, box, "40")
     clear_stop(page, truth)
     page.wait_until(lambda: box.input_value() == home, "the value of before")
@@ -171,7 +171,7 @@ def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
     assert box.input_value() == "165.65"
     type_slowly(page, box, "20.05")
     box.press("Enter")
-    # The buttons beside a box go on from what is typed.
+    # The buttons beside a box start from the typed value.
     box = page.number_box("x, y, z")
     type_slowly(page, box, "400")
     page.frame.locator("[data-direction=up]").first.click()
@@ -180,7 +180,7 @@ def test_arrow_keys_step_the_typed_value(page: ViserPage) -> None:
 
 
 def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
-    """A screen reader types as a person does, or sets the value without the focus."""
+    """Assistive technology types as a person does, or sets the value without the focus."""
     for label, index, text in (("Gripper", 0, "35"), ("Speed", 0, "70"), ("r, p, y", 2, "-12")):
         box = page.number_box(label, index=index)
         before = float(box.input_value())

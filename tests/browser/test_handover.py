@@ -1,4 +1,4 @@
-"""The arm changes hands: what the pages of those who had it, have it and want it show."""
+"""Handover of the arm: pages of the former driver, the driver and the person who requests it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
-from tests.browser.test_gateway import Truth, bar
+from tests.browser.session import Truth, bar
 
 SCRIPT = """\
 name: Wave
@@ -38,7 +38,7 @@ def run(page: ViserPage) -> None:
     page.wait_until(lambda: "Wave, step" in bar(page, "headline"), "the program", seconds=60.0)
 
 
-def test_a_program_is_ended_in_the_bar_and_its_owner_decides_who_drives_next(
+def test_program_is_ended_in_the_bar_and_its_owner_chooses_the_next_driver(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
     truth = Truth(server)

@@ -1,4 +1,4 @@
-"""The harness itself, against the barest viser app: what it drags and reads is what happens."""
+"""The harness itself, tested with a minimal viser app."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
 BOX, DIAL = "/arm/box", "/arm/dial"
 NODES = (MOVE, PITCH, ROLL, BOX, DIAL)
 START = (0.25, 0.0, 0.25)
-# A pixel of the slider is some degrees wide.
+# One pixel of the slider is several degrees.
 SLIDER_PIXEL_DEGREES = 340.0 / 100.0
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
-    """The bare app, running."""
+    """Run the minimal app."""
     with AppServer(BARE_APP) as server:
         yield server
 
 
 @pytest.fixture(scope="module")
 def window(windows: Windows, server: AppServer) -> Iterator[ViserPage]:
-    """One window on the bare app for all tests here."""
+    """Open one window of the minimal app for all tests here."""
     with windows.open(server.url, nodes=NODES) as window:
         yield window
 
 
 @pytest.fixture
 def page(window: ViserPage) -> Iterator[ViserPage]:
-    """That window, with the box at its start and no error on the console."""
+    """Return the window, with the box at its start and no error on the console."""
     page = window
     page.click_button("Reset")
     page.wait_until(
@@ -119,7 +119,7 @@ def test_a_second_window_sees_the_same_pose(
     other.wait_until(
         lambda: np.allclose(other.node_pose(BOX), pose, atol=1e-9), "the box in the second window"
     )
-    # The window that drags is not told the gizmo's pose, the other one is.
+    # Only the window that does not drag receives the gizmo's pose.
     assert other.node_pose(MOVE) == pytest.approx(page.node_pose(MOVE), abs=1e-9)
     assert other.last_pose(MOVE)[2, 3] == pytest.approx(START[2] + 0.04, abs=1e-3)
 
@@ -150,7 +150,7 @@ def test_the_box_is_drawn_where_it_is_projected(page: ViserPage, artefacts: Path
     assert page.screenshot(artefacts / "bare-app.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_page_outlives_its_server(open_page: OpenPage) -> None:
+def test_page_reconnects_after_a_restart_of_its_server(open_page: OpenPage) -> None:
     with AppServer(BARE_APP) as server:
         page = open_page(server.url, nodes=NODES)
         with page.grip_arrow(MOVE, "z") as grip:
@@ -166,7 +166,7 @@ def test_a_page_outlives_its_server(open_page: OpenPage) -> None:
         assert page.page.get_by_role("button", name="Reset").count() == 1
 
 
-def test_what_is_not_there_is_named(page: ViserPage) -> None:
+def test_missing_parts_are_named(page: ViserPage) -> None:
     with pytest.raises(AssertionError, match="missing: /nowhere"):
         page.wait_ready(["/nowhere"], seconds=0.2)
     with pytest.raises(PlaywrightError, match=r"has no ring z; it has: ring y"):
@@ -196,7 +196,7 @@ def test_a_wrong_browser_in_the_environment_is_named(monkeypatch: pytest.MonkeyP
 
 @pytest.fixture
 def bare_path(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """An empty folder that is the whole PATH, on a machine without a browser."""
+    """Set PATH to an empty folder, as on a machine without a browser."""
     monkeypatch.delenv(chromium.ENVIRONMENT_VARIABLE, raising=False)
     monkeypatch.setattr(chromium, "APPLICATIONS", ())
     monkeypatch.setenv("PATH", str(tmp_path))

@@ -1,15 +1,12 @@
-"""The front panel in a real browser: knobs, gauges, plots, and where they stand."""
+"""The instruments in a real browser: knobs, gauges, plots and their layout."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -18,9 +15,22 @@ from playwright.sync_api import Browser
 from katana450.client import connect
 from katana450.server.api import answers, requests
 from tests.browser.conftest import OpenPage
+from tests.browser.instruments import (
+    arrange,
+    card,
+    dial,
+    goal,
+    middle,
+    places,
+    reload,
+    show,
+    slowly,
+    table,
+    turn,
+)
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import MOVE, THIN, Truth, bar, clear_stop, take
+from tests.browser.session import MOVE, THIN, Truth, bar, clear_stop, take
 from tests.gateway.slow_link import SlowLink
 
 KEPT = "katana450.instruments"
@@ -41,7 +51,7 @@ def truth(server: AppServer) -> Truth:
 
 @pytest.fixture(scope="module")
 def window(server: AppServer, browser: Browser) -> Iterator[ViserPage]:
-    """Our own page alone: without viser in its frame it is quick."""
+    """Open only our own page, which is fast without viser in its frame."""
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     context.route("**/viser/**", lambda route: route.abort())
     window = context.new_page()
@@ -54,7 +64,7 @@ def window(server: AppServer, browser: Browser) -> Iterator[ViserPage]:
 
 @pytest.fixture
 def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
-    """Its person drives, its panel is open, and the arm rests."""
+    """Return the page of a driver with open instruments and the arm at rest."""
     take(window)
     if truth.status()["stopped"] is not None:
         clear_stop(window, truth)
@@ -64,76 +74,9 @@ def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
     assert window.errors == []
 
 
-@contextmanager
-def slowly(page: ViserPage, truth: Truth) -> Iterator[None]:
-    """The arm is slow enough for a browser that draws without a graphics card."""
-    speed = dial(page, "speed")
-    speed.focus()
-    for key, wanted in (("PageDown", 0.05), ("PageUp", 1.0)):
-        while truth.status()["speed"] != pytest.approx(wanted):
-            page.page.keyboard.press(key)
-            page.page.wait_for_timeout(60)
-        if wanted < 1.0:
-            yield
-            speed.focus()
-
-
-def show(page: ViserPage, wanted: bool) -> None:
-    button = page.page.locator("#instruments-button")
-    if (button.get_attribute("aria-expanded") == "true") != wanted:
-        button.click()
-    if wanted:
-        page.page.wait_for_function(
-            "() => document.querySelector('.knob .goal')?.textContent.endsWith('°')"
-        )
-
-
-def card(page: ViserPage, name: str) -> Any:
-    found = page.page.locator(f"#instruments .card[data-id={name}]")
-    found.scroll_into_view_if_needed()
-    return found
-
-
-def dial(page: ViserPage, name: str) -> Any:
-    return card(page, name).get_by_role("slider")
-
-
-def goal(page: ViserPage, name: str) -> float:
-    """What a knob points at, in its own unit."""
-    return float(dial(page, name).get_attribute("aria-valuenow") or "nan")
-
-
-def middle(found: Any) -> tuple[float, float, float]:
-    """Of an element in the window, and half its width [px]."""
-    box = found.bounding_box()
-    assert box is not None
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
-
-
-def turn(page: ViserPage, name: str, degrees: float) -> None:
-    """Take a knob at the top and go round it clockwise."""
-    x, y, radius = middle(dial(page, name))
-    mouse = page.page.mouse
-    for step in range(11):
-        angle = math.radians(degrees * step / 10)
-        mouse.move(x + 0.7 * radius * math.sin(angle), y - 0.7 * radius * math.cos(angle))
-        if step == 0:
-            mouse.down()
-    mouse.up()
-
-
-def table(page: ViserPage, name: str) -> dict[str, Any]:
-    """What a plot shows, as it is saved: a column by its heading."""
-    with page.page.expect_download() as told:
-        card(page, name).get_by_role("button", name="as CSV").click()
-    assert told.value.suggested_filename == f"katana450-{name}.csv"
-    heading, *rows = csv.reader(io.StringIO(Path(told.value.path()).read_text(encoding="utf-8")))
-    return dict(zip(heading, np.array(rows, float).T, strict=True))
-
-
 def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, truth: Truth) -> None:
     start = goal(page, "axis-1")
-    # A mere touch moves nothing, nor does a wheel that scrolls past.
+    # A mere touch and a scroll past the knob move nothing.
     x, y, _ = middle(dial(page, "axis-1"))
     page.page.mouse.click(x + 20, y + 20)
     page.page.focus("#stop")
@@ -155,12 +98,12 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     assert t[-1] > early["t [s]"][-1] + 0.5
     assert (np.diff(t) > 0.0).all()
     assert angle[-1] == pytest.approx(there, abs=0.01)
-    # It was on its way at many places, and its speeds add up to that way.
+    # The plot has many points between, and the integral of the speed is the distance.
     moving = angle[(angle > start + 1.0) & (angle < there - 1.0)]
     assert len(np.unique(moving)) > 10
     speeds = table(page, "joint-speeds")
-    way = np.trapezoid(speeds["Axis 1 [deg/s]"], speeds["t [s]"])
-    assert way == pytest.approx(there - start, rel=0.1)
+    distance = np.trapezoid(speeds["Axis 1 [deg/s]"], speeds["t [s]"])
+    assert distance == pytest.approx(there - start, rel=0.1)
 
 
 def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -> None:
@@ -171,7 +114,7 @@ def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -
     keyboard.press("ArrowRight")
     keyboard.press("Shift+ArrowDown")
     assert goal(page, "axis-5") == pytest.approx(start + 10.9, abs=1e-6)
-    # No single key sends the arm to a limit.
+    # No single key moves the arm to a limit.
     keyboard.press("End")
     page.page.mouse.move(*middle(dial(page, "axis-5"))[:2])
     page.page.mouse.wheel(0, 100)
@@ -194,18 +137,18 @@ def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -
 def test_knob_of_a_spectator_springs_back_with_the_reason(
     page: ViserPage, server: AppServer, truth: Truth
 ) -> None:
-    page.press_in_bar("Let go")
+    page.press_in_bar("Release")
     with connect(server.url, "Octave") as other:
         other.ask(requests.Acquire())
         page.wait_until(lambda: bar(page, "holder") == "Octave drives", "who drives")
-        # A program is no window.
+        # A program counts as connected, although it has no page.
         assert bar(page, "name").endswith(", 2 connected")
         before = goal(page, "axis-2")
         turn(page, "axis-2", -30.0)
         page.wait_until(lambda: bar(page, "toast") == "Octave holds the arm: ask for it.", "why")
         page.wait_until(lambda: goal(page, "axis-2") == before, "the knob to spring back")
         assert not other.query(answers.State).moving
-        # It shows what the other one does.
+        # The knob follows the driver.
         other.ask(requests.Joint(axis=2, value=math.radians(before + 5.0)))
         page.wait_until(
             lambda: goal(page, "axis-2") == pytest.approx(before + 5.0, abs=0.02), "the goal"
@@ -215,7 +158,7 @@ def test_knob_of_a_spectator_springs_back_with_the_reason(
 
 
 @pytest.mark.parametrize("key", ["Space", "Escape"])
-def test_stop_is_stop_on_a_knob_too(page: ViserPage, truth: Truth, key: str) -> None:
+def test_stop_keys_work_on_a_knob(page: ViserPage, truth: Truth, key: str) -> None:
     pause = page.page.locator("#instruments .toolbar").get_by_role("button", name="Pause")
     with slowly(page, truth):
         turn(page, "axis-1", -60.0)
@@ -230,24 +173,24 @@ def test_stop_is_stop_on_a_knob_too(page: ViserPage, truth: Truth, key: str) -> 
         rests = math.degrees(truth.status()["q"][0])
         assert rests > desired + 5.0
         page.wait_until(lambda: goal(page, "axis-1") == pytest.approx(rests, abs=0.1), "the knob")
-        # On a button too, which is not pressed by it.
+        # Also with the focus on a button, which is not pressed by the key.
         pause.focus()
         page.page.keyboard.press(key)
         assert pause.get_attribute("aria-pressed") == "false"
         clear_stop(page, truth)
 
 
-def test_gauges_say_what_the_server_says(page: ViserPage, truth: Truth) -> None:
+def test_gauges_show_the_values_of_the_server(page: ViserPage, truth: Truth) -> None:
     def shows(name: str) -> float:
         meter = card(page, name).get_by_role("meter").first
         return float(meter.get_attribute("aria-valuenow") or "nan")
 
     page.wait_until(lambda: shows("tool-speed") == 0.0, "rest")
-    told = truth.status()["margins"]
-    assert shows("clearance") == pytest.approx(1e3 * told["clearance"], abs=1e-3)
-    assert shows("limit") == pytest.approx(math.degrees(told["limit"]), abs=1e-3)
-    assert shows("singular") == pytest.approx(told["smallest_singular_value"], abs=1e-3)
-    assert f"axis {told['axis']}" in card(page, "limit").inner_text()
+    margins = truth.status()["margins"]
+    assert shows("clearance") == pytest.approx(1e3 * margins["clearance"], abs=1e-3)
+    assert shows("limit") == pytest.approx(math.degrees(margins["limit"]), abs=1e-3)
+    assert shows("singular") == pytest.approx(margins["smallest_singular_value"], abs=1e-3)
+    assert f"axis {margins['axis']}" in card(page, "limit").inner_text()
     with slowly(page, truth):
         turn(page, "axis-1", 60.0)
         page.wait_until(lambda: shows("tool-speed") > 5.0, "the tool to move")
@@ -256,7 +199,7 @@ def test_gauges_say_what_the_server_says(page: ViserPage, truth: Truth) -> None:
     page.wait_until(lambda: shows("tool-speed") == 0.0, "the tool to rest")
 
 
-def test_a_plot_is_read_paused_and_sleeps_while_it_is_closed(page: ViserPage, truth: Truth) -> None:
+def test_plot_can_be_read_and_paused_and_stops_while_closed(page: ViserPage, truth: Truth) -> None:
     turn(page, "axis-1", 30.0)
     truth.wait(10.0, mood="ok")
     toolbar = page.page.locator("#instruments .toolbar")
@@ -272,7 +215,7 @@ def test_a_plot_is_read_paused_and_sleeps_while_it_is_closed(page: ViserPage, tr
     assert box is not None
     read = card(page, "joint-angles").get_by_role("button", name="Axis 1").locator("output")
     for back in (0.3, 1.0, 2.0):
-        # The drawing stands off the canvas by 42 px on the left and 8 on the right.
+        # The drawing has margins of 42 px on the left and 8 px on the right.
         x = box["width"] - 8.0 - (box["width"] - 50.0) * back / 10.0
         canvas.hover(position={"x": x, "y": 40.0})
         nearest = np.abs(kept["t [s]"] - kept["t [s]"][-1] + back).argmin()
@@ -289,26 +232,7 @@ def test_a_plot_is_read_paused_and_sleeps_while_it_is_closed(page: ViserPage, tr
     assert np.median(np.diff(kept["t [s]"])) < 0.06
 
 
-def places(page: ViserPage) -> list[tuple[str, str]]:
-    """The shown cards in their order, with their sizes."""
-    found: list[list[str]] = page.page.evaluate(
-        """() => [...document.querySelectorAll("#instruments .card:not([hidden])")]
-          .map((card) => [card.dataset.id, card.dataset.size])"""
-    )
-    return [(name, size) for name, size in found]
-
-
-def arrange(page: ViserPage) -> None:
-    page.page.locator("#instruments .toolbar").get_by_role("button", name="Arrange").click()
-
-
-def reload(page: ViserPage) -> None:
-    """The panel opens by itself, as it was left."""
-    page.page.reload()
-    page.page.wait_for_selector("#instruments .card")
-
-
-def test_a_layout_is_arranged_by_hand_and_keys_and_outlives_the_page(page: ViserPage) -> None:
+def test_layout_is_arranged_by_mouse_and_keys_and_kept(page: ViserPage) -> None:
     first, elbow = places(page), goal(page, "axis-3")
     arrange(page)
     keyboard = page.page.keyboard
@@ -325,7 +249,7 @@ def test_a_layout_is_arranged_by_hand_and_keys_and_outlives_the_page(page: Viser
     mouse.down()
     mouse.move(*middle(card(page, "axis-2"))[:2], steps=6)
     mouse.up()
-    # While it is arranged no knob turns.
+    # In arrange mode no knob turns.
     turn(page, "axis-3", 40.0)
     arrange(page)
     after = places(page)
@@ -361,12 +285,12 @@ BROKEN = (
 )
 
 
-def test_a_broken_layout_is_mended(page: ViserPage) -> None:
+def test_damaged_layout_is_repaired(page: ViserPage) -> None:
     first = places(page)
     for kept in BROKEN:
         page.page.evaluate("([key, text]) => localStorage.setItem(key, text)", [KEPT, kept])
         reload(page)
-        # The last one's first place makes sense in part.
+        # The first place of the last layout is partly valid.
         wanted = first if kept is not BROKEN[-1] else [("speed", "small"), *first]
         assert places(page) == list(dict.fromkeys(wanted))
     page.page.evaluate("(key) => localStorage.removeItem(key)", KEPT)
@@ -374,7 +298,7 @@ def test_a_broken_layout_is_mended(page: ViserPage) -> None:
     assert places(page) == first
 
 
-def test_a_thin_line_shows_few_states_but_no_old_ones(
+def test_slow_connection_shows_few_but_no_old_states(
     server: AppServer, truth: Truth, page: ViserPage, browser: Browser
 ) -> None:
     context = browser.new_context()
@@ -391,7 +315,7 @@ def test_a_thin_line_shows_few_states_but_no_old_ones(
         there = goal(page, "axis-1")
         far.wait_until(lambda: goal(far, "axis-1") == pytest.approx(there, abs=0.01), "the knob")
         assert far.page.inner_text("#instruments .age") == "Live"
-        # What it asks for leaves room for STOP.
+        # The queries leave room for STOP.
         far.page.click("#stop")
         assert truth.wait(2.0, mood="stopped") < 1.0
         line.rate = 1e9
@@ -399,7 +323,7 @@ def test_a_thin_line_shows_few_states_but_no_old_ones(
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_it_fits(page: ViserPage, artefacts: Path, size: str) -> None:
+def test_instruments_fit_the_page(page: ViserPage, artefacts: Path, size: str) -> None:
     before = page.page.viewport_size
     assert before is not None
     width, height = SIZES[size]
@@ -423,7 +347,7 @@ def test_it_fits(page: ViserPage, artefacts: Path, size: str) -> None:
 
 
 @pytest.mark.long
-def test_sliders_and_theme_of_visers_page_go_with_it(
+def test_instruments_follow_sliders_and_theme_of_visers_page(
     server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE))

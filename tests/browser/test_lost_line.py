@@ -1,4 +1,4 @@
-"""A page whose server is killed, whose line falls silent, or that is reloaded in mid-drag."""
+"""A page after the loss of its server, with a silent connection, or reloaded during a drag."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from playwright.sync_api import Route
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import ATTENTIVE_APP, AppServer
+from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, take
 from tests.browser.test_app import Robot
-from tests.browser.test_gateway import MOVE, Truth, bar, camera, clear_stop, take
 from tests.gateway.slow_link import SlowLink
 
 
@@ -32,21 +32,21 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         server.kill()
         killed = time.monotonic()
         page.page.wait_for_selector("#banner.lost")
-        told = time.monotonic() - killed
+        noticed = time.monotonic() - killed
         page.keep(artefacts / "gateway-lost.png")
-        assert "No line" in bar(page, "link")
-        assert bar(page, "headline") == "Out of touch"
-        assert told < 1.0
+        assert "Offline" in bar(page, "link")
+        assert bar(page, "headline") == "No connection"
+        assert noticed < 1.0
         robot.since = time.time()
         server.restart()
         back = time.monotonic()
         page.page.wait_for_selector("#banner", state="hidden")
         page.wait_until(lambda: page.connected, "viser to come back")
-        page.wait_until(lambda: bar(page, "headline") != "Out of touch", "the state to be told")
-        print(f"told after {told:.2f} s, back after {time.monotonic() - back:.2f} s")
+        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
+        print(f"noticed after {noticed:.2f} s, back after {time.monotonic() - back:.2f} s")
         page.wait_ready(("/arm", MOVE))
         robot.settle()
-        # viser starts from its first view, and the camera is brought back from there.
+        # viser starts with its first view; then the camera is restored.
         page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
         page.page.wait_for_timeout(1500)
         assert np.allclose(camera(page), looked, atol=2e-3)
@@ -64,14 +64,14 @@ LATE_RESET = """() => {
     away ||= distance > 0.05;
     if (!away || distance > 1e-3) return;
     clearInterval(timer);
-    // viser has told by then that the camera is back.
+    // By then viser has reported the restored camera.
     setTimeout(() => {
       __viserMutable.resetCameraPose(false);
       window.wasReset = true;
     }, 300);
   }, 10);
 }"""
-"""Do once more what viser does when the scene is there, but after the camera was brought back."""
+"""Script that repeats viser's reset of the camera after the camera was restored."""
 
 
 def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
@@ -88,7 +88,7 @@ def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
         page.wait_until(lambda: page.frame.evaluate("wasReset"), "the reset", seconds=60.0)
         page.page.wait_for_timeout(2000)
         assert np.allclose(camera(page), looked, atol=2e-3)
-        # Who turns the camera then has it.
+        # A person who then turns the camera keeps that view.
         page.page.mouse.down()
         page.page.mouse.move(300, 500, steps=5)
         page.page.mouse.up()
@@ -108,8 +108,8 @@ def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) ->
         took = truth.wait(1.0, mood="stopped")
         assert "fell silent while the arm moved" in truth.status()["stopped"]
         page.page.wait_for_selector("#banner:not([hidden])", timeout=2500)
-        # What is true of a line that is only silent, and nothing shifts the scene in the hand.
-        assert bar(page, "banner") == "Nothing heard from the arm: what you see is old."
+        # The banner describes a silent connection, and nothing shifts the scene.
+        assert bar(page, "banner") == "The arm does not answer. The picture is old."
         assert scene.bounding_box() == place
         truth.wait(5.0, holder=None)
         line.cut = False
@@ -120,9 +120,9 @@ def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) ->
 
 
 def begin_drag(page: ViserPage, truth: Truth) -> None:
-    """Take the handle, with the arm on its way; the hand does not let go.
+    """Begin a drag whose mouse button stays pressed, and return once the arm moves.
 
-    A browser that is starved of its processor may be silent, and the arm stopped, before that.
+    A browser with too little processor time may exceed the heartbeat timeout before that.
     """
     for _ in range(3):
         page.grip_arrow(MOVE, "z").__enter__().sweep(0.1, 4)
@@ -136,10 +136,10 @@ def begin_drag(page: ViserPage, truth: Truth) -> None:
 
 
 SLOW = 0.05
-"""Fraction of full speed at which the arm still moves when a page is back."""
+"""Fraction of full speed at which the arm still moves after the reload."""
 
 
-def test_reload_in_mid_drag_stops_the_arm_and_says_why(
+def test_reload_during_a_drag_stops_the_arm_with_a_reason(
     open_page: OpenPage, artefacts: Path
 ) -> None:
     with AppServer(ATTENTIVE_APP) as server:
@@ -151,8 +151,8 @@ def test_reload_in_mid_drag_stops_the_arm_and_says_why(
         begin_drag(page, truth)
         name = truth.status()["holder"]
         goal = truth.status()["goal"]
-        # The hand still holds the handle: its drag never ends. The page takes longer to come back
-        # than the arm waits for it; a quicker one is no silence.
+        # The mouse button stays pressed, so the drag never ends. The page takes longer to load than
+        # the heartbeat timeout; a quicker reload does not stop the arm.
         held: list[Route] = []
 
         def hold(route: Route) -> None:
@@ -178,7 +178,7 @@ def test_reload_in_mid_drag_stops_the_arm_and_says_why(
         page.keep(artefacts / "reloaded-in-mid-drag.png")
         page.page.wait_for_timeout(1500)
         assert truth.status()["q"] == rest
-        # Clearing the stop begins no motion either.
+        # Clear stop starts no motion either.
         page.page.locator("#clear-stop").click()
         truth.wait(stopped=None)
         page.page.wait_for_timeout(1500)

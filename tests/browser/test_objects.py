@@ -1,4 +1,4 @@
-"""A file of another program comes through the page, stands before the arm, is moved and removed."""
+"""Objects from files: the page uploads a file, and the object is placed, moved and removed."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from tests.browser.server import AppServer
 MOVE = "/target/move"
 SHAPE = "/objects/3/shape"
 HANDLE = "/handles/3"
-"""Cup and basin are there before it."""
+"""The third object, after cup and basin."""
 
 
-def said(page: ViserPage) -> str:
+def sheet_text(page: ViserPage) -> str:
     return page.page.locator("#read").inner_text()
 
 
@@ -36,12 +36,16 @@ def test_an_object_is_brought_moved_changed_and_removed(
         page = open_page(server.url, nodes=("/arm", MOVE))
         page.press_in_bar("Objects")
         page.page.set_input_files("#object-file", broken)
-        page.wait_until(lambda: "broken.stl" in said(page) and "…" not in said(page), "a refusal")
+        page.wait_until(
+            lambda: "broken.stl" in sheet_text(page) and "…" not in sheet_text(page), "a refusal"
+        )
         assert page.page.locator("#read.bad").count() == 1
 
         page.page.set_input_files("#object-file", ring)
-        page.wait_until(lambda: "2304 triangles, 104 × 104 × 24 mm" in said(page), "the answer")
-        assert "taken as mm" in said(page)
+        page.wait_until(
+            lambda: "2304 triangles, 104 × 104 × 24 mm" in sheet_text(page), "the answer"
+        )
+        assert "taken as mm" in sheet_text(page)
         page.wait_ready((SHAPE,))
         np.testing.assert_allclose(place_of(page), (0.36, 0.0, 0.0), atol=1e-6)
 
@@ -55,9 +59,9 @@ def test_an_object_is_brought_moved_changed_and_removed(
         moved = place_of(page)
         np.testing.assert_allclose(moved, (0.36, 0.12, 0.0), atol=0.01)
 
-        # Another unit than the guessed one: the same object, as large as it then is.
+        # Another unit than the guessed one changes the size of the same object.
         page.page.select_option("#unit", "cm")
-        page.wait_until(lambda: "1040 × 1040 × 240 mm" in said(page), "the other unit")
+        page.wait_until(lambda: "1040 × 1040 × 240 mm" in sheet_text(page), "the other unit")
         page.wait_until(
             lambda: len(page.messages("MeshMessage", node=SHAPE)) == 2, "it in the scene"
         )

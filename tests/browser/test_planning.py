@@ -1,4 +1,4 @@
-"""Programs while they are planned, as a person at the page sees and steers them."""
+"""Programs during planning, on the page of a person who steers them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.browser.server import AppServer
 pytestmark = pytest.mark.long
 
 PLANNED = 60.0
-"""[s] In which a busy machine has planned anything here."""
+"""Timeout [s] of every plan here, on a busy machine."""
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def headline(page: ViserPage) -> str:
 
 
 def orders(page: ViserPage) -> list[str]:
-    """Labels of the buttons in the bar that steer the program."""
+    """Return the labels of the buttons in the bar that steer the program."""
     return page.page.locator("#orders button").all_inner_texts()
 
 
@@ -56,7 +56,7 @@ def press(page: ViserPage, label: str) -> None:
 
 
 def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
-    """Until the bar's headline matches ``shown``."""
+    """Wait until the bar's headline matches ``shown``."""
     page.wait_until(lambda: re.fullmatch(shown, headline(page)) is not None, shown, seconds=seconds)
 
 
@@ -81,7 +81,7 @@ def test_a_cancelled_preview_leaves_the_planner_free(page: ViserPage, artefacts:
     assert orders(page) == []
 
 
-def test_a_previewed_plan_has_one_clock_and_is_run_at_once(
+def test_previewed_plan_shows_one_duration_and_runs_immediately(
     page: ViserPage, arm: Client, artefacts: Path
 ) -> None:
     page.choose("Script", "Pour")
@@ -89,11 +89,11 @@ def test_a_previewed_plan_has_one_clock_and_is_run_at_once(
     state = wait(arm, lambda state: state.program is not None and state.program.status == "ready")
     assert state.program is not None
     page.wait_until(lambda: "of motion" in page.text_of(".k450.program"), "its length")
-    said = re.search(r"([\d.]+) s of motion", page.text_of(".k450.program"))
-    assert said is not None
+    duration = re.search(r"([\d.]+) s of motion", page.text_of(".k450.program"))
+    assert duration is not None
     thumb = page._labelled("Look at").get_by_role("slider")
     end = float(thumb.get_attribute("aria-valuemax") or 0)
-    assert float(said[1]) == pytest.approx(end)
+    assert float(duration[1]) == pytest.approx(end)
     assert state.program.seconds <= end < state.program.seconds + 0.1
     page.keep(artefacts / "planning-previewed.png")
     begun = time.monotonic()
@@ -106,7 +106,7 @@ def test_a_previewed_plan_has_one_clock_and_is_run_at_once(
     until(page, "On target", 5.0)
 
 
-def test_a_pause_while_it_is_planned_lasts_until_resume(
+def test_pause_during_planning_lasts_until_resume(
     page: ViserPage, arm: Client, artefacts: Path
 ) -> None:
     page.choose("Script", "Square")
@@ -129,7 +129,7 @@ def test_a_pause_while_it_is_planned_lasts_until_resume(
     until(page, r"Square, step \d+ of \d+", 5.0)
     wait(arm, lambda state: state.moving)
     page.keep(artefacts / "planning-running.png")
-    # Its owner paces it by every control there is.
+    # The owner can use every control that changes the pace.
     page.click_button("Pause")
     until(page, "Square, paused", 5.0)
     page.click_button("Resume")

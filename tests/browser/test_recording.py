@@ -1,4 +1,4 @@
-"""A run as a page from a file, without any network: its slider moves the arm."""
+"""A recording in one file works without a network: its slider moves the arm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.long
 PAN = "/arm/base_link/arm_base_link/pan_link"
 
 SECONDS, TURN = 4.0, 1.2
-"""Of the motion, and [rad] by which axis 1 turns in it."""
+"""Duration [s] of the motion, and angle [rad] by which axis 1 turns."""
 
 TRACK = ".mantine-Slider-trackContainer"
 
@@ -29,7 +29,7 @@ FAINTEST = """() => {
   canvas.style.opacity = '0.05';
   return getComputedStyle(canvas).opacity;
 }"""
-"""How clear the picture is while viser would have it faint."""
+"""Script that returns the opacity of the picture while viser would draw it faintly."""
 
 COUNT_IMAGES = """
   window.images = 0;
@@ -39,7 +39,7 @@ COUNT_IMAGES = """
     return made.call(URL, blob);
   };
 """
-"""Counts the pictures that are decoded; the light of the room comes as one."""
+"""Script that counts decoded images; the light of the room is one of them."""
 
 NOW = "() => Number(document.querySelector('[role=slider]').getAttribute('aria-valuenow'))"
 
@@ -61,9 +61,9 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
     options = json.dumps({"draws": False, "fullQuality": False})
     context.add_init_script(f"window.harness = {options};\n{scripts}")
     page = context.new_page()
-    asked: list[str] = []
+    requested: list[str] = []
     errors: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
+    page.on("request", lambda request: requested.append(request.url))
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:
         page.goto(f"{recording.as_uri()}?fixedDpr=0.5")
@@ -75,19 +75,19 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
             box = page.locator(TRACK).bounding_box()
             assert box is not None
             page.mouse.click(box["x"] + fraction * box["width"], box["y"] + 0.5 * box["height"])
-            # It may still take a step; then it rests.
+            # The player may still take one step; then it rests.
             page.wait_for_timeout(500)
             t = float(page.evaluate(NOW))
             assert t == pytest.approx(fraction * SECONDS, abs=0.15)
             assert pan(page) == pytest.approx(TURN * t / SECONDS, abs=0.02)
         assert not errors
-        assert all(url.startswith(("file:", "blob:", "data:")) for url in asked)
+        assert all(url.startswith(("file:", "blob:", "data:")) for url in requested)
     finally:
         context.close()
 
 
 def test_recording_keeps_its_brightness_after_seeking(browser: Browser, recording: Path) -> None:
-    """The light of the room is decoded once, and not again with every step backwards."""
+    """The light of the room is decoded only once, not after every step backwards."""
     page = browser.new_page(viewport={"width": 480, "height": 320})
     page.add_init_script(COUNT_IMAGES)
     try:
@@ -110,13 +110,13 @@ def test_recording_keeps_its_brightness_after_seeking(browser: Browser, recordin
 
 
 def brightness(page: Page) -> float:
-    """Mean of the picture of the scene, 0 to 255."""
+    """Return the mean brightness of the scene, 0 to 255."""
     shot = page.locator("canvas[data-engine]").screenshot()
     return float(np.asarray(Image.open(io.BytesIO(shot)).convert("L")).mean())
 
 
 def settled_brightness(page: Page) -> float:
-    """That of a picture that no longer changes."""
+    """Return the brightness of a picture that no longer changes."""
     last = brightness(page)
     for _ in range(60):
         page.wait_for_timeout(500)
@@ -128,7 +128,7 @@ def settled_brightness(page: Page) -> float:
 
 
 def pan(page: Page) -> float:
-    """[rad] by which axis 1 is turned on the page."""
+    """Return the angle [rad] of axis 1 on the page."""
     found = page.evaluate("name => harness.poses(name)", PAN)
     node, root = (np.reshape(found[key], (4, 4)).T for key in ("node", "root"))
     R = (np.linalg.inv(root) @ node)[:3, :3]

@@ -1,4 +1,4 @@
-"""The page at every size and in both themes: arm and gizmo are in the picture, under nothing."""
+"""The page at every size and in both themes: arm and gizmo are in the picture and uncovered."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from katana450.server.viser_bridge.themes import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import take
+from tests.browser.session import take
 from tests.gateway.slow_link import SlowLink
 
 MOVE = "/target/move"
@@ -29,20 +29,20 @@ SIZES = (WIDE, WIDER, PORTRAIT, LANDSCAPE)
 PHONE = {"has_touch": True, "is_mobile": True}
 
 MOODS = {*(status.value for status in Status), "moving", "stopped"}
-"""All that the server sends of an arm whose state is known."""
+"""All moods of an arm whose state is known."""
 
 LEAST_FINGER = 40.0
-"""Pixels of a button, across and down."""
+"""Minimum width and height of a button [px]."""
 
 PRESSABLE = """() => Object.fromEntries(
     [...document.querySelectorAll("header button, #stage button")]
         .map((each) => [each.id || each.textContent, each.getBoundingClientRect()])
         .filter(([, { width }]) => width)
         .map(([name, { x, y, width, height }]) => [name, [x, y, width, height]]))"""
-"""Place and size of all buttons of our page, in pixels."""
+"""Script that returns position and size of all buttons of our page [px]."""
 
 LEAST_CONTRAST = 3.0
-"""Of a lamp to what it lies on, as WCAG 2.2 (1.4.11) asks for."""
+"""Minimum contrast of a lamp to its background (WCAG 2.2, 1.4.11)."""
 
 SHOWN = """() => {
     // Each vertex of the arm and of the gizmo, as the camera sees it: pixels of viser's document.
@@ -85,7 +85,7 @@ NOTED = """
         shades.add(bare ? `bare ${colorScheme}` : backgroundColor);
     })();
 """
-"""Keeps what each frame of a document was drawn in."""
+"""Script that records the background colour of each frame of a document."""
 
 NIGHT = "rgb(20, 24, 29)"
 
@@ -98,7 +98,7 @@ def server() -> Iterator[AppServer]:
 
 @pytest.fixture(scope="module")
 def desk(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
-    """A window with a mouse, light at first."""
+    """Return a window with a mouse, which has the light theme first."""
     with windows.open(server.url, nodes=("/arm", MOVE), window=WIDE, own_camera=True) as page:
         yield page
         assert page.errors == []
@@ -111,7 +111,7 @@ def shown(page: ViserPage) -> dict[str, Any]:
 
 
 def whole(page: ViserPage) -> bool:
-    """Whether arm and gizmo are in the picture and nothing of either document lies over them."""
+    """Return whether arm and gizmo are in the picture and not covered by either document."""
     found = shown(page)
     assert found["count"] > 1000
     left, top, width, height = found["canvas"]
@@ -132,7 +132,7 @@ def whole(page: ViserPage) -> bool:
 
 def wait_whole(page: ViserPage, what: str) -> None:
     page.wait_until(lambda: whole(page), f"arm and gizmo in the picture {what}", seconds=15.0)
-    # It stays so.
+    # The state must last.
     page.page.wait_for_timeout(300)
     assert whole(page), what
 
@@ -143,7 +143,7 @@ def resize(page: ViserPage, size: tuple[int, int]) -> None:
 
 
 def eye(page: ViserPage) -> FloatArray:
-    """Where the camera stands, in three.js's world."""
+    """Return the camera position (3,) in three.js's world."""
     page.wait_drawn()
     return np.array(page.frame.evaluate("() => __viserMutable.camera.position.toArray()"))
 
@@ -184,7 +184,7 @@ def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     desk.page.wait_for_timeout(500)
     assert np.allclose(eye(desk), turned, atol=1e-3)
     assert not whole(desk)
-    # A view button fits again, now and at every size that follows.
+    # After a view button, the view is fitted again, also at later sizes.
     desk.frame.get_by_text("Katana450", exact=True).first.click()
     desk.page.wait_for_timeout(500)
     desk.click_button("Front")
@@ -195,9 +195,9 @@ def test_a_view_chosen_by_the_person_is_kept(desk: ViserPage) -> None:
     wait_whole(desk, "again")
 
 
-def test_every_mood_has_a_lamp_that_is_seen(desk: ViserPage) -> None:
+def test_every_mood_has_a_visible_lamp(desk: ViserPage) -> None:
     def lamp(mood: str) -> tuple[str, str]:
-        """Colours of the lamp and of what it lies on."""
+        """Return the colours of the lamp and of its background."""
         colours: list[str] = desk.page.evaluate(
             """(mood) => {
                 const kept = document.body.dataset.mood;
@@ -223,7 +223,7 @@ def test_every_mood_has_a_lamp_that_is_seen(desk: ViserPage) -> None:
 
 
 def contrast(one: str, other: str) -> float:
-    """Of two colours as CSS writes them, by WCAG 2.2."""
+    """Return the contrast ratio (WCAG 2.2) of two colours in CSS notation."""
 
     def luminance(colour: str) -> float:
         parts = [int(part) / 255 for part in colour[4:-1].split(",")]
@@ -234,7 +234,7 @@ def contrast(one: str, other: str) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
-def test_on_a_phone_by_night_and_a_slow_line_all_is_dark_and_seen_from_the_first_frame(
+def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
     with SlowLink(server.port, 1e6, delay=0.15) as line:
@@ -256,7 +256,7 @@ def test_on_a_phone_by_night_and_a_slow_line_all_is_dark_and_seen_from_the_first
         page.keep(artefacts / "phone.png")
         sky = np.median(page.scene_picture()[5:15].reshape(-1, 3), axis=0)
         assert sky.max() < max(DARK.floor) + 30
-        # Folded until a person opens it; then the scene has what is left of the height.
+        # The panel is folded until a person opens it; the scene then gets the remaining height.
         assert not in_view(page, "3D")
         page.frame.get_by_text("Katana450", exact=True).first.tap()
         page.wait_until(lambda: in_view(page, "3D"), "the panel")
@@ -268,7 +268,7 @@ def test_on_a_phone_by_night_and_a_slow_line_all_is_dark_and_seen_from_the_first
         for key in page.page.locator("#jog kbd").all():
             assert not key.is_visible()
         page.keep(artefacts / "phone-jog.png")
-        # The system changes, and so do both documents and the room.
+        # A change of the system's theme changes both documents and the room.
         page.page.emulate_media(color_scheme="light")
         page.wait_until(
             lambda: (
@@ -307,7 +307,9 @@ def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
     page.page.wait_for_selector("#clear-stop:not([hidden])")
     for opener in ("jog-button", "objects-button"):
         page.page.tap(f"#{opener}")
-        page.page.evaluate("katana.toast('Axis 2: 300 is not between -124.25 and 7.75, not sent.')")
+        page.page.evaluate(
+            "katana.toast('Axis 2: 300 is not between -124.3 and 7.8. It was not sent.')"
+        )
         page.page.wait_for_selector("#toast.shown")
         found: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
         assert {"stop", "clear-stop", opener} <= found.keys()
@@ -320,7 +322,7 @@ def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
             assert not overlap(reason, x, y, width, height), name
         assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
         page.keep(artefacts / f"finger-{size[0]}-{opener}.png")
-    # The help lies over Clear stop.
+    # The help covers Clear stop.
     page.page.tap("#help-button")
     page.page.tap("#help button")
     assert not page.page.get_by_role("dialog").is_visible()
@@ -328,13 +330,13 @@ def test_buttons_on_a_phone_are_finger_sized_and_covered_by_no_message(
 
 
 def overlap(box: FloatRect, x: float, y: float, width: float, height: float) -> bool:
-    """Whether a box and a rectangle share a pixel."""
+    """Return whether a box and a rectangle overlap."""
     across = min(box["x"] + box["width"], x + width) - max(box["x"], x)
     return across > 0 and min(box["y"] + box["height"], y + height) > max(box["y"], y)
 
 
 def overhang(page: ViserPage) -> float:
-    """How far the bar's last button is beyond the right edge of the screen, in pixels."""
+    """Return the distance [px] of the bar's last button beyond the right edge of the screen."""
     right: float = page.page.evaluate(
         "() => Math.max(...[...document.querySelector('#acts').children]"
         ".map((each) => each.getBoundingClientRect().right))"
@@ -343,7 +345,7 @@ def overhang(page: ViserPage) -> float:
 
 
 def in_view(page: ViserPage, text: str) -> bool:
-    """Whether the text in viser's document lies in the window."""
+    """Return whether the text in viser's document is in the window."""
     found = page.frame.get_by_text(text, exact=True).first
     box = found.bounding_box() if found.is_visible() else None
     size = page.page.viewport_size

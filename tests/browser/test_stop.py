@@ -1,4 +1,4 @@
-"""What the page says of a stop: requested or confirmed by the arm, and who may end it."""
+"""Stops on the page: requested or confirmed by the arm, and the persons who may clear them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.test_gateway import bar, mood, take
+from tests.browser.session import bar, mood, take
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="freezes a process")
 
@@ -55,7 +55,7 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
         wait_headline(page, "Stopped")
         assert mood(page.page) == "stopped"
     assert other.page.locator("#stop.asked").count() == 0
-    # Only who may end the stop is offered to; the other page names who can.
+    # Clear stop is offered only to a person who may use it; the other page names that person.
     assert offers_clear_stop(driver)
     assert bar(driver, "why").endswith("Nothing moves until Clear stop is pressed.")
     assert not offers_clear_stop(other)
@@ -63,8 +63,8 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
     other.keep(artefacts / "stop-of-another.png")
     driver.press_in_bar("Clear stop")
     other.wait_until(lambda: mood(other.page) == "ok", "the stop to be cleared")
-    # With nobody driving everybody here may.
-    driver.press_in_bar("Let go")
+    # Without a driver everybody here may clear the stop.
+    driver.press_in_bar("Release")
     driver.page.keyboard.press("Space")
     other.wait_until(lambda: offers_clear_stop(other), "the offer")
     other.press_in_bar("Clear stop")

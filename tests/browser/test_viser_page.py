@@ -1,4 +1,4 @@
-"""Each part of viser's page that static/viser.js relies on, tried on a real page of viser."""
+"""Each part of viser's page that static/viser.js uses, tested on a real page of viser."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from katana450.resources import STATIC
+from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage, Windows
-from tests.browser.page import Camera, ViserPage
+from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.viser_parts_app import EYE
 from tests.viser_bridge.parts import part
@@ -66,7 +67,7 @@ def server() -> Iterator[AppServer]:
 
 @pytest.fixture(scope="module")
 def page(windows: Windows, server: AppServer) -> Iterator[ViserPage]:
-    """A window of viser's page with our file in front of its own program."""
+    """Open a window of viser's page with our script before its own program."""
     with windows.open(server.url, nodes=NODES, camera=CAMERA, script=script()) as page:
         yield page
         assert page.errors == []
@@ -78,7 +79,7 @@ def ask(page: ViserPage, what: str) -> Any:
 
 
 def eye(page: ViserPage) -> list[float]:
-    """Where the camera stands, in viser's world."""
+    """Return the camera position in viser's world."""
     place: list[float] = ask(
         page,
         "Viser.viewer().camera.position.clone()"
@@ -116,14 +117,14 @@ def test_page_speaks_to_its_worker_as_the_tap_expects(page: ViserPage, server: A
         assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
         assert ask(page, "tapped.connected") == 1
         assert "ViewerCameraMessage" in ask(page, "tapped.sends")
-        # A message that is ours alone, in either direction.
+        # A message of our own, in each direction.
         (slider,) = page.messages("GuiSliderMessage")
         page.frame.evaluate(
             """(uuid) => tapped.line.say(
                 { type: "GuiUpdateMessage", uuid, updates: { value: 0.4 } })""",
             slider.body["uuid"],
         )
-        page.wait_until(lambda: abs(height(page) - 0.4) < 1e-6, "what was said to the server")
+        page.wait_until(lambda: abs(height(page) - 0.4) < 1e-6, "the message to the server")
         page.frame.evaluate(
             """() => tapped.line.show(
                 [{ type: "SetPositionMessage", name: "/box", position: [0, 0, 0.9] }])"""
@@ -273,7 +274,9 @@ def test_page_plays_the_recording_that_its_address_names(
 ) -> None:
     with part("playbackPath"):
         page = open_page(server.url, nodes=NODES, script=script())
-        asked: list[str] = []
-        page.page.on("request", lambda request: asked.append(request.url))
+        requested: list[str] = []
+        page.page.on("request", lambda request: requested.append(request.url))
         page.page.goto(f"{server.url}/?playbackPath=/run.viser")
-        page.wait_until(lambda: f"{server.url}/run.viser" in asked, "the recording to be asked for")
+        page.wait_until(
+            lambda: f"{server.url}/run.viser" in requested, "the recording to be requested"
+        )

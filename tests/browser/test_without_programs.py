@@ -1,4 +1,4 @@
-"""The page of a server without the extension ``programs``: whole, and silent about programs."""
+"""The page of a server without the extension ``programs`` works and offers no programs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from tests.browser.conftest import OpenPage
 from tests.browser.server import ATTENTIVE_APP, AppServer
-from tests.browser.test_gateway import bar, mood, take
+from tests.browser.session import bar, mood, take
 from tests.extensions.environments import without
 
 

@@ -1,4 +1,4 @@
-"""Our VRML97 in X_ITE, a VRML browser in a web page: the same silhouettes, joint by joint."""
+"""Our VRML97 files in X_ITE, a VRML browser in a web page, give the same silhouettes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TURN = """async turns => {
 
 @pytest.mark.skipif(SCRIPT is None, reason=f"{X_ITE} is not here; `make exchange` brings it")
 def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
-    """The file is opened at the first pose; then its joints are turned to the others."""
+    """Open the file at the first pose, then turn its joints to the others."""
     assert SCRIPT is not None
     script, katana = SCRIPT, load(URDF_PATH)
     page = browser.new_page(viewport={"width": SIZE, "height": SIZE})
@@ -73,6 +73,6 @@ def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
 
 
 def turns(katana: Robot, pose: tuple[float, ...]) -> dict[str, list[float]]:
-    """Axis and angle of each joint; at zero all frames of the Katana are parallel."""
+    """Return axis and angle of each joint; at zero all frames of the Katana are parallel."""
     values = katana.values(pose)
     return {name: [*joint.axis.tolist(), values[name]] for name, joint in katana.joints.items()}

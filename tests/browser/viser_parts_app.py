@@ -1,4 +1,4 @@
-"""A viser app with one of each object that our scripts touch in viser's page."""
+"""A viser app with one object of each kind that our scripts use in viser's page."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def furnish(server: viser.ViserServer) -> None:
 
 
 def main() -> None:
-    """Serve on the port asked for until interrupted."""
+    """Serve on the given port until interrupted."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, required=True)
     port = parser.parse_args().port

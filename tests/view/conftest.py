@@ -1,4 +1,4 @@
-"""A viser server that nobody has opened a page of."""
+"""A viser server without any page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import viser
 
 @pytest.fixture
 def server() -> Iterator[viser.ViserServer]:
-    """On a free port of this machine."""
+    """Open a viser server on a free port of this machine."""
     with contextlib.redirect_stdout(io.StringIO()):
         opened = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         yield opened

@@ -1,4 +1,4 @@
-"""A gate for gestures that lets everything through and remembers it."""
+"""A gesture gate that admits and records every command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ANNA = Actor(Person("anna", "Anna", Role.OPERATOR), CommandChannel.SCENE, seen=0
 
 
 class RecordedGestures:
-    """Everything is Anna's."""
+    """A gate whose actor is always Anna."""
 
     def __init__(self) -> None:
         self.commands: list[Command] = []

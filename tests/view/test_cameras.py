@@ -1,4 +1,4 @@
-"""All of the arm is in every picture, however it is posed."""
+"""The whole arm is in the picture of every camera, in every posture."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ASPECT = 1.2
 
 @pytest.fixture(scope="module")
 def postures(arm: MountedArm) -> FloatArray:
-    """(n, 5) [rad] at random, and stretched out to every side."""
+    """Return random and stretched postures (n, 5) [rad]."""
     chain = arm.chain
     stretched = [
         (pan, shoulder, 0.0, 0.0, 0.0)
@@ -30,7 +30,7 @@ def postures(arm: MountedArm) -> FloatArray:
 
 
 def points_on(robot: Robot, q: FloatArray) -> FloatArray:
-    """Points (n, 3) [m] on the arm's hulls in the base frame, the fingers wide open."""
+    """Return points (n, 3) [m] on the arm's hulls in the base frame, with open fingers."""
     T = robot.frames(robot.joint_values(q, robot.require_arm().gripper.upper))
     points = []
     for link in robot.links:
@@ -40,7 +40,7 @@ def points_on(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("preset", CAMERA_POSES)
-def test_no_pose_is_cut_off(robot: Robot, postures: FloatArray, preset: Preset) -> None:
+def test_no_posture_is_cut_off(robot: Robot, postures: FloatArray, preset: Preset) -> None:
     look = CAMERA_POSES[preset]
     position, target = np.array(look.position), np.array(look.target)
     ahead = (target - position) / np.linalg.norm(target - position)
@@ -57,5 +57,5 @@ def test_no_pose_is_cut_off(robot: Robot, postures: FloatArray, preset: Preset) 
         across = np.abs(seen @ right / depth).max() / (ASPECT * top)
         up = np.abs(seen @ np.cross(right, ahead) / depth).max() / top
         greatest = max(greatest, across, up)
-    # And it fills the picture.
+    # The arm also fills the picture.
     assert 0.9 < greatest < 1.0

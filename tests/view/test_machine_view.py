@@ -42,7 +42,7 @@ def standing(robot: Robot) -> State:
 
 
 def shown(server: viser.ViserServer, path: str) -> FloatArray:
-    """(4, 4) of a node in the world, as the messages to a browser have it."""
+    """Return the pose (4, 4) of a node in the world, as in the messages to a browser."""
     T, name = np.eye(4), ""
     for part in path.split("/")[1:]:
         name += f"/{part}"
@@ -51,7 +51,7 @@ def shown(server: viser.ViserServer, path: str) -> FloatArray:
     return T
 
 
-def test_every_link_is_shown_where_it_is(server: viser.ViserServer, robot: Robot) -> None:
+def test_every_link_is_shown_in_its_pose(server: viser.ViserServer, robot: Robot) -> None:
     nodes = MachineNodes(server, robot)
     joints, random = robot.joint_group, np.random.default_rng(1)
     for _ in range(3):
@@ -61,7 +61,7 @@ def test_every_link_is_shown_where_it_is(server: viser.ViserServer, robot: Robot
             np.testing.assert_allclose(shown(server, nodes.path[name]), T, rtol=0, atol=1e-9)
 
 
-def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
+def test_link_is_painted(server: viser.ViserServer) -> None:
     robot = load(GANTRY)
     nodes = MachineNodes(server, robot)
     blue = Appearance().having("cart", AppearanceTrait.COLOUR, (0.0, 0.0, 1.0))
@@ -71,7 +71,7 @@ def test_a_link_of_it_is_painted(server: viser.ViserServer) -> None:
     assert tuple(coat.color) == (0, 0, 255)
 
 
-def test_the_panel_has_a_slider_a_joint_and_says_why(
+def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     server: viser.ViserServer, robot: Robot
 ) -> None:
     state = standing(robot)
@@ -88,7 +88,7 @@ def test_the_panel_has_a_slider_a_joint_and_says_why(
         assert controls[label].min == pytest.approx(unit * joints.lower[axis], abs=0.01)
         assert controls[label].min >= unit * joints.lower[axis] - 1e-9
         assert controls[label].max <= unit * joints.upper[axis] + 1e-9
-        # A joint may be called anything, and is nobody's alone for that.
+        # No joint name can produce a label that the guard treats differently.
         assert label not in (*PERSONAL, *ProgramRunner.controls)
     assert "mm" in page(joints, state)
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]

@@ -1,4 +1,4 @@
-"""What moves in the scene stands where the joints have it."""
+"""Moving nodes of the scene have the poses that the joint values give."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from katana450.server.view.scene import FrameTree
 from tests.viser_bridge.internals import nodes
 
 
-def test_every_link_is_turned_as_its_joint_is(robot: Robot, server: viser.ViserServer) -> None:
+def test_every_link_turns_with_its_joint(robot: Robot, server: viser.ViserServer) -> None:
     tree = FrameTree(server, "/tree", robot)
     node = nodes(server)
     random = np.random.default_rng(450)
@@ -40,7 +40,7 @@ def test_every_link_is_turned_as_its_joint_is(robot: Robot, server: viser.ViserS
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_rings_stand_across_the_conduit_also_between_the_angles_worked_out(
+def test_rings_are_square_to_the_conduit_also_between_computed_angles(
     arm: MountedArm, number: int
 ) -> None:
     stretch: ConduitStretch = arm.stretches[number]
@@ -52,13 +52,13 @@ def test_rings_stand_across_the_conduit_also_between_the_angles_worked_out(
     ):
         points, tangents = stretch.courses(angles, 30)
         np.testing.assert_allclose(shown[..., 4:], points, atol=1e-6)
-        # A ring as much smaller as a pixel is of it.
+        # A deviation of the length scales a ring by less than one pixel.
         np.testing.assert_allclose(np.linalg.norm(shown[..., :4], axis=2), 1.0, atol=6e-3)
         for row, lead in zip(shown.reshape(-1, 7), tangents.reshape(-1, 3), strict=True):
             assert so3.from_quaternion(row[:4])[:, 0] @ lead > 0.998
 
 
-def test_branches_are_looked_for_once_a_second_while_the_arm_moves(
+def test_branches_are_computed_once_a_second_while_the_arm_moves(
     robot: Robot, server: viser.ViserServer, session: Session
 ) -> None:
     looked: list[State] = []

@@ -1,4 +1,4 @@
-"""Parts that are hidden or painted, as viser's scene has them."""
+"""Hidden and painted links in viser's scene."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def shown(server: viser.ViserServer, robot: Robot, session: Session) -> Shown:
     return Shown(server, robot, session)
 
 
-def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
+def test_link_is_painted_hidden_and_restored(shown: Shown) -> None:
     made = [shape.visible for shape in shown.arm.shapes["pan_link"]]
     assert made
     assert all(made)
@@ -58,7 +58,7 @@ def test_a_link_is_painted_hidden_and_as_it_was(shown: Shown) -> None:
     assert not any(shape.visible for shape in shown.arm.shapes["pan_link"])
     glass = Appearance().having("pan_link", AppearanceTrait.TRANSPARENCY, 0.75)
     shown.show(appearance=glass)
-    # Of a paint that nobody mixed: the colour of most of what the link is made of.
+    # Without a colour of its own, the paint has the link's main colour.
     robot = load(URDF_PATH)
     (link,) = (link for link in robot.links if link.name == "pan_link")
     assert set(shown.painted().values()) == {tuple(round(255.0 * part) for part in link.colour)}

@@ -1,4 +1,4 @@
-"""The panel of programs: what it says, what it draws, what it asks for."""
+"""The panel of programs: its texts, its drawings and its requests."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from tests.view.gestures import ANNA, RecordedGestures
 
 
 class ProgramRunner:
-    """Remembers what was asked."""
+    """A program runner that records requests."""
 
     def __init__(self) -> None:
         self.progress: Progress | None = None
         self.program: Program | None = None
-        self.asked: list[tuple[str, ProgramOrder | None]] = []
+        self.requests: list[tuple[str, ProgramOrder | None]] = []
 
     def plan(self, text: str, then: ProgramOrder | None, _actor: Actor) -> None:
-        self.asked.append((text, then))
+        self.requests.append((text, then))
 
     def steer(self, order: ProgramOrder, _actor: Actor) -> None:
-        self.asked.append(("", order))
+        self.requests.append(("", order))
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def server() -> Iterator[viser.ViserServer]:
     server.stop()
 
 
-def test_what_is_said_is_text_and_no_markup() -> None:
+def test_texts_are_escaped_in_markup() -> None:
     page = _page(
         Progress(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"), 2
     )
@@ -57,14 +57,14 @@ def test_what_is_said_is_text_and_no_markup() -> None:
     assert "<script>" not in page
     assert "2 poses" in page
     assert "a while" in _page(Progress(name="", by="me", status="planning"), 0)
-    told = Progress(
+    progress = Progress(
         name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", fraction=0.5
     )
-    assert "Step 2 of 3, line 7: line, 50%" in _page(told, 0)
+    assert "Step 2 of 3, line 7: line, 50%" in _page(progress, 0)
     assert _page(None, 0) == ""
 
 
-def test_it_previews_steers_and_teaches(
+def test_panel_previews_steers_and_teaches(
     server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
     program_runner = ProgramRunner()
@@ -72,7 +72,7 @@ def test_it_previews_steers_and_teaches(
     panel = ProgramsPanel(
         server, robot, program_runner, Scripts(tmp_path), RecordedGestures(), lambda: state
     )
-    # Not the first, which is for an arm without its gripper.
+    # The first choice is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
     way = panel._preview._way
@@ -88,22 +88,22 @@ def test_it_previews_steers_and_teaches(
     panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
     program_runner.progress = Progress(name="x", by="me", status="running")
-    for said in ("Wait", "Run", "End"):
-        panel._orders.value = said  # type: ignore[misc]  # likewise
+    for label in ("Wait", "Run", "End"):
+        panel._orders.value = label  # type: ignore[misc]  # as above
         panel._order(ANNA)
-    assert [order for _, order in program_runner.asked] == [
+    assert [order for _, order in program_runner.requests] == [
         ProgramOrder.RUN, ProgramOrder.PAUSE, ProgramOrder.RUN, ProgramOrder.END
     ]  # fmt: skip
-    assert parse(program_runner.asked[0][0]).name == "Circle with gripper"
+    assert parse(program_runner.requests[0][0]).name == "Circle with gripper"
 
-    for said in ("Add pose", "Add pose", "Save"):
-        panel._teach.value = said  # type: ignore[misc]  # likewise
+    for label in ("Add pose", "Add pose", "Save"):
+        panel._teach.value = label  # type: ignore[misc]  # as above
         panel._on_teach(ANNA)
     assert len(parse((tmp_path / "My script.yaml").read_text(encoding="utf-8")).steps) == 2
     assert panel._choice.value == "My script"
 
 
-def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
+def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
     server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
 ) -> None:
     program_runner = ProgramRunner()
@@ -124,7 +124,7 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
 
     program_runner.program = program
     panel.follow()
-    # Nobody asked to see it.
+    # No preview was requested.
     assert not ghosts()
     panel._orders.value = "Preview"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
@@ -143,7 +143,7 @@ def test_a_preview_shows_the_arm_along_the_way_until_it_runs(
     assert robot.frames(robot.joint_values(q, fingers))["tcp"] == pytest.approx(tool, abs=1e-9)
 
     assert timeline.span <= panel._look.max < timeline.span + 0.11
-    panel._look.value = 1.0  # type: ignore[misc]  # likewise
+    panel._look.value = 1.0  # type: ignore[misc]  # as above
     preview.look(1.0)
     assert looked_at()
     preview.look(0.0)

@@ -1,4 +1,4 @@
-"""The read-out tells of every axis and of all that the velocities come to, for any posture."""
+"""The read-out shows limit distances and velocity measures for any posture."""
 
 from __future__ import annotations
 
@@ -15,29 +15,27 @@ from katana450.server.view.controls import ends
 from katana450.server.view.readout import page
 
 
-def test_every_axis_tells_how_far_its_limit_is_and_the_nearest_stands_out(
+def test_limit_distance_of_every_axis_is_shown_and_the_nearest_marked(
     arm: MountedArm, session: Session
 ) -> None:
     random, chain = np.random.default_rng(2), arm.chain
     for q in random.uniform(chain.lower, chain.upper, (20, 5)):
-        told = page(arm, replace(session.begin(session.ready, 0.0, 0.0), q=q))
-        (rooms,) = re.findall(r"data-now='limits'>(.*?)</table>", told)
+        text = page(arm, replace(session.begin(session.ready, 0.0, 0.0), q=q))
+        (rooms,) = re.findall(r"data-now='limits'>(.*?)</table>", text)
         cells = re.findall(r"<td( class=nearest)?>(\d+)°</td>", rooms)
         distances = np.degrees(limit_distances(chain, q))
         assert [int(degrees) for _, degrees in cells] == [round(x) for x in distances.tolist()]
         assert [bool(mark) for mark, _ in cells] == (distances == distances.min()).tolist()
 
 
-def test_the_measures_of_velocity_are_those_of_the_kinematics(
-    arm: MountedArm, session: Session
-) -> None:
+def test_velocity_measures_equal_those_of_the_kinematics(arm: MountedArm, session: Session) -> None:
     chain, state = arm.chain, session.begin(session.ready, 0.0, 0.0)
-    told = page(arm, state)
-    assert f"<td data-now='condition'>{condition_number(chain, state.q):.0f}</td>" in told
-    assert f"<td data-now='manipulability'>{manipulability(chain, state.q):.3f}</td>" in told
+    text = page(arm, state)
+    assert f"<td data-now='condition'>{condition_number(chain, state.q):.0f}</td>" in text
+    assert f"<td data-now='manipulability'>{manipulability(chain, state.q):.3f}</td>" in text
 
 
-def test_in_a_singularity_the_condition_has_no_end(arm: MountedArm, session: Session) -> None:
+def test_condition_is_infinite_in_a_singularity(arm: MountedArm, session: Session) -> None:
     assert "<td data-now='condition'>∞</td>" in page(arm, session.begin(np.zeros(5), 0.0, 0.0))
 
 
@@ -45,11 +43,11 @@ def test_in_a_singularity_the_condition_has_no_end(arm: MountedArm, session: Ses
     ("limits", "shown"),
     [
         ((-108.861981, 108.861981), (-108.86, 108.86)),
-        # Through radians and back.
+        # Rounding errors of the conversion to radians and back.
         ((-173.35000000000002, 165.64999999999998), (-173.35, 165.65)),
     ],
 )
-def test_the_ends_of_a_slider_are_short_and_inside(
+def test_slider_ends_are_rounded_and_inside_the_limits(
     limits: tuple[float, float], shown: tuple[float, float]
 ) -> None:
     assert ends(*limits) == shown

@@ -1,4 +1,4 @@
-"""Shapes of the ghost: with less detail, and where they were."""
+"""Shapes of the ghost have less detail and the same outline."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from katana450.server.view.scene import COAT, DETAIL, coarse, surface
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(5e-3, 0.05), st.integers(0, 4))
-def test_a_coarse_shape_is_where_the_fine_one_is(cell: float, subdivisions: int) -> None:
+def test_coarse_shape_is_near_the_fine_one(cell: float, subdivisions: int) -> None:
     ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=0.1)
     vertices, faces = coarse(ball.vertices, ball.faces, cell)
     assert len(faces) <= len(ball.faces)
     assert (np.abs(np.linalg.norm(vertices, axis=1) - 0.1) < np.sqrt(3.0) * cell).all()
-    # Every face has three corners, and no other lies on it.
+    # Every face has three different corners, and no two faces coincide.
     corners = np.sort(faces, axis=1)
     assert (np.diff(corners, axis=1) > 0).all()
     assert len(np.unique(corners, axis=0)) == len(faces)
     assert faces.max(initial=0) < len(vertices)
 
 
-def test_far_corners_stay_as_they_are() -> None:
+def test_distant_corners_are_unchanged() -> None:
     cube = trimesh.creation.box((0.1, 0.2, 0.3))
     vertices, faces = coarse(cube.vertices, cube.faces, 1e-3)
     assert sorted(map(tuple, vertices.round(12))) == sorted(map(tuple, cube.vertices.round(12)))
     assert trimesh.Trimesh(vertices, faces).volume == cube.volume
 
 
-def test_the_ghost_keeps_the_arms_outline(robot: Robot) -> None:
+def test_ghost_keeps_the_outline_of_the_arm(robot: Robot) -> None:
     before = after = 0
     for body in robot.links:
         for visual in body.visuals:

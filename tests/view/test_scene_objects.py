@@ -1,4 +1,4 @@
-"""What stands around is drawn as it is said to look, and is coated where the arm is near."""
+"""Scene objects are drawn with their appearance, and coated while the arm is near."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def seen(state: State, *objects: SceneObject, near: str = "") -> State:
     return replace(state, objects=objects, findings=found)
 
 
-def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
+def test_mesh_is_drawn_again_only_when_necessary(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
     meshes = Meshes()
@@ -103,7 +103,7 @@ def test_a_mesh_is_drawn_and_drawn_anew_only_when_it_has_to_be(
     assert not [each for each in internals.nodes(server) if each.startswith(PATH)]
 
 
-def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
+def test_mesh_without_triangles_is_drawn_as_its_convex_body(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
     nodes = ThingNodes(server, load_props(), Environment(None, None), RecordedGestures(), Meshes())
@@ -116,7 +116,7 @@ def test_a_mesh_whose_triangles_are_gone_is_drawn_as_what_it_counts_as(
     nodes.follow(seen(state))
 
 
-def test_faces_are_apart_at_creases_and_colours_and_one_where_they_bend(mesh: Mesh) -> None:
+def test_faces_are_split_at_creases_and_colours_only(mesh: Mesh) -> None:
     ball = trimesh.creation.icosphere(3)
     assert len(drawn(ball.vertices, ball.faces).vertices) == len(ball.vertices)
     half = np.where(ball.triangles_center[:, 2] > 0.0, 0, 1)
@@ -127,9 +127,9 @@ def test_faces_are_apart_at_creases_and_colours_and_one_where_they_bend(mesh: Me
     np.testing.assert_allclose(split.vertices[split.faces], ball.triangles, atol=1e-12)
     assert len(ball.vertices) < len(split.vertices) < len(ball.vertices) + 100
     tube = trimesh.creation.cylinder(1.0, 2.0, sections=32)
-    # The round side is one, each lid another, its middle shared by nobody.
+    # The round side and each lid have vertices of their own.
     assert len(drawn(tube.vertices, tube.faces).vertices) == 4 * 32 + 2
-    # Read by another program: where it was, in its colours.
+    # Another program reads the same size.
     back = trimesh.load_scene(trimesh.util.wrap_as_stream(glb(mesh.drawn, 0.5)), file_type="glb")
     np.testing.assert_allclose(np.ptp(back.bounds, axis=0), mesh.solid.size, atol=1e-6)
 
@@ -137,15 +137,15 @@ def test_faces_are_apart_at_creases_and_colours_and_one_where_they_bend(mesh: Me
 def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     server: viser.ViserServer, session: Session
 ) -> None:
-    """The person hears why when they let go, and the handle comes back to the cup."""
+    """The reason is shown at the release, and the handle returns to the cup."""
     gestures = RecordedGestures()
     put = gestures.commands
     around = Environment(None, None, TableTop((-0.25, 0.75), (-0.7, 0.7), -0.025))
     nodes = ThingNodes(server, load_props(), around, gestures, Meshes())
     cup = SceneObject("cup", Shape.CYLINDER, (0.032, 0.09), np.eye(4), can_be_held=True)
     nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), cup))
-    told: list[str] = []
-    client = SimpleNamespace(add_notification=lambda _title, text, **_: told.append(text))
+    shown: list[str] = []
+    client = SimpleNamespace(add_notification=lambda _title, text, **_: shown.append(text))
 
     def drag(phase: str, x: float) -> None:
         target = SimpleNamespace(position=(x, 0.1, 0.0))
@@ -159,15 +159,15 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
         0.7,
         0.74,
     ]
-    assert not told
+    assert not shown
     nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), put[-1].scene_object))  # type: ignore[union-attr]
     drag("end", 1.5)
     assert len(put) == 2
-    assert "nothing carries it there" in told[0]
+    assert "nothing carries it there" in shown[0]
     assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
 
 
-def test_the_panel_shows_the_object_there_is(
+def test_panel_shows_the_chosen_object(
     server: viser.ViserServer, session: Session, mesh: Mesh
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Every reason has its sentence, with its number in it."""
+"""Texts of the state: every reason has a sentence that contains its number."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def with_findings(state: State, *findings: Finding) -> State:
 
 @pytest.mark.parametrize("reason", Reason)
 def test_every_reason_has_a_sentence(state: State, reason: Reason) -> None:
-    told = sentence(with_findings(state, Finding(reason, 0.5, 1)))
-    assert not told[0].islower()
-    assert told.endswith(".")
+    text = sentence(with_findings(state, Finding(reason, 0.5, 1)))
+    assert not text[0].islower()
+    assert text.endswith(".")
 
 
 @pytest.mark.parametrize("status", Status)
@@ -56,7 +56,7 @@ def test_every_status_has_a_headline(status: Status) -> None:
     assert STATUS[status]
 
 
-def test_no_text_is_left_over() -> None:
+def test_texts_and_kinds_match() -> None:
     assert set(REASONS) == set(Reason)
     assert set(STATUS) == set(Status)
     assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(Priority)
@@ -65,7 +65,7 @@ def test_no_text_is_left_over() -> None:
 
 
 @pytest.mark.parametrize(
-    ("finding", "said"),
+    ("finding", "expected"),
     [
         (Finding(Reason.OUT_OF_REACH, 0.032), "32 mm out of reach."),
         (Finding(Reason.OUT_OF_REACH, 0.0013), "1.3 mm out of reach."),
@@ -80,12 +80,12 @@ def test_no_text_is_left_over() -> None:
         ),
     ],
 )
-def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, said: str) -> None:
-    assert sentence(with_findings(state, finding)) == said
+def test_the_numbers_are_in_the_sentence(state: State, finding: Finding, expected: str) -> None:
+    assert sentence(with_findings(state, finding)) == expected
 
 
 @pytest.mark.parametrize("priority", Priority)
-def test_every_reading_has_a_name_of_its_own_and_a_hint(priority: Priority) -> None:
+def test_every_priority_has_a_unique_name_and_a_hint(priority: Priority) -> None:
     assert list(PRIORITIES.values()).count(PRIORITIES[priority]) == 1
     assert PRIORITY_HINTS[priority]
 
@@ -114,19 +114,21 @@ def test_contact_is_reported_with_both_parts_and_the_distance(state: State) -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "expected"),
     [("pan_link", "shoulder"), ("forearm_link", "forearm"), ("table", "table"), ("cup_2", "cup 2")],
 )
-def test_parts_are_named_as_people_name_them(name: str, said: str) -> None:
-    assert part(name) == said
+def test_parts_have_plain_names(name: str, expected: str) -> None:
+    assert part(name) == expected
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "expected"),
     [((1.2, 0.6), "2.0"), ((1.2, 0.03), "40"), ((1.2, 1e-9), "∞"), ((1.2, 0.0), "∞")],
 )
-def test_the_condition_has_no_digits_of_rounding(values: tuple[float, float], said: str) -> None:
-    assert condition(np.array(values)) == said
+def test_the_condition_has_no_digits_of_rounding(
+    values: tuple[float, float], expected: str
+) -> None:
+    assert condition(np.array(values)) == expected
 
 
 def test_nearest_limit_is_reported_with_its_axis() -> None:
@@ -134,7 +136,7 @@ def test_nearest_limit_is_reported_with_its_axis() -> None:
 
 
 @pytest.mark.parametrize(
-    ("position_error", "rotation_error", "parts", "said"),
+    ("position_error", "rotation_error", "parts", "expected"),
     [
         (0.0, 0.0, None, "nothing"),
         (0.0123, 0.0, None, "12 mm"),
@@ -148,29 +150,29 @@ def test_branch_cells_have_three_texts(
     position_error: float,
     rotation_error: float,
     parts: tuple[str, str] | None,
-    said: str,
+    expected: str,
 ) -> None:
     contact = None if parts is None else Contact(parts, 0.001, np.zeros((2, 3)), np.eye(3)[2])
     cost = BranchMetrics(
         BRANCHES[0], state.q, True, position_error, rotation_error, math.radians(90), 1.318, 0.1512
     )
     choice = BranchOption(cost, contact)
-    assert branch_cells(choice) == (said, "90°, 1.3 s", "0.151")
+    assert branch_cells(choice) == (expected, "90°, 1.3 s", "0.151")
     assert len(BRANCH_HEADINGS) == 1 + len(branch_cells(choice))
 
 
 def test_two_reasons_make_one_sentence(state: State) -> None:
-    said = sentence(
+    text = sentence(
         with_findings(
             state,
             Finding(Reason.OUT_OF_REACH, 0.032),
             Finding(Reason.AXIS_LIMIT, math.radians(7.75), 1),
         )
     )
-    assert said == "32 mm out of reach; axis 2 at its limit of 7.75°."
+    assert text == "32 mm out of reach; axis 2 at its limit of 7.75°."
 
 
-def test_nothing_wrong_nothing_said(state: State) -> None:
+def test_state_without_findings_has_no_sentence(state: State) -> None:
     assert sentence(state) == ""
     assert headline(state) == STATUS[Status.OK]
 
@@ -182,7 +184,7 @@ def test_no_negative_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    ("robot", "said"), [("katana450", "Katana450"), ("youbot_arm", "Youbot arm"), ("", "")]
+    ("robot", "expected"), [("katana450", "Katana450"), ("youbot_arm", "Youbot arm"), ("", "")]
 )
-def test_a_page_is_named_after_its_robot(robot: str, said: str) -> None:
-    assert title(robot) == said
+def test_a_page_is_named_after_its_robot(robot: str, expected: str) -> None:
+    assert title(robot) == expected

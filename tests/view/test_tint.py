@@ -1,4 +1,4 @@
-"""The coats of parts that are about to touch."""
+"""The coats of parts near a contact."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Coat:
 
 @dataclass
 class Scene:
-    """Remembers what is added to it."""
+    """A scene that records added meshes."""
 
     coats: dict[str, Coat] = field(default_factory=dict)
 
@@ -72,9 +72,7 @@ def test_both_parts_are_coated_until_they_are_apart(robot: Robot, state: State) 
 
 
 @pytest.mark.parametrize("scene_object", [part.name for part in initial_objects(load_props())])
-def test_a_object_is_coated_too_where_it_stands(
-    robot: Robot, state: State, scene_object: str
-) -> None:
+def test_object_near_a_contact_is_coated(robot: Robot, state: State, scene_object: str) -> None:
     scene = Scene()
     paths = {body.name: f"/{body.name}" for body in robot.links}
     tint = Tint(cast(Any, Server(scene)), robot, paths, load_props())
@@ -84,7 +82,7 @@ def test_a_object_is_coated_too_where_it_stands(
     assert scene.coated() == set()
 
 
-def test_viser_takes_the_coats(robot: Robot, state: State, server: viser.ViserServer) -> None:
+def test_viser_accepts_the_coats(robot: Robot, state: State, server: viser.ViserServer) -> None:
     Workcell(server, load_props())
     paths = {body.name: f"/{body.name}" for body in robot.links}
     tint = Tint(server, robot, paths, load_props())

@@ -1,4 +1,4 @@
-"""What viser is told of the path of the tool: what there is to see, and nothing at rest."""
+"""The path and the trace of the tool in viser's scene; nothing is sent at rest."""
 
 from __future__ import annotations
 
@@ -29,9 +29,7 @@ def server() -> Iterator[viser.ViserServer]:
     server.stop()
 
 
-def test_the_path_and_the_way_that_was_gone_are_the_arc(
-    server: viser.ViserServer, arm: MountedArm
-) -> None:
+def test_path_and_trace_follow_the_arc(server: viser.ViserServer, arm: MountedArm) -> None:
     session = Session(arm, np.array(Settings().ready))
     state = session.begin(session.ready, 0.0, 0.0)
     at = ToolTarget.at(arm.chain, session.ready)
@@ -44,20 +42,20 @@ def test_the_path_and_the_way_that_was_gone_are_the_arc(
     traces.follow(state)
     assert [desired.visible, traced.visible] == [False, False]
     state = session.step(state, [cmd.Follow(plan_along(arm, None, state, [path]))], 0.01)
-    told = []
+    lengths = []
     while state.moving:
         state = session.step(state, [], state.t + 0.01)
         state = session.observe(state, state.setpoint, 0.0)
         traces.follow(state)
-        told.append(len(traced.points))
+        lengths.append(len(traced.points))
     assert [desired.visible, traced.visible] == [True, True]
     middle = (arm.T_base_shoulder @ np.append(centre, 1.0))[:3]
     for handle in (desired, traced):
         away = np.linalg.norm(np.asarray(handle.points) - middle, axis=2)
         assert np.abs(away - 0.05).max() < 1e-5
     assert (np.asarray(traced.colors) == GOOD_COLOUR.astype(np.uint8)).all()
-    # Appended ten times a second, not with every tick.
-    assert len(set(told)) < 1.2 * len(told) / 10 + 3
+    # The trace is extended ten times a second, not at every tick.
+    assert len(set(lengths)) < 1.2 * len(lengths) / 10 + 3
     last = traced.points
     traces.follow(state)
     assert traced.points is last

@@ -1,4 +1,4 @@
-"""The viser server that nobody has opened a page of, as in the tests of the view."""
+"""The viser server without any page, as in the tests of the view."""
 
 from tests.view.conftest import server
 

@@ -1,4 +1,4 @@
-"""viser's private parts that tests read or write: the only place in `tests` that names them.
+"""Access of tests to viser's private parts; no other module in `tests` names them.
 
 docs/viser.md lists each of them.
 """
@@ -28,7 +28,7 @@ def panel(server: viser.ViserServer) -> list[Any]:
 
 
 def sent(server: viser.ViserServer) -> list[Any]:
-    """Return the messages that a browser gets that connects now."""
+    """Return the messages for a browser that connects now."""
     return list(server._websock_server.get_message_buffer().message_from_id.values())
 
 
@@ -43,10 +43,10 @@ def value_change(handle: Any, value: object) -> wire.GuiUpdateMessage:
 
 
 def pretend_client(server: viser.ViserServer, client_id: int, client: Any) -> None:
-    """Have the server take ``client`` for the handle of a connected browser."""
+    """Register ``client`` as the handle of a connected browser."""
     server._connected_clients[client_id] = client
 
 
 def forget_clients(server: viser.ViserServer) -> None:
-    """Remove what `pretend_client` put in."""
+    """Remove the clients of `pretend_client`."""
     server._connected_clients.clear()

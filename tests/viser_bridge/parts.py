@@ -1,4 +1,4 @@
-"""Tests of viser's private parts name the part that they are about."""
+"""A context that names the private part of viser in the error of a test."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def part(name: str) -> Iterator[None]:
-    """Name the private part in the message of whatever fails in the block.
+    """Name the private part in the message of every error in the block.
 
     ``name``: as in the first column of docs/viser.md.
     """
@@ -17,5 +17,5 @@ def part(name: str) -> Iterator[None]:
     except Exception as error:
         raise AssertionError(
             f"viser's {name} is not as docs/viser.md describes it: "
-            f"{type(error).__name__}: {error}. See there what depends on it."
+            f"{type(error).__name__}: {error}. That list names the dependent files."
         ) from error

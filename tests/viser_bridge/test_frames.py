@@ -1,4 +1,4 @@
-"""Frames that are packed once, held to viser's own."""
+"""Frames that are packed once are identical to viser's own."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ from katana450.server.viser_bridge.viser_server import open_server
 
 
 def visers_own(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The producer of a viser that the app has not touched."""
+    """Return the producer of an unchanged viser."""
     assert _infra.__file__ is not None
     spec = importlib.util.spec_from_file_location("viser.infra._untouched", _infra.__file__)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    # Its dataclasses look for it there.
+    # Dataclasses of the module look it up in sys.modules.
     monkeypatch.setitem(sys.modules, spec.name, module)
     spec.loader.exec_module(module)
     return module._message_producer
 
 
 class Line:
-    """Takes in what is sent."""
+    """A connection that records sent frames."""
 
     def __init__(self, slot: frames.FrameSlot | None = None) -> None:
-        self.heard: list[bytes] = []
+        self.sent: list[bytes] = []
         self.request = SimpleNamespace(
             headers={} if slot is None else {frames.FRAME_SLOT_HEADER: slot.name}
         )
 
     async def send(self, frame: bytes) -> None:
-        self.heard.append(frame)
+        self.sent.append(frame)
 
 
 def messages() -> list[Any]:
@@ -60,8 +60,8 @@ def messages() -> list[Any]:
     ]
 
 
-async def heard_by(lines: dict[int, tuple[Any, Line]], pushed: list[list[Any]]) -> None:
-    """Let producers send each of the lists of messages to their lines."""
+async def send_to(lines: dict[int, tuple[Any, Line]], pushed: list[list[Any]]) -> None:
+    """Send each list of messages to all connections by their producers."""
     buffer = AsyncMessageBuffer(asyncio.get_running_loop(), persistent_messages=True)
     tasks = [
         asyncio.create_task(produce(line, buffer, number))
@@ -79,27 +79,27 @@ async def heard_by(lines: dict[int, tuple[Any, Line]], pushed: list[list[Any]]) 
 
 
 def opened(frame: bytes) -> tuple[dict[str, Any], bytes]:
-    """What is packed in it, without its time; and the arrays as they are."""
+    """Return the content of a frame without its time, and the bytes of its arrays."""
     size, packed = (int.from_bytes(frame[at : at + 8], "little") for at in (0, 8))
     body = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed])
     assert len(body) == size
     decoded = msgspec.msgpack.decode(body)
     assert decoded.pop("timestampSec") > 0.0
     arrays = 16 + packed
-    # They begin where the page can look at them without a copy.
+    # The arrays are aligned so that the page can use them without a copy.
     return decoded, frame[arrays + -arrays % 8 :]
 
 
-def test_a_browser_is_sent_what_viser_sends(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_are_identical_to_those_of_viser(monkeypatch: pytest.MonkeyPatch) -> None:
     ours, own = Line(), Line()
     pushed = [messages(), messages()[:1], messages()[1:]]
-    asyncio.run(heard_by({1: (frames.produce, ours), 2: (visers_own(monkeypatch), own)}, pushed))
-    assert len(ours.heard) == len(own.heard) == 3
-    for mine, visers in zip(ours.heard, own.heard, strict=True):
+    asyncio.run(send_to({1: (frames.produce, ours), 2: (visers_own(monkeypatch), own)}, pushed))
+    assert len(ours.sent) == len(own.sent) == 3
+    for mine, visers in zip(ours.sent, own.sent, strict=True):
         assert opened(mine) == opened(visers)
 
 
-def test_a_crowd_is_sent_frames_that_were_packed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_for_many_browsers_are_packed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     packed: list[int] = []
     pack = frames.Packer._pack
 
@@ -110,15 +110,15 @@ def test_a_crowd_is_sent_frames_that_were_packed_once(monkeypatch: pytest.Monkey
     monkeypatch.setattr(frames.Packer, "_pack", counted)
     lines = [Line() for _ in range(20)]
     pushed = [messages() for _ in range(3)]
-    asyncio.run(heard_by({n: (frames.produce, line) for n, line in enumerate(lines)}, pushed))
+    asyncio.run(send_to({n: (frames.produce, line) for n, line in enumerate(lines)}, pushed))
     assert packed == [3, 3, 3]
-    assert all(line.heard == lines[0].heard for line in lines)
+    assert all(line.sent == lines[0].sent for line in lines)
 
 
 def test_unread_state_is_replaced_by_a_newer_one() -> None:
     async def take(slot: frames.FrameSlot) -> list[float]:
-        told = opened(await slot.take())[0]["messages"]
-        return [message["position"][0] for message in told]
+        taken = opened(await slot.take())[0]["messages"]
+        return [message["position"][0] for message in taken]
 
     async def act(viser: asyncio.AbstractEventLoop) -> None:
         slot = frames.FrameSlot()
@@ -153,7 +153,7 @@ def test_unread_state_is_replaced_by_a_newer_one() -> None:
 
         await asyncio.wrap_future(there(end()))
 
-    # As in the app: viser has a thread of its own.
+    # As in the app, viser runs in a thread of its own.
     viser = asyncio.new_event_loop()
     thread = threading.Thread(target=viser.run_forever)
     thread.start()
@@ -165,7 +165,7 @@ def test_unread_state_is_replaced_by_a_newer_one() -> None:
         viser.close()
 
 
-def test_later_message_is_sent_later() -> None:
+def test_changed_message_is_packed_again() -> None:
     packer = frames.Packer()
     props = {"visible": True}
     window = [wire.SceneNodeUpdateMessage("/a", props)]
@@ -176,14 +176,14 @@ def test_later_message_is_sent_later() -> None:
     assert opened(packer.frame(window)) != opened(before)
 
 
-def test_messages_that_are_gone_are_not_taken_for_later_ones() -> None:
+def test_deleted_messages_are_not_mistaken_for_later_ones() -> None:
     packer = frames.Packer()
     for number in range(200):
-        # Python gives a new message the place, and so the number, of one that is gone.
+        # Python gives a new message the address, and so the id, of a deleted one.
         body, _ = opened(packer.frame([wire.SetPositionMessage(f"/{number}", (0.0, 0.0, 0.0))]))
         assert body["messages"][0]["name"] == f"/{number}"
 
 
-def test_the_app_packs_so() -> None:
+def test_server_of_the_app_uses_our_producer() -> None:
     open_server("a key").stop()
     assert _infra._message_producer is frames.produce

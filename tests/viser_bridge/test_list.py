@@ -54,7 +54,7 @@ def names() -> set[str]:
 
 
 def trees(*folders: Path) -> Iterator[tuple[Path, ast.Module]]:
-    """Parse the files below ``folders`` that name viser at all."""
+    """Parse the files below ``folders`` that mention viser."""
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
             text = path.read_text(encoding="utf-8")
@@ -163,7 +163,7 @@ def test_only_one_script_names_private_parts_of_the_page() -> None:
             assert not found, f"{path} names {found}: move that into {OURS.name}"
 
 
-def test_what_that_script_offers_is_listed() -> None:
+def test_functions_of_that_script_are_listed() -> None:
     text = OURS.read_text(encoding="utf-8")
     offered = text[text.rindex("return {") :]
     offered = re.sub(r"//.*", "", offered)

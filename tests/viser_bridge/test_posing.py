@@ -1,4 +1,4 @@
-"""What is sent without viser's setters is what they send, and the handles know it."""
+"""Poses sent without viser's setters give the same messages and update the handles."""
 
 from __future__ import annotations
 
@@ -16,38 +16,38 @@ TURN = (0.6, 0.0, -0.8, 0.0)
 POINT = (0.1, -0.2, 0.3)
 
 
-def told(server: viser.ViserServer, kind: type[Any], node: str) -> list[Any]:
-    """What a browser that opens the page now is told of a node."""
+def messages_for(server: viser.ViserServer, kind: type[Any], node: str) -> list[Any]:
+    """Return the messages about a node for a browser that connects now."""
     return [each for each in sent(server) if isinstance(each, kind) and each.name == node]
 
 
-def test_a_pose_goes_as_viser_sends_it(server: viser.ViserServer) -> None:
+def test_pose_message_is_identical_to_that_of_viser(server: viser.ViserServer) -> None:
     theirs, ours = (server.scene.add_frame(name) for name in ("/theirs", "/ours"))
     theirs.wxyz, theirs.position = np.array(TURN), np.array(POINT)
     turn(ours, TURN)
     place(ours, POINT)
     for kind in (wire.SetOrientationMessage, wire.SetPositionMessage):
-        (a,), (b,) = told(server, kind, "/theirs"), told(server, kind, "/ours")
+        (a,), (b,) = messages_for(server, kind, "/theirs"), messages_for(server, kind, "/ours")
         a.name = b.name
         assert a.as_serializable_dict() == b.as_serializable_dict()
     np.testing.assert_array_equal(ours.wxyz, theirs.wxyz)
     np.testing.assert_array_equal(ours.position, theirs.position)
 
 
-def test_a_turn_too_small_for_visers_setter_is_sent_all_the_same(
+def test_turn_below_the_tolerance_of_visers_setter_is_sent(
     server: viser.ViserServer,
 ) -> None:
     frame = server.scene.add_frame("/frame", wxyz=TURN)
     little = (0.600001, 0.0, -0.79999925, 0.0)
     frame.wxyz = np.array(little)
-    (message,) = told(server, wire.SetOrientationMessage, "/frame")
+    (message,) = messages_for(server, wire.SetOrientationMessage, "/frame")
     assert message.wxyz == TURN
     turn(frame, little)
-    (message,) = told(server, wire.SetOrientationMessage, "/frame")
+    (message,) = messages_for(server, wire.SetOrientationMessage, "/frame")
     assert message.wxyz == little
 
 
-def test_instances_go_in_one_message_that_says_what_visers_two_say(
+def test_poses_of_instances_are_sent_in_one_message(
     server: viser.ViserServer,
 ) -> None:
     random = np.random.default_rng(450)
@@ -60,9 +60,9 @@ def test_instances_go_in_one_message_that_says_what_visers_two_say(
     )
     theirs.batched_wxyzs, theirs.batched_positions = wxyzs, positions
     arrange(ours, wxyzs, positions)
-    (message,) = told(server, wire.SceneNodeUpdateMessage, "/ours")
+    (message,) = messages_for(server, wire.SceneNodeUpdateMessage, "/ours")
     expected: dict[str, Any] = {}
-    for each in told(server, wire.SceneNodeUpdateMessage, "/theirs"):
+    for each in messages_for(server, wire.SceneNodeUpdateMessage, "/theirs"):
         expected |= each.updates
     assert message.updates.keys() == expected.keys()
     for name, value in expected.items():

@@ -1,4 +1,4 @@
-"""What is changed of viser's page for a recording is there to be changed, and only once."""
+"""The text that is replaced in viser's page of a recording occurs exactly once."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from katana450.server.viser_bridge.recording_page import KEEP_LIGHT
 PAGE = Path(viser.__file__).parent / "client" / "build" / "index.html"
 
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
-"""Of the base 88 in which viser's page holds its own program: 5 of them are 4 bytes."""
+"""Digits of the base 88 in which viser's page contains its program: 5 digits are 4 bytes."""
 
 
 def program() -> str:
-    """viser's program, as its page unpacks it."""
+    """Return viser's program as its page unpacks it."""
     found = re.search(r'<script data-p="([^"]*)" data-ss="(\d+)"', PAGE.read_text(encoding="utf-8"))
     assert found
     value = np.zeros(128, dtype=np.uint64)
@@ -43,5 +43,5 @@ def test_reset_of_the_light_is_found_once_in_the_player() -> None:
     text = program()
     places = [found.start() for found in re.finditer(pattern[1], text)]
     assert len(places) == 1
-    # Next to it the player hides what it shows, before it plays from the start.
+    # Next to it the player hides all nodes, before it plays from the start.
     assert "useSceneTree.getAll()" in text[places[0] : places[0] + 200]

@@ -1,4 +1,4 @@
-"""Each private part of viser's server that the app relies on, tried on a real server."""
+"""Each private part of viser's server that the app uses, tested on a real server."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.viser_bridge.internals import sent
 from tests.viser_bridge.parts import part
 
 SECONDS = 10.0
-"""[s] In which whatever is awaited has come."""
+"""Timeout [s] of every wait."""
 
 CAMERA = {
     "type": "ViewerCameraMessage", "wxyz": UPRIGHT, "position": [1.0, 0.0, 1.0], "fov": 0.7,
@@ -47,7 +47,7 @@ FROM_PAGE: dict[str, dict[str, Any]] = {
         "name": "/n", "instance_index": None, "modifier": None, "owner": "", **RAY,
     },
 }  # fmt: skip
-"""Fields of each message that the app reads of a page, as the page sends them."""
+"""Fields of each message that the app reads, as the page sends them."""
 
 
 @asynccontextmanager
@@ -82,19 +82,19 @@ def test_server_has_a_websocket_server(server: viser.ViserServer) -> None:
 
 def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> None:
     async def trial() -> None:
-        heard: list[tuple[Any, Any]] = []
+        received: list[tuple[Any, Any]] = []
         websocket = server._websock_server
         pass_on = websocket._handle_incoming_message
 
         async def handle(client_id: Any, message: Any) -> None:
-            heard.append((client_id, message))
+            received.append((client_id, message))
             await pass_on(client_id, message)
 
         websocket._handle_incoming_message = handle  # type: ignore[method-assign]
         async with browser(server) as socket:
             await socket.send(msgspec.msgpack.encode(CAMERA))
             await until(server.get_clients, "a client for the first camera")
-            ((client_id, message),) = heard
+            ((client_id, message),) = received
             assert isinstance(message, wire.ViewerCameraMessage)
             assert client_id in server.get_clients()
 
@@ -104,10 +104,10 @@ def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> Non
 
 def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> None:
     async def trial() -> None:
-        heard: list[Any] = []
+        received: list[Any] = []
 
         async def handle(_client_id: Any, message: Any) -> None:
-            heard.append(message)
+            received.append(message)
 
         def meet(connection: Any) -> None:
             connection._handle_incoming_message = handle
@@ -115,7 +115,7 @@ def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> N
         server._websock_server.on_client_connect(meet)
         async with browser(server) as socket:
             await socket.send(msgspec.msgpack.encode(CAMERA))
-            await until(lambda: heard, "the message")
+            await until(lambda: received, "the message")
 
     with part("_handle_incoming_message"):
         run(trial())
@@ -164,7 +164,7 @@ def test_producer_of_frames_can_be_replaced(
     server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server.scene.add_frame("/frame")
-    heard: list[str] = []
+    received: list[str] = []
 
     async def produce(
         line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None
@@ -173,15 +173,15 @@ def test_producer_of_frames_can_be_replaced(
         windows = buffer.window_generator(client_id, backlog_done_message=backlog_done_message)
         try:
             async for window in windows:
-                heard.extend(type(message).__name__ for message in window)
+                received.extend(type(message).__name__ for message in window)
         finally:
             await windows.aclose()
 
     async def trial() -> None:
         monkeypatch.setattr(_infra, "_message_producer", produce)
         async with browser(server):
-            await until(lambda: "ReplayDoneMessage" in heard, "the scene")
-        assert "FrameMessage" in heard
+            await until(lambda: "ReplayDoneMessage" in received, "the scene")
+        assert "FrameMessage" in received
 
     with part("_message_producer"), part("window_generator"):
         run(trial())
@@ -194,8 +194,10 @@ def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> 
         async with browser(server) as one, browser(server) as other:
             await until(lambda: len(connections) == 2, "both")
             connections[0].queue_message(wire.SetPositionMessage("/only", (0.0, 0.0, 0.0)))
-            told = [await Peer(socket).listen() for socket in (one, other)]
-        named = [[each for each in messages if each.get("name") == "/only"] for messages in told]
+            received = [await Peer(socket).listen() for socket in (one, other)]
+        named = [
+            [each for each in messages if each.get("name") == "/only"] for messages in received
+        ]
         assert sorted(map(len, named)) == [0, 1]
 
     with part("queue_message"):
@@ -219,8 +221,8 @@ def test_state_of_a_node_can_be_written_and_sent(server: viser.ViserServer) -> N
         assert frame._impl.props.show_axes == frame.show_axes
     with part("_queue_scene_message"):
         frame._impl.api._queue_scene_message(wire.SetPositionMessage("/frame", (1.0, 2.0, 3.0)))
-        (told,) = (each for each in sent(server) if isinstance(each, wire.SetPositionMessage))
-        assert told.position == (1.0, 2.0, 3.0)
+        (message,) = (each for each in sent(server) if isinstance(each, wire.SetPositionMessage))
+        assert message.position == (1.0, 2.0, 3.0)
 
 
 @pytest.mark.parametrize("kind", FROM_PAGE)

@@ -1,1 +1,1 @@
-"""What a person sees and touches: shows states, sends commands, computes nothing."""
+"""The view: shows states in viser and sends commands of people. It computes nothing."""

@@ -1,7 +1,7 @@
-"""The branches to choose from: what each would give and cost, and two ways to take one.
+"""The branches to choose from, with the outcome and cost of each.
 
-A table and buttons in the panel; and, when a person asks to see them, the arm as it would
-stand, to be clicked.
+A person takes a branch by a button below the table in the panel, or by a click on its ghost, which
+shows the arm on that branch. Ghosts are shown on request.
 """
 
 from __future__ import annotations
@@ -23,23 +23,25 @@ from katana450.server.view.controls import Listen
 from katana450.server.view.scene import Colour, GhostNodes
 
 COLOURS: tuple[Colour, ...] = ((47, 128, 237), (124, 77, 219), (0, 150, 136), (216, 67, 121))
-"""One for each of BRANCHES, told apart by people of every kind of sight; the table has them too."""
+"""Colours of BRANCHES in their order, which colour-blind people can distinguish."""
 
 OPACITY = 0.25
 
 NONE, OTHERS = "None", "All others"
-"""Whose ghosts are shown, beside that of one branch alone."""
+"""Choices of the ghosts that are shown, besides each single branch."""
 
 INTERVAL = 1.0
-"""[s] Between two looks at the branches while the arm moves and none is shown: a look costs more
-than several pictures."""
+"""Time [s] between two updates while the arm moves and no ghost is shown.
+
+One update takes longer than several frames.
+"""
 
 Find = Callable[[State], tuple[BranchOption, ...]]
-"""The choice on each of BRANCHES."""
+"""Returns the option for each of BRANCHES in a state."""
 
 
 class BranchList:
-    """Looking at the branches changes nothing."""
+    """Table, ghosts and buttons of the branches. The choice of a ghost changes only the display."""
 
     def __init__(
         self,
@@ -56,30 +58,31 @@ class BranchList:
         self._seen = state
         self._seen_at = -math.inf
         self._ghosts: list[GhostNodes] = []
-        # Ghosts are chosen in a thread of viser's.
+        # viser calls `_show` in a thread of its own when a ghost is chosen.
         self._lock = threading.Lock()
         found = find(state)
         self._table = server.gui.add_html(_rows(found, state.branch))
-        self._wanted = server.gui.add_dropdown(
+        self._ghost_choice = server.gui.add_dropdown(
             "Ghosts",
             (NONE, OTHERS, *(str(branch) for branch in BRANCHES)),
             initial_value=NONE,
-            hint="Shows the arm as it would stand; click a ghost and the arm goes there",
+            hint="Shows the arm on other branches. Click a ghost to move the arm there",
         )
-        self._wanted.on_update(lambda _: self._show())
+        self._ghost_choice.on_update(lambda _: self._show())
         take = server.gui.add_button_group(
             "Take",
             tuple(str(branch) for branch in BRANCHES),
-            hint="The tool where it is wished, the arm on this branch",
+            hint="Moves the arm to this branch; the target of the tool stays the same",
         )
         listen(take, lambda: TakeBranch(Branch.parse(take.value)))
 
     def follow(self, state: State, now: float) -> None:
-        """Show what the branches come to from ``state`` at time ``now`` [s].
+        """Update the branches for ``state`` at time ``now`` [s].
 
-        At once when the arm is at rest or a person watches the ghosts; else after INTERVAL.
+        The update is immediate while the arm is at rest or ghosts are shown. Otherwise at least
+        INTERVAL lies between two updates.
         """
-        watched = self._wanted.value != NONE or not state.moving
+        watched = self._ghost_choice.value != NONE or not state.moving
         if state is self._seen or not (watched or now - self._seen_at >= INTERVAL):
             return
         self._seen, self._seen_at = state, now
@@ -94,9 +97,9 @@ class BranchList:
         rows = _rows(found, state.branch)
         if rows != self._table.content:
             self._table.content = rows
-        wanted = self._wanted.value
+        wanted = self._ghost_choice.value
         if wanted != NONE and not self._ghosts:
-            # Made when first wanted: three more arms are half of what a page loads.
+            # Made on the first request: three more arms are half of the data that a page loads.
             self._ghosts = [self._ghost(number) for number in range(len(BRANCHES))]
         for ghost, choice in zip(self._ghosts, found, strict=False):
             branch = choice.metrics.branch
@@ -115,13 +118,13 @@ class BranchList:
 
 
 def _rows(found: tuple[BranchOption, ...], now: Branch) -> str:
-    """A row a branch, that of ``now`` marked."""
+    """Return the table as HTML, with one row per branch and the branch ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in BRANCH_HEADINGS)
     rows = "".join(
         f"<tr data-branch='{choice.metrics.branch}'"
         f"{' aria-current=true' if choice.metrics.branch == now else ''}>"
         f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
-        + "".join(f"<td>{escape(said)}</td>" for said in branch_cells(choice))
+        + "".join(f"<td>{escape(cell)}</td>" for cell in branch_cells(choice))
         + "</tr>"
         for choice, colour in zip(found, COLOURS, strict=True)
     )

@@ -1,4 +1,4 @@
-"""Where to look from: named views for one browser at a time."""
+"""Named camera views, chosen for each browser separately."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ from katana450.maths.kinematics.forward import forward
 from katana450.server.viser_bridge.presets import CAMERA_POSES, CameraPose, Preset
 
 BEHIND, ABOVE, AHEAD = 0.34, 0.16, 0.12
-"""[m] Where the camera rides on the tool, and how far ahead of the tool point it looks."""
+"""Offsets [m] of the tool camera.
+
+The camera is BEHIND and ABOVE the tool point and looks at the point AHEAD of it.
+"""
 
 
 class Cameras:
-    """Turns cameras; a browser that rides on the tool does so until it is given another view."""
+    """The cameras of all browsers. A camera on the tool follows it until another view is chosen."""
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
         self._arm = arm
@@ -35,7 +38,7 @@ class Cameras:
         _turn(client, camera_pose(preset, self._arm, state))
 
     def follow(self, state: State) -> None:
-        """Take the cameras that ride on the tool along."""
+        """Move the cameras that are on the tool to where the tool of ``state`` is."""
         with self._lock:
             riding = list(self._riding.values())
         for client in riding:
@@ -47,13 +50,13 @@ class Cameras:
 
 
 def camera_pose(preset: Preset, arm: MountedArm, state: State) -> CameraPose:
-    """The view that ``preset`` is of an arm in ``state``."""
+    """Return the camera pose of ``preset``; the tool camera depends on ``state``."""
     if preset is not Preset.TOOL:
         return CAMERA_POSES[preset]
     chain = arm.chain_to(state.tool)
     T = arm.T_base_shoulder @ forward(chain, state.q)
     p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
-    # Above in the arm's plane, however the tool is rolled.
+    # "Above" lies in the arm's plane and does not depend on the roll of the tool.
     up = z - (z @ x) * x
     size = float(np.linalg.norm(up))
     up = up / size if size > MIN_UP_SINE else -T[:3, 2]
@@ -61,7 +64,7 @@ def camera_pose(preset: Preset, arm: MountedArm, state: State) -> CameraPose:
 
 
 MIN_UP_SINE = 0.05
-"""The tool upright: up in its plane is no longer told by gravity."""
+"""Sine of the angle between tool axis and vertical below which the tool's own axis gives "up"."""
 
 
 def _turn(client: viser.ClientHandle, look: CameraPose) -> None:

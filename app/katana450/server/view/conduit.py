@@ -1,4 +1,4 @@
-"""The conduit in the scene: rings along its curves, drawn by the browser from one ring's shape."""
+"""The conduit in the scene: rings along its curves, drawn as instances of one mesh."""
 
 from __future__ import annotations
 
@@ -20,26 +20,29 @@ from katana450.server.viser_bridge.posing import arrange
 Floats = npt.NDArray[np.float32]
 
 RUBBER: Colour = (4, 4, 5)
-"""Of light, not of sRGB as elsewhere: so viser takes the colours of instances."""
+"""Linear colour, not sRGB as elsewhere: viser expects linear colours for instances."""
 
 PITCH = 4.2e-3
-"""[m] From rib to rib."""
+"""Distance [m] between two ribs."""
 
 PROFILE = ((-0.62, 0.84), (-0.3, 0.92), (0.0, 1.0), (0.3, 0.92), (0.62, 0.84))
-"""(along, out) of a ring, of the pitch and of the radius; neighbours overlap, so no gap opens in a
-bend."""
+"""Cross section of a ring as (along, out), fractions of pitch and radius.
+
+Neighbouring rings overlap, so that no gap opens in a bend.
+"""
 
 SIDES = 14
+"""Corners of a ring."""
 
 ANGLE_WORTH_SENDING = 2e-3
-"""[rad] Moves a rib by less than a third of a millimetre."""
+"""Smallest change [rad] that is sent. It moves a rib by less than a third of a millimetre."""
 
 
-class _Hung:
-    """A stretch as it is drawn: the poses of its rings for a row of angles, and the one shown."""
+class _StretchNode:
+    """One stretch in the scene, with the poses of its rings at a series of angles."""
 
     def __init__(self, server: viser.ViserServer, stretch: ConduitStretch, path: str) -> None:
-        """``path``: of its node in the scene."""
+        """Add the rings to the scene as the node ``path``."""
         self.stretch = stretch
         self._poses = poses(stretch, round(stretch.length / PITCH))
         self._steps = np.diff(self._poses, axis=0)
@@ -55,39 +58,39 @@ class _Hung:
         )
 
     def bend(self, angle: float) -> None:
-        """Bend it to the ``angle`` [rad] of its joint."""
+        """Show the stretch at the ``angle`` [rad] of its joint."""
         if abs(angle - self._shown) > ANGLE_WORTH_SENDING:
             self._shown = angle
             rings = self._at(angle)
             arrange(self._node, rings[:, :4], rings[:, 4:])
 
     def _at(self, angle: float) -> Floats:
-        """(count, 7) the rings' poses in between those worked out."""
+        """Return the poses (count, 7) of the rings, interpolated between the computed angles."""
         low, fraction = self.stretch.between(angle)
         rings: Floats = self._poses[low] + np.float32(fraction) * self._steps[low]
         return rings
 
 
 class Conduits:
-    """Hang below the links they start from; sent anew only when the joint between has moved."""
+    """All stretches, each a child of the link it starts from. Only changed stretches are sent."""
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm, nodes: ArmNodes) -> None:
-        self._hung = [
-            _Hung(server, stretch, f"{nodes.path[stretch.start.link]}/conduit{number}")
+        self._stretches = [
+            _StretchNode(server, stretch, f"{nodes.path[stretch.start.link]}/conduit{number}")
             for number, stretch in enumerate(arm.stretches)
         ]
 
     def move(self, angles: Mapping[str, float]) -> None:
-        """Bend it to the joint ``angles`` [rad]."""
-        for hung in self._hung:
-            hung.bend(angles[hung.stretch.hinge.joint])
+        """Show the conduit at the joint ``angles`` [rad], given by joint name."""
+        for node in self._stretches:
+            node.bend(angles[node.stretch.hinge.joint])
 
 
 def poses(stretch: ConduitStretch, count: int) -> Floats:
-    """(A, count, 7) wxyz and position [m] of the rings for each of its angles.
+    """Return the poses (A, count, 7) of the rings at each angle: wxyz and position [m].
 
-    From angle to angle every ring turns the shortest way, so that a pose in between is to be had
-    by leading all seven numbers linearly: its quaternion is then of length 1 to a thousandth.
+    From one angle to the next every ring makes its shortest turn. All seven numbers may therefore
+    be interpolated linearly; the length of the quaternion is then 1 to a thousandth.
     """
     points, tangents = stretch.courses(stretch.angles, count)
     wxyz = np.empty((*tangents.shape[:2], 4))
@@ -99,18 +102,19 @@ def poses(stretch: ConduitStretch, count: int) -> Floats:
 
 
 def _shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Wxyz (n, 4) of the turns of the unit vectors ``a`` onto ``b``, both (n, 3)."""
+    """Return quaternions (n, 4) that turn the unit vectors ``a`` onto ``b``, both (n, 3)."""
     wxyz = np.column_stack((1.0 + (a * b).sum(axis=1), np.cross(a, b)))
-    # Straight back, as from x only: of the half turns that will do, the one about z.
+    # Opposite vectors, which occur only for a = x: of all possible half turns, the one about z.
     wxyz[wxyz[:, 0] < BACKWARD] = (0.0, 0.0, 0.0, 1.0)
     return np.asarray(wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True))
 
 
 BACKWARD = 1e-9
+"""Bound of 1 + cos(angle) below which two unit vectors count as opposite."""
 
 
 def ring(radius: float) -> tuple[FloatArray, npt.NDArray[Any]]:
-    """Vertices (n, 3) [m] and faces (m, 3) of a rib about the x axis."""
+    """Return vertices (n, 3) [m] and faces (m, 3) of a rib about the x axis."""
     turn = np.arange(SIDES) * (math.tau / SIDES)
     circle = np.stack((np.zeros(SIDES), np.cos(turn), np.sin(turn)), axis=1)
     rows = [np.array([along * PITCH, 0.0, 0.0]) + out * radius * circle for along, out in PROFILE]

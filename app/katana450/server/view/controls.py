@@ -1,4 +1,4 @@
-"""What every panel is made of: controls that send commands, and are written with what is new."""
+"""Parts of every panel: controls that send commands, and functions that update them."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from katana450.errors import KatanaError, LeaseError
 from katana450.server.viser_bridge.labels import PACING
 
 WORTH_SENDING = 2e-6
-"""[deg, mm] Rounding on the way to radians and back is less."""
+"""Smallest change [deg, mm] that is sent. The conversion to radians and back rounds by less."""
 
 FINEST = 100.0
-"""Parts of a degree or mm that a slider's ends are told in."""
+"""Divisions of a degree or mm to which the ends of a slider are rounded."""
 
 READ_IN = 10.0
-"""[s] Why something is not done goes away by itself, or the reasons would cover the scene."""
+"""Time [s] after which the reason of a refusal closes, so that reasons do not cover the scene."""
 
 Clickable = (
     viser.GuiInputHandle[Any]
@@ -30,10 +30,13 @@ Clickable = (
     | viser.GuiButtonGroupHandle
     | viser.MeshHandle
 )
-"""What a person changes or clicks."""
+"""Handles of the controls that a person changes or clicks."""
 
 Listen = Callable[[Clickable, Callable[[], cmd.Command]], None]
-"""Sends what the function makes when a person, not this program, changes the handle."""
+"""Sends the command that the function makes when a person changes the handle.
+
+A change by this program sends nothing.
+"""
 
 ORDERS: dict[str, cmd.Command] = {
     "Pause": cmd.Pause(),
@@ -42,43 +45,50 @@ ORDERS: dict[str, cmd.Command] = {
 
 
 class GestureGate(Protocol):
-    """Path of a person's gestures to the arm; ``viser_bridge.gestures.Gestures`` is one."""
+    """Path of a person's gestures to the arm; ``viser_bridge.gestures.Gestures`` implements it."""
 
     def actor(self, client_id: int | None, /) -> Actor:
-        """Return the giver of the gesture that viser just told of. Raises LeaseError."""
+        """Return the actor of the gesture that viser just reported. Raises LeaseError."""
         ...
 
     def submit(self, command: cmd.Command, actor: Actor, /) -> int:
-        """Give ``command`` to the arm; return its ticket. Raises LeaseError and InputError."""
+        """Submit ``command`` and return its ticket. Raises LeaseError and InputError."""
         ...
 
     def is_current(self, actor: Actor, /) -> bool:
-        """Return whether there was neither a stop nor a loss of the lease since ``actor`` began."""
+        """Return False if a stop or a loss of the lease has happened since ``actor`` began."""
         ...
 
 
 class NoGestures:
-    """A `GestureGate` that refuses everything, for a scene that drives no arm."""
+    """A `GestureGate` that refuses everything, for a scene that only shows an arm."""
 
     def actor(self, _client_id: int | None) -> Actor:
-        raise LeaseError("This scene shows an arm and drives none.")
+        """Raise LeaseError."""
+        raise LeaseError(SHOW_ONLY)
 
     def submit(self, _command: cmd.Command, _actor: Actor) -> int:
-        raise LeaseError("This scene shows an arm and drives none.")
+        """Raise LeaseError."""
+        raise LeaseError(SHOW_ONLY)
 
     def is_current(self, _actor: Actor) -> bool:
+        """Return False."""
         return False
 
 
-def listener(gestures: GestureGate) -> Listen:
-    """Return one that submits commands, and shows the person why one is refused."""
+SHOW_ONLY = "This scene only shows an arm; it cannot drive one."
+"""Reason for the refusal of every gesture in a scene without an arm."""
 
-    def listen(handle: Clickable, say: Callable[[], cmd.Command]) -> None:
+
+def listener(gestures: GestureGate) -> Listen:
+    """Return a function that submits commands and shows the person the reason of a refusal."""
+
+    def listen(handle: Clickable, make: Callable[[], cmd.Command]) -> None:
         async def changed(event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:
-                gestures.submit(say(), gestures.actor(event.client_id))
+                gestures.submit(make(), gestures.actor(event.client_id))
             except KatanaError as error:
                 refuse(event, error)
 
@@ -94,7 +104,7 @@ def refuse(
     event: viser.GuiEvent[Any] | viser.SceneNodePointerEvent[Any] | viser.TransformControlsEvent,
     error: KatanaError,
 ) -> None:
-    """Tell whoever asked why it is not done, in their window."""
+    """Show ``error`` in the window in which ``event`` happened."""
     if event.client is not None:
         event.client.add_notification(
             "Not done", str(error), color="red", auto_close_seconds=READ_IN
@@ -102,11 +112,11 @@ def refuse(
 
 
 def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSliderHandle[float]:
-    """Pause, Resume, and how fast; the slider of that."""
+    """Add the buttons Pause and Resume and the speed slider. Return the slider [percent]."""
     orders = gui.add_button_group(
         PACING[0],
         tuple(ORDERS),
-        hint="Pause: rest on the way, until Resume. STOP is above, and on Space and Esc",
+        hint="Pause: wait on the path until Resume. STOP is at the top, and on Space and Esc",
     )
     listen(orders, lambda: ORDERS[orders.value])
     speed = gui.add_slider(
@@ -115,28 +125,28 @@ def add_motion(gui: viser.GuiApi, listen: Listen, state: State) -> viser.GuiSlid
         max=100.0,
         step=1.0,
         initial_value=round(100.0 * state.speed),
-        hint="Percent of the greatest speed, also of a motion under way",
+        hint="Percent of the maximum speed, also for the current motion",
     )
     listen(speed, lambda: cmd.SpeedScale(speed.value / 100.0))
     return speed
 
 
 def ends(lower: float, upper: float) -> tuple[float, float]:
-    """Of a slider between limits [deg, mm]: numbers a person can read, and never beyond them."""
+    """Return the ends of a slider between limits [deg, mm], rounded and never beyond the limits."""
     low = math.ceil(FINEST * (lower - WORTH_SENDING)) / FINEST
     return low, math.floor(FINEST * (upper + WORTH_SENDING)) / FINEST
 
 
 def set_value(handle: Any, value: object) -> None:
-    """Show ``value``, if it is another."""
+    """Show ``value`` if it differs from the value that is shown."""
     known = handle.value
     if (tuple(known) if isinstance(known, list | np.ndarray) else known) != value:
         handle.value = value
 
 
 def set_slider(slider: viser.GuiSliderHandle[float], value: float) -> None:
-    """Show ``value``, if it is another."""
-    # Rounded off where nobody can see it, so that no slider shows "-0.00".
+    """Show ``value``, clipped to the ends, if it differs from the value that is shown."""
+    # Rounded beyond the digits that are shown, so that no slider shows "-0.00".
     value = min(max(round(value, 6) + 0.0, slider.min), slider.max)
     if abs(slider.value - value) > WORTH_SENDING:
         set_value(slider, value)

@@ -1,4 +1,4 @@
-"""Controls that change what is seen and nothing else: camera, theme, what is drawn besides."""
+"""Controls that change only the display: camera, theme and additional drawings."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ from katana450.server.viser_bridge.themes import THEMES
 
 @dataclass(frozen=True)
 class DisplayOptions:
-    """What the controls call.
+    """The functions that the controls call.
 
-    ellipsoid, handles: show or hide them. look_from: turns one browser's camera. layers: what
-    extensions show.
+    Attributes:
+        ellipsoid: shows or hides the velocity ellipsoid.
+        handles: shows or hides the handles of scene objects.
+        look_from: turns the camera of one browser.
+        layers: layers of extensions.
     """
 
     ellipsoid: Callable[[bool], None]
@@ -28,12 +31,12 @@ class DisplayOptions:
 
 
 def add_views(gui: viser.GuiApi, shows: DisplayOptions) -> None:
-    """A row of buttons, each for the browser it is clicked in."""
+    """Add the buttons of the camera views. A click changes only its own browser."""
     views = gui.add_button_group(
         "View",
         tuple(preset.value for preset in Preset),
-        hint="Where you look from; Tool rides on the tool until you choose another. "
-        "Drag, right-drag and wheel turn, shift and zoom",
+        hint="Camera of this window. Tool follows the tool until you choose another view. "
+        "Drag to turn, right-drag to shift, wheel to zoom",
     )
 
     @views.on_click
@@ -43,18 +46,18 @@ def add_views(gui: viser.GuiApi, shows: DisplayOptions) -> None:
 
 
 def add_shows(gui: viser.GuiApi, shows: DisplayOptions) -> None:
-    """The rest of them."""
+    """Add the controls of the folder "Show"."""
     add_themes(gui)
     box = gui.add_checkbox(
         "Velocity ellipsoid",
         initial_value=False,
-        hint="How fast the tool point can go in each direction: flat where one is lost",
+        hint="Possible speed of the tool point in each direction; flat at a singularity",
     )
     box.on_update(lambda _: shows.ellipsoid(box.value))
     handles = gui.add_checkbox(
         "Handles on objects",
         initial_value=False,
-        hint="Arrows by which cup, basin and objects can be put elsewhere on the table",
+        hint="Arrows that move cup, basin and other objects on the table",
     )
     handles.on_update(lambda _: shows.handles(handles.value))
     for layer in shows.layers:
@@ -62,5 +65,5 @@ def add_shows(gui: viser.GuiApi, shows: DisplayOptions) -> None:
 
 
 def add_themes(gui: viser.GuiApi) -> None:
-    """Light or dark. The page changes its own theme; the server does not see the click."""
-    gui.add_button_group("Theme", tuple(THEMES), hint="Of this window alone")
+    """Add the theme buttons. The page changes its own theme; the server does not see the click."""
+    gui.add_button_group("Theme", tuple(THEMES), hint="Only for this window")

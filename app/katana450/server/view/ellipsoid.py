@@ -1,4 +1,4 @@
-"""How fast the tool point can go in each direction, drawn as an ellipsoid round it."""
+"""The velocity ellipsoid, which shows how fast the tool point can move in each direction."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import velocity_ellipsoid
 
 SCALE = 0.2
-"""[rad] Drawn is how far the tool point gets while the joints turn by this much together."""
+"""Joint motion [rad] (norm) to which the drawn displacement of the tool point belongs."""
 
 MIN_RADIUS = 1e-3
-"""[m] Flat in a singularity, but still to be seen."""
+"""Minimum radius [m]: the ellipsoid is flat in a singularity, but stays visible."""
 
 COLOUR = (124, 77, 219)
 
 
 class EllipsoidNode:
-    """Hidden until a person asks for it."""
+    """The ellipsoid in the scene, hidden until a person shows it."""
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
         self._arm = arm
@@ -36,12 +36,12 @@ class EllipsoidNode:
         )
 
     def show(self, visible: bool, state: State) -> None:
-        """Show it for ``state``, or hide it."""
+        """Show the ellipsoid for ``state``, or hide it."""
         self._node.visible = visible
         self.follow(state)
 
     def follow(self, state: State) -> None:
-        """Go where the tool of ``state`` is, if shown."""
+        """Draw the ellipsoid for ``state`` if it is shown."""
         if not self._node.visible:
             return
         chain = self._arm.chain_to(state.tool)

@@ -1,8 +1,8 @@
-"""The handle a person drags: five freedoms, because the arm has five.
+"""The handle at the tool that a person drags. It has five degrees of freedom, as the arm has.
 
-Arrows move the tool point. Two rings turn the tool: pitch, about the horizontal that
-is square to the arm's plane, and roll, about the tool's own axis. There is no third ring: where
-the tool points sideways follows from where it is.
+Arrows move the tool point. Two rings turn the tool: pitch about the horizontal that is square to
+the arm's plane, and roll about the tool's own axis. There is no third ring, because the position
+determines the sideways direction of the tool.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
 
 SIZE = 0.13
-"""[m] Length of the arrows: clear of the gripper, within the picture."""
+"""Length [m] of the arrows: they are clear of the gripper and stay within the picture."""
 
 RINGS = 1.6
-"""Size of the rings to that of the arrows: their arcs end just outside the arrow heads."""
+"""Ratio of ring size to arrow size: the arcs end just outside the arrow heads."""
 
 DISTANCE_WORTH_SENDING = 1e-6
-"""[m]"""
+"""Smallest change of position [m] that is sent."""
 
 TURN_WORTH_SENDING = 1e-7
-"""Of each number of a quaternion."""
+"""Smallest change of a number of a quaternion that is sent."""
 
 
 PARTS = ("move", "pitch", "roll")
-"""What of the handle can be held."""
+"""Parts of the gizmo that can be held."""
 
 
 @dataclass
 class _Turn:
-    """A ring drag under way: where it began and how far it has gone [rad]."""
+    """A drag of a ring: rotation, pitch and roll [rad] at its start, and the angle so far [rad]."""
 
     R_start: FloatArray
     pitch: float
@@ -56,7 +56,7 @@ class _Turn:
 
 @dataclass(frozen=True)
 class _Aim:
-    """Where the parts of the handle are when nobody holds them, as viser has it."""
+    """The poses of the gizmo's parts while they are not held, in the types of viser."""
 
     point: Point
     pitched: Quaternion
@@ -64,7 +64,7 @@ class _Aim:
 
 
 class Gizmo:
-    """Sends where the handle is dragged; goes where the goal is when nobody holds it."""
+    """The gizmo: sends the pose to which it is dragged, and follows the goal while not held."""
 
     def __init__(
         self,
@@ -73,7 +73,14 @@ class Gizmo:
         gestures: GestureGate,
         current: Callable[[], State],
     ) -> None:
-        """``current``: the newest state."""
+        """Add the gizmo to the scene.
+
+        Args:
+            server: viser's server.
+            arm: The arm of the gizmo.
+            gestures: The path of gestures to the arm.
+            current: Returns the newest state.
+        """
         self._arm = arm
         self._gestures = gestures
         self._current = current
@@ -112,7 +119,7 @@ class Gizmo:
         )
 
     def aim(self, state: State, T: FloatArray) -> None:
-        """Take in where the goal of ``state`` is, ``T`` (4, 4) in the base frame."""
+        """Store the pose of the goal of ``state``; its ``T`` (4, 4) is in the base frame."""
         chain = self._arm.chain_to(state.tool)
         pitched = self._arm.T_base_shoulder[:3, :3] @ pitched_frame(chain, state.goal)
         _, roll = pitch_and_roll(chain, state.goal)
@@ -121,7 +128,7 @@ class Gizmo:
         self._aim = _Aim((x, y, z), _quaternion(pitched), _quaternion(rolled))
 
     def follow(self) -> None:
-        """Go where the goal is, but for what is held."""
+        """Move the parts that are not held to the goal."""
         aim = self._aim
         apart = _apart(self._move.position, aim.point) > DISTANCE_WORTH_SENDING
         if apart and not any(map(self._holds, PARTS)):
@@ -144,7 +151,7 @@ class Gizmo:
         self._submit(event, actor, MoveTool(p @ self._arm.T_base_shoulder[:3, :3]))
 
     def _submit(self, event: viser.TransformControlsEvent, actor: Actor, command: Command) -> None:
-        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        # A drag sends 20 messages a second: the next one repeats the request or shows the refusal.
         with suppress(KatanaError):
             self._gestures.submit(command, actor)
             if event.phase == "end":
@@ -169,13 +176,16 @@ class Gizmo:
     def _turning(
         self, event: viser.TransformControlsEvent, actor: Actor, ring: str
     ) -> _Turn | None:
-        """Follow one ring's drag; the turn is counted on past half a circle."""
+        """Update the turn of a ring's drag and return it; None at its start or without a drag.
+
+        The angle is counted past half a circle.
+        """
         R = so3.from_quaternion(np.asarray(event.target.wxyz, dtype=float))
         if event.phase == "start":
             state = self._current()
-            wish = state.target
-            if isinstance(wish, ToolTarget):
-                pitch, roll = wish.pitch, wish.roll
+            target = state.target
+            if isinstance(target, ToolTarget):
+                pitch, roll = target.pitch, target.roll
             else:
                 chain = self._arm.chain_to(state.tool)
                 pitch, roll = pitch_and_roll(chain, state.goal)
@@ -203,9 +213,10 @@ def _turn(handle: viser.TransformControlsHandle, wxyz: Quaternion) -> None:
         turn(handle, wxyz)
 
 
-def _apart(there: FloatArray, here: tuple[float, ...]) -> float:
-    known: list[float] = there.tolist()
-    return max(abs(a - b) for a, b in zip(known, here, strict=True))
+def _apart(shown: FloatArray, new: tuple[float, ...]) -> float:
+    """Return the largest difference between two numbers at the same place."""
+    numbers: list[float] = shown.tolist()
+    return max(abs(a - b) for a, b in zip(numbers, new, strict=True))
 
 
 def _quaternion(R: FloatArray) -> Quaternion:

@@ -1,4 +1,4 @@
-"""What extensions show in the scene of an arm."""
+"""Layers that extensions add to the scene of an arm."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ class ViewLayer(Protocol):
 
     @property
     def what(self) -> str:
-        """A sentence on what was asked for and needs an arm; empty to be left out without one."""
+        """Sentence that names the requested feature, which needs an arm.
+
+        If it is empty, the layer is left out for a robot without an arm.
+        """
 
     def attach(self, server: viser.ViserServer, robot: Robot) -> None:
         """Prepare for the arm of ``robot`` on ``server``. Raises ConfigurationError."""

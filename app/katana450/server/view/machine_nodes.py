@@ -1,4 +1,4 @@
-"""Any robot in the browser: a frame a link, nested as the links are, that turns or slides."""
+"""Any robot in the scene: one frame per link, nested as the links are, that turns or slides."""
 
 from __future__ import annotations
 
@@ -16,22 +16,26 @@ from katana450.server.view.scene import add_shape
 from katana450.server.viser_bridge.posing import place, turn
 
 WORTH_SENDING = 1e-7
-"""[rad, m] A joint that moved less is where it was."""
+"""Smallest change of a joint [rad, m] that is sent."""
 
 
 class MachineNodes:
-    """The links and their shapes."""
+    """The links of a robot and their shapes, as nodes of the scene.
+
+    Attributes:
+        path: path of each link's node, by link name.
+        shapes: nodes of each link's shapes in their original look, by link name.
+    """
 
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
         self.path: dict[str, str] = {}
         self.shapes: dict[str, list[viser.MeshHandle]] = {}
-        """Of each link, as they are made."""
         self._jointed: list[tuple[Joint, FloatArray, viser.FrameHandle]] = []
         self._sent: dict[str, float] = {}
         self._surfaces = {link.name: link.shapes for link in robot.links}
         for number, link in enumerate(robot.links):
             above = "" if link.parent is None else self.path[link.parent]
-            # A link's own name may hold what a path is parted by.
+            # The name of a link may contain the separator of paths.
             path = self.path[link.name] = f"{above}/link{number}"
             T = link.T_parent_link
             frame = server.scene.add_frame(
@@ -45,11 +49,11 @@ class MachineNodes:
             ]
 
     def surfaces(self, link: str) -> Sequence[VisualMesh]:
-        """What its shapes are."""
+        """Return the surfaces of ``link``."""
         return self._surfaces[link]
 
     def move(self, values: Mapping[str, float]) -> None:
-        """Put the links where the joint ``values`` [rad, m] have them; sends only what changed."""
+        """Place the links for the joint ``values`` [rad, m]. Only changes are sent."""
         for joint, T_parent_link, frame in self._jointed:
             value = values[joint.name]
             if abs(value - self._sent.get(joint.name, np.inf)) <= WORTH_SENDING:

@@ -1,4 +1,4 @@
-"""The front panel of a mechanism that is driven joint by joint: why that is so, and its sliders."""
+"""The control panel of a mechanism that is driven joint by joint: the reason, and its sliders."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from katana450.server.view.view_updater import READOUT_INTERVAL
 GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
 
 STEPS = 400
-"""Of a slider from end to end, at least."""
+"""Minimum number of steps of a slider from end to end."""
 
 
 class MachinePanel:
-    """Sliders show the goal; the read-out shows where the joints are."""
+    """The panel. Its sliders show the goal, and its read-out shows the joint values."""
 
     def __init__(
         self,
@@ -41,11 +41,11 @@ class MachinePanel:
         gestures: GestureGate,
         state: State,
     ) -> None:
-        """``state``: what the panel shows first."""
+        """Add the controls to ``gui``; they show ``state`` first."""
         self._gui = gui
         self._joints = joints
-        self._told_at = -math.inf
-        self._told = ""
+        self._shown_at = -math.inf
+        self._shown = ""
         listen: Listen = listener(gestures)
         self._readout = gui.add_html(page(joints, state))
         gui.add_html(f"<div class='k450'><p><b>Joints only.</b> {escape(joints.why)}</p></div>")
@@ -54,7 +54,7 @@ class MachinePanel:
         drive = gui.add_button_group(
             "Drive",
             tuple(GESTURES),
-            hint="Home: every joint to zero, or the limit next to it. Hold: stop here.",
+            hint="Home: every joint to zero, or to the limit nearest to zero. Hold: stop here.",
         )
         listen(drive, lambda: GESTURES[drive.value])
         self._speed = add_motion(gui, listen, state)
@@ -68,16 +68,16 @@ class MachinePanel:
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
     ) -> None:
         """Show ``state`` at time ``now`` [s]; see ``Panel.follow``."""
-        if now - self._told_at < READOUT_INTERVAL:
+        if now - self._shown_at < READOUT_INTERVAL:
             return
-        self._told_at = now
+        self._shown_at = now
         if caught_up:
             for axis, slider in enumerate(self._sliders):
                 set_slider(slider, shown(self._joints, axis, float(state.goal[axis])))
             set_slider(self._speed, 100.0 * state.speed)
-        told = page(self._joints, state)
-        if told != self._told:
-            self._told = self._readout.content = told
+        text = page(self._joints, state)
+        if text != self._shown:
+            self._shown = self._readout.content = text
         self._why.follow(event_log)
 
     def _slider(self, axis: int, state: State, listen: Listen) -> viser.GuiSliderHandle[float]:
@@ -87,7 +87,7 @@ class MachinePanel:
         )
         slides = joints.slides[axis]
         slider = self._gui.add_slider(
-            # With its number, as sentences have it; no name can pass for that of another control.
+            # The number stands in messages too, and keeps the label apart from other controls.
             f"{axis + 1}. {joints.names[axis]}",
             min=low,
             max=high,
@@ -102,12 +102,12 @@ class MachinePanel:
 
 
 def shown(joints: JointSet, axis: int, value: float) -> float:
-    """A joint's value as people read it: [rad] in degrees, [m] in mm."""
+    """Return the ``value`` of a joint [rad, m] in the units of the panel [deg, mm]."""
     return 1e3 * value if joints.slides[axis] else math.degrees(value)
 
 
 def page(joints: JointSet, state: State) -> str:
-    """The read-out for ``state``, as HTML."""
+    """Return the read-out for ``state`` as HTML."""
     rows = "".join(
         f"<tr><th>{axis + 1}. {escape(name)}</th>"
         f"<td data-now='{axis}'>{signed(shown(joints, axis, float(state.q[axis])), 1)}</td>"

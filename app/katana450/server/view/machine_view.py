@@ -20,7 +20,7 @@ from katana450.server.view.view_updater import ViewUpdater
 
 
 class MachineView(ViewUpdater):
-    """Its links, and a panel of its joints. There is nothing to be dragged."""
+    """The links of the robot and a panel with its joints. The scene has no gizmo."""
 
     def __init__(
         self,
@@ -31,7 +31,16 @@ class MachineView(ViewUpdater):
         last_ticket: Callable[[], int],
         frame_rate: float,
     ) -> None:
-        """``last_ticket``: of the newest command. ``frame_rate``: most updates a second [Hz]."""
+        """Build the scene and the panel.
+
+        Args:
+            server: viser's server.
+            robot: The robot.
+            state_publisher: The source of snapshots.
+            gestures: The path of gestures to the arm.
+            last_ticket: Returns the ticket of the newest command.
+            frame_rate: Maximum number of updates per second [Hz].
+        """
         super().__init__(server, state_publisher, frame_rate)
         self._robot = robot
         self._last_ticket = last_ticket
@@ -47,6 +56,7 @@ class MachineView(ViewUpdater):
         self.show(state_publisher.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
+        """Send the changes in ``snapshot`` to every browser."""
         state = snapshot.state
         with self._server.atomic():
             self._nodes.move(self._robot.joint_values(state.q, state.gripper))

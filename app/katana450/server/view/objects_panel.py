@@ -1,4 +1,4 @@
-"""The panel of objects: choose one, colour, scale, turn, attach and remove it."""
+"""The panel of scene objects: choose one, and colour, scale, turn, attach or remove it."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from katana450.server.view.controls import GestureGate, refuse, set_value
 from katana450.server.view.scene_objects import COLOUR
 
 NOTHING = "nothing yet"
+"""The only choice while there are no objects."""
 
 MOUNTS = {"Hand": Attachment.HAND, "Table": Attachment.TABLE, "Here": Attachment.WORLD}
 
@@ -37,7 +38,7 @@ OWN, REMOVE = "Own colour", "Remove"
 
 
 class ObjectsPanel:
-    """A folder of controls, all of the one object that is chosen."""
+    """A folder of controls for the chosen scene object."""
 
     def __init__(
         self,
@@ -46,7 +47,14 @@ class ObjectsPanel:
         state: Callable[[], State],
         environment: Environment,
     ) -> None:
-        """``state``: the newest. ``surroundings``: what objects stand on and are fixed to."""
+        """Add the folder to the panel.
+
+        Args:
+            server: viser's server.
+            gestures: The path of gestures to the arm.
+            state: Returns the newest state.
+            environment: The supports and links to which objects can be fixed.
+        """
         self._environment = environment
         self._gestures = gestures
         self._state = state
@@ -56,7 +64,7 @@ class ObjectsPanel:
         names = _names(self._objects)
         with gui.add_folder("Objects", expand_by_default=False):
             self._choice = gui.add_dropdown(
-                "Object", names, hint="What the rest of this folder is about"
+                "Object", names, hint="The controls below are for this object"
             )
             self._colour = gui.add_rgb("Colour", COLOUR)
             self._opacity = gui.add_slider(
@@ -65,7 +73,7 @@ class ObjectsPanel:
                 max=100.0,
                 step=1.0,
                 initial_value=100.0,
-                hint="Percent; for contacts it counts whole whatever it looks like",
+                hint="Percent. It does not change the collision checks",
             )
             self._scale = gui.add_number(
                 "Scale",
@@ -73,7 +81,7 @@ class ObjectsPanel:
                 min=MIN_SCALE,
                 max=MAX_SCALE,
                 step=0.001,
-                hint="Times the size it came with",
+                hint="Relative to the original size",
             )
             self._turn = gui.add_slider(
                 "Turn",
@@ -81,18 +89,18 @@ class ObjectsPanel:
                 max=180.0,
                 step=1.0,
                 initial_value=0.0,
-                hint="About the vertical, degrees",
+                hint="About the vertical, in degrees",
             )
             self._hidden = gui.add_checkbox(
                 "Hidden",
                 initial_value=False,
-                hint="Not drawn; the arm keeps clear of it even so",
+                hint="Not drawn. The arm still keeps clear of it",
             )
             self._mounts = gui.add_button_group(
                 "Attach to",
                 tuple(MOUNTS),
-                hint="Hand: it goes with the hand and counts as a part of it. Table: it is set "
-                "down below. Here: it stays where it is, in the air too",
+                hint="Hand: it moves with the hand as a part of it. Table: it is set down on the "
+                "table below. Here: it stays where it is, even in the air",
             )
             self._acts = gui.add_button_group("And", (OWN, REMOVE))
         self._on(self._colour, lambda scene_object: _recoloured(scene_object, self._colour.value))
@@ -111,11 +119,11 @@ class ObjectsPanel:
         )
         self._on(self._mounts, self._mounted)
         self._on(self._acts, self._acted)
-        self._choice.on_update(lambda _: self._show(self._chosen(), anew=True))
-        self._show(self._chosen(), anew=True)
+        self._choice.on_update(lambda _: self._show(self._chosen(), again=True))
+        self._show(self._chosen(), again=True)
 
     def follow(self, state: State, *, caught_up: bool) -> None:
-        """Show what there is. ``caught_up``: see ``Panel``."""
+        """Show the objects of ``state``. ``caught_up``: see ``Panel.follow``."""
         if not caught_up:
             return
         self._objects = state.objects
@@ -125,7 +133,7 @@ class ObjectsPanel:
             chosen = self._choice.value
             self._choice.options = names
             if new or chosen not in names:
-                # What has just come is what one wants to touch.
+                # A new object becomes the chosen one.
                 chosen = new[-1] if new else names[0]
             set_value(self._choice, chosen)
         self._show(self._chosen())
@@ -133,8 +141,8 @@ class ObjectsPanel:
     def _chosen(self) -> SceneObject | None:
         return named(self._objects, self._choice.value)
 
-    def _show(self, scene_object: SceneObject | None, *, anew: bool = False) -> None:
-        if scene_object is None or (scene_object is self._shown and not anew):
+    def _show(self, scene_object: SceneObject | None, *, again: bool = False) -> None:
+        if scene_object is None or (scene_object is self._shown and not again):
             return
         self._shown = scene_object
         set_value(self._colour, scene_object.appearance.colour or COLOUR)
@@ -157,21 +165,21 @@ class ObjectsPanel:
             return cmd.Remove(scene_object.name)
         return _looking(scene_object, colour=None)
 
-    def _on(self, handle: Any, say: Callable[[SceneObject], cmd.Command]) -> None:
-        """Send what ``say`` makes of the chosen object when a person changes ``handle``."""
+    def _on(self, handle: Any, make: Callable[[SceneObject], cmd.Command]) -> None:
+        """Send the command that ``make`` returns for the chosen object when ``handle`` changes."""
 
         async def changed(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:
                 return
             try:
-                # What is shown may be older than what was put there meanwhile.
+                # The objects that are shown may be older than those of the newest state.
                 self._objects = self._state().objects
                 scene_object = self._chosen()
                 if scene_object is None:
                     raise InputError("There is no object: add one first.")
-                self._gestures.submit(say(scene_object), self._gestures.actor(event.client_id))
+                self._gestures.submit(make(scene_object), self._gestures.actor(event.client_id))
             except KatanaError as error:
-                self._show(self._chosen(), anew=True)
+                self._show(self._chosen(), again=True)
                 refuse(event, error)
 
         if isinstance(handle, viser.GuiButtonGroupHandle):
@@ -202,12 +210,14 @@ def _recoloured(scene_object: SceneObject, value: tuple[int, int, int]) -> cmd.C
 
 def _scaled(scene_object: SceneObject, scale: float) -> cmd.Command:
     if scene_object.name in (CUP, BASIN):
-        raise InputError(f"The {scene_object.name} is as large as the water in it counts on.")
+        raise InputError(
+            f"The {scene_object.name} cannot be scaled: the water model depends on its size."
+        )
     return _placed(scene_object, scale=float(scale))
 
 
 def _turned(scene_object: SceneObject, yaw: float) -> cmd.Command:
-    """About the z axis of the frame that it is in, where it stands."""
+    """Return the command that sets the yaw [rad] of ``scene_object`` in its own frame."""
     roll, pitch, _ = so3.to_rpy(scene_object.T[:3, :3])
     T = np.array(scene_object.T)
     T[:3, :3] = so3.from_rpy(roll, pitch, yaw)

@@ -1,4 +1,4 @@
-"""Links that somebody hid, or painted in one colour."""
+"""Links that are hidden or painted in one colour."""
 
 from __future__ import annotations
 
@@ -16,9 +16,11 @@ from katana450.server.view.scene import add_shape, of_255
 
 @dataclass
 class _PaintCoat:
-    """What a link is shown as once it is painted.
+    """The painted shapes of a link.
 
-    colour: of a paint that nobody has mixed.
+    Attributes:
+        shapes: the nodes.
+        colour: colour (sRGB, 0 to 1) if the appearance has none.
     """
 
     shapes: Sequence[viser.MeshHandle]
@@ -33,19 +35,22 @@ class _PaintCoat:
 
 
 class LinkPaint(Protocol):
-    """The nodes of a robot's links, by name: its shapes as they are made, and what they are."""
+    """The nodes of a robot's links, such as `ArmNodes` or `MachineNodes`."""
 
     @property
-    def shapes(self) -> Mapping[str, Sequence[Any]]: ...
+    def shapes(self) -> Mapping[str, Sequence[Any]]:
+        """Nodes of each link's shapes in their original look, by link name."""
 
     @property
-    def path(self) -> Mapping[str, str]: ...
+    def path(self) -> Mapping[str, str]:
+        """Path of each link's node, by link name."""
 
-    def surfaces(self, link: str) -> Sequence[VisualMesh]: ...
+    def surfaces(self, link: str) -> Sequence[VisualMesh]:
+        """Return the surfaces of ``link``, one per material."""
 
 
 class PaintNodes:
-    """Follows the looks of a state; all that was never painted costs nothing."""
+    """Shows the appearance of links. Painted shapes are made when a link is first painted."""
 
     def __init__(self, server: viser.ViserServer, links: LinkPaint) -> None:
         self._server = server
@@ -54,7 +59,7 @@ class PaintNodes:
         self._seen = Appearance()
 
     def follow(self, state: State) -> None:
-        """Show every link as ``state`` says."""
+        """Show every link with its appearance in ``state``."""
         looks = state.appearance
         if looks is self._seen or looks == self._seen:
             return

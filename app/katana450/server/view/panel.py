@@ -1,4 +1,4 @@
-"""The front panel: what the arm does, sliders for its joints, a pose to type, buttons."""
+"""The control panel of an arm: read-out, sliders for its joints, a pose to type, and buttons."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from katana450.server.view.event_list import LedgerList
 from katana450.server.view.view_updater import READOUT_INTERVAL
 
 MAX_TYPED_POSITION = 1000.0
-"""[mm] Beyond any tool point of the arm: what a typed position may hold."""
+"""Maximum [mm] of a typed coordinate, beyond any tool point of the arm."""
 
 
 GESTURES: dict[str, cmd.Command] = {
@@ -50,7 +50,7 @@ GESTURES: dict[str, cmd.Command] = {
 
 
 class Panel:
-    """Sliders show the goal, as the gizmo does; the read-out shows the arm itself."""
+    """The panel. Sliders show the goal, as the gizmo does; the read-out shows the arm itself."""
 
     def __init__(
         self,
@@ -61,12 +61,21 @@ class Panel:
         shows: DisplayOptions,
         state: State,
     ) -> None:
-        """``state``: what the panel shows first."""
+        """Add the controls to the panel of ``server``.
+
+        Args:
+            server: viser's server.
+            robot: The robot, which must have an arm.
+            gestures: The path of gestures to the arm.
+            find: Returns the branch options of a state.
+            shows: The functions of the display controls.
+            state: The state that the panel shows first.
+        """
         self._arm = robot.require_arm()
         self._on_person = listener(gestures)
         self._gui = server.gui
-        self._told_at = -math.inf
-        self._told = ""
+        self._shown_at = -math.inf
+        self._shown = ""
         self._readout = self._gui.add_html(readout.page(self._arm, state))
         add_views(self._gui, shows)
         if not robot.collides:
@@ -78,7 +87,7 @@ class Panel:
             "Drive",
             tuple(GESTURES),
             hint="Home: to the ready posture. Go to zero: every joint to zero, the arm along x. "
-            "Hold: stop here and forget the target.",
+            "Hold: stop here and drop the target.",
         )
         self._on_person(self._gestures, lambda: GESTURES[self._gestures.value])
         self._speed = add_motion(self._gui, self._on_person, state)
@@ -90,25 +99,25 @@ class Panel:
             add_shows(self._gui, shows)
         with self._gui.add_folder("Why", expand_by_default=False):
             self._why = LedgerList(self._gui)
-        # At the end, where nobody sees that it takes a line.
+        # At the end of the panel, because the element takes an empty line.
         self._gui.add_html(readout.style())
 
     def follow(
         self, state: State, now: float, event_log: tuple[LogEntry, ...], *, caught_up: bool
     ) -> None:
-        """Show ``state`` at time ``now`` [s], and ``event_log``, what held the arm back so far.
+        """Show ``state`` and ``event_log`` at time ``now`` [s].
 
-        ``caught_up``: every command sent is in ``state``; until then controls are left alone, so
-        that an older state never takes a slider out of the hand that moves it.
+        ``caught_up`` means that ``state`` includes every command that was sent. Without it the
+        controls stay as they are, so that an older state never moves a slider that a person drags.
         """
-        if now - self._told_at < READOUT_INTERVAL:
+        if now - self._shown_at < READOUT_INTERVAL:
             return
-        self._told_at = now
+        self._shown_at = now
         if caught_up:
             self._set_controls(state)
         page = readout.page(self._arm, state)
-        if page != self._told:
-            self._told = self._readout.content = page
+        if page != self._shown:
+            self._shown = self._readout.content = page
         self._branches.follow(state, now)
         self._why.follow(event_log)
 
@@ -163,14 +172,14 @@ class Panel:
             "Tool",
             tuple(arm.tools),
             initial_value=state.tool,
-            hint="The frame that the gizmo, the numbers and the read-out are of",
+            hint="The frame of the gizmo, these numbers and the read-out",
         )
         self._on_person(self._tool, lambda: cmd.SetTool(self._tool.value))
         self._priority = self._gui.add_dropdown(
             "Priority",
             tuple(PRIORITIES.values()),
             initial_value=PRIORITIES[state.priority],
-            hint="What counts when five axes cannot do it all",
+            hint="Which part of the target is kept when five axes cannot satisfy all of it",
         )
         self._meaning = self._gui.add_html(_meaning(state.priority))
         self._on_person(self._priority, lambda: cmd.SetPriority(_priority(self._priority.value)))
@@ -194,7 +203,8 @@ class Panel:
         def pose() -> cmd.Command:
             return cmd.SetPose(typed_pose(position.value, angles.value))
 
-        self._on_person(self._gui.add_button("Go to pose", hint="As near as five axes can"), pose)
+        button = self._gui.add_button("Go to pose", hint="Or to the nearest possible pose")
+        self._on_person(button, pose)
 
     def _opening(self, angle: float) -> float:
         fingers = self._arm.gripper
@@ -208,7 +218,7 @@ class Panel:
 def typed_pose(
     position: tuple[float, float, float], angles: tuple[float, float, float]
 ) -> FloatArray:
-    """The pose (4, 4) in {S} of numbers as people type them: mm, and degrees roll, pitch, yaw."""
+    """Return the pose (4, 4) in {S} of a typed position [mm] and roll, pitch, yaw [deg]."""
     R = so3.from_rpy(*(math.radians(angle) for angle in angles))
     return se3.from_rotation_translation(R, 1e-3 * np.array(position))
 

@@ -15,23 +15,23 @@ from katana450.server.view.controls import GestureGate
 
 
 class PanelFolder(Protocol):
-    """Controls of an extension in a folder of their own, with what they show in the scene."""
+    """A folder with the controls of an extension, and the nodes that it shows in the scene."""
 
     def follow(self) -> None:
-        """Show what has changed. Called for each state that is shown, in the view's thread."""
+        """Show changes. Called in the view's thread for each state that is shown."""
 
 
 class FolderContext(NamedTuple):
-    """What a folder of an extension can use.
+    """The parts of the server that a folder of an extension can use.
 
     Attributes:
         server: viser's server, with the panel.
         robot: The robot, which has an arm.
         gestures: The path of gestures to the arm.
         state: Returns the newest state.
-        hub: The arm and who drives it, with the runner of the server.
-        call: Runs a function in the server's thread and returns afterwards. Raises what that
-            raises, and LeaseError where the server does not answer.
+        hub: The arm and its driver, with the runner of the server.
+        call: Runs a function in the server's thread and returns afterwards. Raises the errors of
+            the function, and LeaseError if the server does not answer.
         options: Options of ``katana450 serve``.
     """
 

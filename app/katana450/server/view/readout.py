@@ -1,4 +1,4 @@
-"""The read-out as HTML: what the arm does, and where its tool is and is going."""
+"""The read-out as HTML: the status of the arm, and the pose of its tool now and at the goal."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 def page(arm: MountedArm, state: State) -> str:
-    """The whole read-out for ``state``."""
+    """Return the whole read-out for ``state``."""
     chain = arm.chain_to(state.tool)
     now, goal = (_numbers(forward(chain, q)) for q in (state.q, state.goal))
     rows = "".join(
@@ -47,7 +47,7 @@ def page(arm: MountedArm, state: State) -> str:
 
 
 def _at_once(chain: Chain, q: FloatArray) -> str:
-    """How near the arm is to a singularity and to a limit."""
+    """Return a table of the distances at ``q`` to a singularity and to the joint limits."""
     values = singular_values(chain, q)
     distances = limit_distances(chain, q)
     nearest = int(distances.argmin())
@@ -76,5 +76,5 @@ def _numbers(T: FloatArray) -> list[str]:
 
 
 def style() -> str:
-    """How all HTML of the panel looks, apart: the read-out goes out ten times a second."""
+    """Return the style of all HTML in the panel, apart from the read-out, which is sent often."""
     return f"<style>{(STATIC / 'panel.css').read_text(encoding='utf-8')}</style>"

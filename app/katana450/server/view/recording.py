@@ -1,4 +1,4 @@
-"""A run as a page of its own: viser's client and all it has to show, in one file."""
+"""A run as a single HTML file, which contains viser's client and all its data."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from katana450.server.viser_bridge.viser_server import close_server, open_server
 def recorded(
     robot: Robot, session: Session, states: Iterable[State], interval: float, title: str
 ) -> str:
-    """HTML that shows ``states``, ``interval`` [s] apart, with a slider of the time."""
-    # Nobody is let in: the server is there for what it would send.
+    """Return HTML that shows ``states``, ``interval`` [s] apart, with a slider for the time."""
+    # The key is secret, so no client connects: only the messages of the server are used.
     server = open_server(secrets.token_hex())
     try:
         scenery = Scenery(server, robot, session, load_props(), NoGestures(), Meshes())

@@ -1,4 +1,4 @@
-"""The room round the arm: floor, sky and light, by day and by night."""
+"""The room round the arm: floor, sky and light, in a light and a dark theme."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import viser
 from katana450.server.viser_bridge.themes import LIGHT, Theme, gradient
 
 FLOOR_AT = -0.0255
-"""[m] The table lies on the floor, a hair above it so that nothing flickers."""
+"""Height [m] of the floor, slightly below the table so that the two do not flicker."""
 
 
 def set_up_room(server: viser.ViserServer) -> None:
-    """Light the scene and give it the light theme; a dark window's page changes it to its own."""
+    """Light the scene and set the light theme, which the page replaces in a dark window."""
     scene = server.scene
     scene.configure_default_lights(enabled=False)
-    # Key from the left and above, in front: it models the cheeks; the rim parts arm from sky.
+    # The key light shines from the front, left and above; the rim light sets arm and sky apart.
     scene.add_light_directional(
         "/light/key", intensity=1.7, cast_shadow=True, color=(255, 250, 242), position=KEY
     )
@@ -25,7 +25,7 @@ def set_up_room(server: viser.ViserServer) -> None:
 
 
 KEY, RIM, FILL = (0.7, -0.9, 1.9), (-1.0, 1.4, 0.9), (1.2, 1.0, 0.6)
-"""[m] Where each light shines from, towards the base."""
+"""Positions [m] of the lights, which shine towards the base."""
 
 
 def _paint(scene: viser.SceneApi, theme: Theme) -> None:

@@ -1,4 +1,4 @@
-"""The arm in the browser: a tree of frames that each turn or slide, and its ghost."""
+"""The arm in the scene: a tree of frames that each turn or slide, and its ghost."""
 
 from __future__ import annotations
 
@@ -19,21 +19,27 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.viser_bridge.posing import Quaternion, place, turn
 
 Colour = tuple[int, int, int]
-"""Red, green, blue of 255."""
+"""Red, green and blue, each from 0 to 255."""
 
 ANGLE_WORTH_SENDING = 1e-7
-"""[rad or m] A joint that moved less than this would move a tool 0.6 m away by less than 0.1 um."""
+"""Smallest change of a joint [rad or m] that is sent: less than 0.1 um at a tool 0.6 m away."""
 
 GAP_WORTH_SEEING = 1e-3
-"""[m]"""
+"""Smallest distance [m] between target and goal that is drawn."""
 
 
 @dataclass
 class _Jointed:
-    """A link that turns, as it was last sent.
+    """A link that turns, and the angle that was sent last.
 
-    straight, across: its quaternions (4,) at the joint's zero and half a turn on; all others are
-    cos(angle / 2) of the one and sin(angle / 2) of the other. angle: that sent [rad].
+    Its quaternion is ``cos(angle / 2) * straight + sin(angle / 2) * across``.
+
+    Attributes:
+        joint: name of the joint.
+        frame: node of the link.
+        straight: quaternion (4,) at the joint's zero.
+        across: quaternion (4,) half a turn further.
+        angle: angle [rad] that was sent last.
     """
 
     joint: str
@@ -43,11 +49,11 @@ class _Jointed:
     angle: float = math.inf
 
     def move(self, angle: float) -> None:
-        """Send its turn for the joint at ``angle`` [rad]."""
+        """Send the rotation of the link for the joint at ``angle`` [rad]."""
         turn(self.frame, self.at(angle))
 
     def at(self, angle: float) -> Quaternion:
-        """Its turn in its parent with the joint at ``angle`` [rad]."""
+        """Return the rotation of the link in its parent with the joint at ``angle`` [rad]."""
         c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
         w, x, y, z = (c * a + s * b for a, b in zip(self.straight, self.across, strict=True))
         return w, x, y, z
@@ -55,29 +61,33 @@ class _Jointed:
 
 @dataclass
 class _Sliding:
-    """A link that slides, as it was last sent.
+    """A link that slides, and the joint value that was sent last.
 
-    start, way: (3,) its place at the joint's zero and what a metre of the joint adds to it [m].
-    angle: the value of the joint that was sent [m].
+    Attributes:
+        joint: name of the joint.
+        frame: node of the link.
+        start: position (3,) [m] at the joint's zero.
+        direction: unit vector (3,) of the motion in the parent.
+        angle: value of the joint [m] that was sent last.
     """
 
     joint: str
     frame: viser.FrameHandle
     start: FloatArray
-    way: FloatArray
+    direction: FloatArray
     angle: float = math.inf
 
     def move(self, value: float) -> None:
-        """Send its place for the joint at ``value`` [m]."""
-        x, y, z = (self.start + value * self.way).tolist()
+        """Send the position of the link for the joint at ``value`` [m]."""
+        x, y, z = (self.start + value * self.direction).tolist()
         place(self.frame, (x, y, z))
 
 
 class FrameTree:
-    """One viser frame a link, nested as the links are; shapes are hung below by a subclass."""
+    """One viser frame per link, nested as the links are. Subclasses add the shapes."""
 
     def __init__(self, server: viser.ViserServer, root: str, robot: Robot) -> None:
-        """``root``: name of the node that carries the tree, for instance ``/arm``."""
+        """Add the frames below the new node ``root``, for instance ``/arm``."""
         self._server = server
         self.root = server.scene.add_frame(root, show_axes=False)
         self.path: dict[str, str] = {}
@@ -97,7 +107,7 @@ class FrameTree:
                 self._joints.append(_Jointed(joint.name, frame, straight.tolist(), across.tolist()))
 
     def move(self, angles: Mapping[str, float]) -> None:
-        """Bring the links to the joint ``angles`` [rad or m]; sends only what changed."""
+        """Place the links for the joint ``angles`` [rad or m]. Only changes are sent."""
         for jointed in self._joints:
             angle = angles[jointed.joint]
             if abs(angle - jointed.angle) > ANGLE_WORTH_SENDING:
@@ -106,7 +116,11 @@ class FrameTree:
 
 
 class ArmNodes(FrameTree):
-    """The arm itself: GLB files as they are, so that normals and materials are kept."""
+    """The arm itself, drawn from its GLB files, which keep normals and materials.
+
+    Attributes:
+        shapes: nodes of each link's shapes in their original look, by link name.
+    """
 
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
         super().__init__(server, "/arm", robot)
@@ -117,7 +131,6 @@ class ArmNodes(FrameTree):
             ]
             for link in robot.links
         }
-        """Of each link, as they are made."""
         self._links = {link.name: link for link in robot.links}
 
     def surfaces(self, link: str) -> Sequence[VisualMesh]:
@@ -142,17 +155,19 @@ def _as_made(
 
 
 COAT = 2e-3
-"""[m] The ghost is this much thicker than the arm: where both are in one place it coats the arm
-instead of flickering in it."""
+"""Distance [m] of the ghost's surface from the arm's, so that they do not flicker in one place."""
 
 
 DETAIL = 3e-3
-"""[m] Smaller things cannot be told in what is translucent and of one colour; without them it takes
-a quarter fewer bytes."""
+"""Size [m] of the smallest details of a ghost.
+
+Smaller ones are invisible in a translucent body of one colour. Without them the ghost needs a
+quarter fewer bytes.
+"""
 
 
 class GhostNodes(FrameTree):
-    """Where the arm is going, or could go: the same links, translucent, in one colour."""
+    """The translucent arm at the goal, or at a branch that can be chosen, in one colour."""
 
     def __init__(
         self,
@@ -162,7 +177,7 @@ class GhostNodes(FrameTree):
         colour: Colour,
         opacity: float,
     ) -> None:
-        """``root``: name of its node; it is made hidden."""
+        """Add the ghost below the new node ``root``, hidden."""
         super().__init__(server, root, robot)
         self.root.visible = False
         self._colour = colour
@@ -181,7 +196,7 @@ class GhostNodes(FrameTree):
         ]
 
     def show(self, visible: bool, colour: Colour) -> None:
-        """Show or hide the ghost, in ``colour`` (red, green, blue of 255)."""
+        """Show the ghost in ``colour`` or hide it."""
         if visible != self.root.visible:
             self.root.visible = visible
         if visible and colour != self._colour:
@@ -191,7 +206,7 @@ class GhostNodes(FrameTree):
 
 
 class Gap:
-    """A line from where the tool was wished to where it can go."""
+    """A line from the target of the tool point to its goal."""
 
     COLOUR = (255, 128, 0)
 
@@ -201,7 +216,7 @@ class Gap:
         )
 
     def show(self, desired: FloatArray | None, goal: FloatArray) -> None:
-        """Draw it between two points (3,) [m] in the base frame; hide it where there is no gap."""
+        """Draw the line between two points (3,) [m] in the base frame; hide it without a gap."""
         visible = desired is not None and bool(np.abs(desired - goal).max() > GAP_WORTH_SEEING)
         if visible != self._line.visible:
             self._line.visible = visible
@@ -212,9 +227,9 @@ class Gap:
 
 
 def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Vertices (n, 3) [m] and faces (m, 3) of a shape without its materials and small details."""
+    """Return vertices (n, 3) [m] and faces (m, 3) of a shape without materials and details."""
     mesh = visual.mesh.copy()
-    # One vertex a corner: half of what goes over the wire.
+    # One vertex per corner halves the data that is sent.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     return coarse(mesh.vertices + COAT * mesh.vertex_normals, np.asarray(mesh.faces), DETAIL)
 
@@ -222,10 +237,10 @@ def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
 def coarse(
     vertices: FloatArray, faces: npt.NDArray[Any], cell: float
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Vertices (n, 3) and faces (m, 3) with all vertices of a cubic ``cell`` [m] made one.
+    """Return vertices (n, 3) and faces (m, 3) with the vertices of each cubic ``cell`` [m] merged.
 
-    Vertex clustering (Rossignac and Borrel 1993): a vertex moves by less than the cell's diagonal,
-    and faces that have come down to an edge or lie on another are gone.
+    Vertex clustering (Rossignac and Borrel 1993): a vertex moves by less than the cell's diagonal.
+    Faces that collapse to an edge or coincide with another face are removed.
     """
     _, into = np.unique(np.round(vertices / cell), axis=0, return_inverse=True)
     into = into.ravel()
@@ -240,7 +255,7 @@ def coarse(
 def add_shape(
     server: viser.ViserServer, name: str, shape: VisualMesh, colour: tuple[float, float, float]
 ) -> viser.MeshHandle:
-    """A shape in one colour, sRGB 0..1."""
+    """Add a shape in one ``colour`` (sRGB, 0 to 1) as the node ``name``."""
     faces = shape.faces.astype(np.uint32)
     return server.scene.add_mesh_simple(
         name, shape.vertices.astype(np.float32), faces, color=of_255(colour)
@@ -248,6 +263,6 @@ def add_shape(
 
 
 def of_255(colour: tuple[float, float, float]) -> Colour:
-    """As viser counts colours."""
+    """Return ``colour`` (0 to 1) as numbers from 0 to 255, as viser expects."""
     red, green, blue = (round(255.0 * part) for part in colour)
     return red, green, blue

@@ -1,4 +1,4 @@
-"""What stands around or is carried: where it is, and handles to put it elsewhere."""
+"""Scene objects in the scene, with handles that move them on the table."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place, turn
 
 HANDLE = 0.09
-"""[m] Length of a handle's arrows: they end outside cup and basin."""
+"""Length [m] of a handle's arrows: they end outside cup and basin."""
 
 COLOUR = (148, 163, 184)
-"""Of what has none of its own."""
+"""Colour of an object without a colour of its own."""
 
 COAT = 1.005
-"""[1] A coat is so much larger, that it does not flicker with what it coats."""
+"""Scale of a contact coat relative to its object, so that the two do not flicker."""
 
 FACETS = 48
-"""Of what is round."""
+"""Number of facets of a cylinder."""
 
 
 class ThingNodes:
-    """A frame an object with its shape in it, made anew when that is another."""
+    """One frame per scene object with its shape, which is made again when it changes."""
 
     def __init__(
         self,
@@ -52,7 +52,15 @@ class ThingNodes:
         gestures: GestureGate,
         meshes: Meshes,
     ) -> None:
-        """``meshes``: those that objects are of."""
+        """Prepare for objects on ``server``.
+
+        Args:
+            server: viser's server.
+            props: Table, cup and basin.
+            environment: The supports and links to which objects are fixed.
+            gestures: The path of gestures to the arm.
+            meshes: The meshes of objects.
+        """
         self._server = server
         self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
         self._environment = environment
@@ -65,19 +73,19 @@ class ThingNodes:
         self._objects: dict[str, SceneObject] = {}
         self._seen: tuple[SceneObject, ...] = ()
         self._dragged: tuple[str, Actor] | None = None
-        self._wanted = False
+        self._handles_shown = False
 
     def show_handles(self, visible: bool) -> None:
-        """Show or hide the handles."""
-        self._wanted = visible
+        """Show or hide the handles. A carried object has none."""
+        self._handles_shown = visible
         for name, handle in self._handles.items():
             scene_object = self._objects.get(name)
-            wanted = visible and scene_object is not None and not scene_object.carried
-            if handle.visible != wanted:
-                handle.visible = wanted
+            shown = visible and scene_object is not None and not scene_object.carried
+            if handle.visible != shown:
+                handle.visible = shown
 
     def follow(self, state: State) -> None:
-        """Put everything where ``state`` has it."""
+        """Show the objects of ``state``; those near a contact are coated."""
         changed = state.objects is not self._seen
         if changed:
             self._take_in(state.objects)
@@ -100,7 +108,7 @@ class ThingNodes:
             shape.follow(scene_object)
             if frame.visible == scene_object.appearance.hidden:
                 frame.visible = not scene_object.appearance.hidden
-        self.show_handles(self._wanted)
+        self.show_handles(self._handles_shown)
 
     def _pose(self, scene_object: SceneObject, x: FloatArray) -> None:
         T = self._environment.pose(scene_object, x)
@@ -120,7 +128,7 @@ class ThingNodes:
 
     def _take_away(self, name: str) -> None:
         if name in self._props:
-            # Others hang shapes of their own on it.
+            # `Tint` has nodes below this frame.
             self._frames[name].visible = False
             return
         del self._shapes[name]
@@ -162,13 +170,13 @@ class ThingNodes:
             if is_loose(moved):
                 check_carried(self._environment.table, self._seen, moved)
         except InputError as error:
-            # It waits at the edge, and the handle comes back to it.
+            # The object stays at the edge, and the handle returns to it.
             if event.phase == "end":
                 px, py, pz = scene_object.T[:3, 3].tolist()
                 place(self._handles[name], (px, py, pz))
                 refuse(event, error)
             return
-        # A drag sends twenty a second: the next one says the same, or is refused visibly.
+        # A drag sends 20 messages a second: the next one repeats the request or shows the refusal.
         with suppress(KatanaError):
             self._gestures.submit(PlaceObject(moved), actor)
 
@@ -178,12 +186,12 @@ class ThingNodes:
 
 
 class _Shape:
-    """What of an object is drawn: a file in its own colours, or a surface in one colour."""
+    """The drawn shape of an object: a file in its own colours, or a surface in one colour."""
 
     def __init__(
         self, server: viser.ViserServer, path: str, meshes: Meshes, prop: Any = None
     ) -> None:
-        """``prop``: the GLB file of what has one and is no other form."""
+        """Prepare the shape below the node ``path``; ``prop``: GLB file of the cup or the basin."""
         self._scene = server.scene
         self._path = f"{path}/shape"
         self._coat_path = f"{path}/contact"
@@ -194,10 +202,10 @@ class _Shape:
         self._is: tuple[object, ...] = ()
 
     def follow(self, scene_object: SceneObject) -> None:
-        """Look as ``scene_object`` does; sends only what is new."""
+        """Draw ``scene_object``. Only changes are sent."""
         own = scene_object.appearance.colour is None and self._own(scene_object) is not None
         key = None if scene_object.solid is None else scene_object.solid.key
-        # A file is sent anew for another opacity, a surface is not.
+        # A changed opacity requires to send the file again, but not the surface.
         now = (
             scene_object.shape,
             scene_object.size,
@@ -217,7 +225,7 @@ class _Shape:
         _set(self._node, "scale", scene_object.scale)
 
     def warn(self, scene_object: SceneObject, *, near: bool) -> None:
-        """Coat it, as long as the arm is ``near``, in what it counts as."""
+        """Coat the object with its convex body while the arm is ``near``."""
         if self._coat is None and near:
             body = _plain(scene_object) if scene_object.solid is None else _hull(scene_object.solid)
             surface = _of(body)
@@ -252,7 +260,7 @@ class _Shape:
         )
 
     def _own(self, scene_object: SceneObject) -> bytes | None:
-        """A GLB file of it in its own colours; None where it has none."""
+        """Return a GLB file of the object in its own colours; None without such colours."""
         if scene_object.solid is not None:
             mesh = self._meshes.get(scene_object.solid.key)
             if mesh is None or mesh.colours is None:
@@ -267,7 +275,7 @@ class _Shape:
             mesh = self._meshes.get(scene_object.solid.key)
             if mesh is not None:
                 return mesh.drawn
-            # Known to the arm from before this process began.
+            # The arm's process knows this object from before the start of this process.
             return _of(_hull(scene_object.solid))
         if self._prop is not None:
             made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop).mesh
@@ -277,19 +285,19 @@ class _Shape:
 
 
 def _hull(solid: Solid) -> Any:
-    """What a mesh counts as."""
+    """Return the convex body that stands for a mesh."""
     return trimesh.Trimesh(solid.corners).convex_hull
 
 
 def form(scene_object: SceneObject) -> Any:
-    """A trimesh of it as large as it is, on z = 0 of its own frame [m]; of a mesh, its hull."""
+    """Return a trimesh [m] of the object in its size, on z = 0 of its own frame; a mesh as hull."""
     made = _hull(scene_object.solid) if scene_object.solid is not None else _plain(scene_object)
     made.apply_scale(scene_object.scale)
     return made
 
 
 def _plain(scene_object: SceneObject) -> Any:
-    """A trimesh of its form, at scale 1."""
+    """Return a trimesh [m] of the object's shape at scale 1."""
     match scene_object.shape:
         case Shape.BOX:
             made, height = trimesh.creation.box(scene_object.size), scene_object.size[2]

@@ -1,4 +1,4 @@
-"""All of a state that can be seen and is no control: arm, conduit, table, objects, water."""
+"""The visible parts of a state apart from controls: arm, conduit, table, objects and water."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from katana450.server.view.workcell import Workcell
 
 
 class Scenery:
-    """Its nodes; what has not changed is not sent."""
+    """The nodes of arm, conduit, table, objects and water. Only changes are sent."""
 
     def __init__(
         self,
@@ -31,8 +31,15 @@ class Scenery:
         gestures: GestureGate,
         meshes: Meshes,
     ) -> None:
-        """``session``: knows where objects are. ``gestures``: takes those with their handles.
-        ``meshes``: those that objects are of.
+        """Build the scene on ``server``.
+
+        Args:
+            server: viser's server.
+            robot: The robot, which must have an arm.
+            session: The session, which has the environment of objects and the water model.
+            props: Table, cup and basin.
+            gestures: The path of gestures at the handles of objects.
+            meshes: The meshes of objects.
         """
         self._server = server
         self._robot = robot
@@ -42,12 +49,12 @@ class Scenery:
         self.objects = ThingNodes(server, props, session.environment, gestures, meshes)
         self.arm = ArmNodes(server, robot)
         self._conduits = Conduits(server, robot.require_arm(), self.arm)
-        # Made when there is water.
+        # Made on the first state with water.
         self._water: WaterNodes | None = None
         self._water_environment: WaterEnvironment | None = None
 
     def show(self, state: State) -> None:
-        """Everything as ``state`` has it."""
+        """Show ``state``."""
         angles = self._robot.joint_values(state.q, state.gripper)
         self.arm.move(angles)
         self._conduits.move(angles)

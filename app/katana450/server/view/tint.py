@@ -1,4 +1,4 @@
-"""The parts that are about to touch, links and objects alike, coated in a warning colour."""
+"""A warning colour on links and props that are near a contact."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ from katana450.server.view.scene import surface
 
 
 class Tint:
-    """Coats links in the shapes that stand for them where contacts are looked for, objects in their
-    own.
-    """
+    """Coats parts near a contact: links with their collision shapes, props with their own."""
 
     COLOUR = (224, 49, 49)
     OPACITY = 0.55
@@ -30,7 +28,7 @@ class Tint:
         path: Mapping[str, str],
         props: Props,
     ) -> None:
-        """``path``: the scene node of each link; an object's is its name."""
+        """Prepare the coats; ``path``: the scene node of each link. A prop's node is its name."""
         self._server = server
         self._shapes = {link.name: (path[link.name], link.collisions) for link in robot.links} | {
             name: (f"/{name}", (Visual(frozen(np.eye(4)), frozen(np.ones(3)), mesh),))
@@ -40,12 +38,12 @@ class Tint:
                 ("basin", props.basin.mesh),
             )
         }
-        # Made when they are first needed: most runs never touch anything.
+        # Made on first use: most runs never come near a contact.
         self._coats: dict[str, list[viser.MeshHandle]] = {}
         self._coated: frozenset[str] = frozenset()
 
     def follow(self, state: State) -> None:
-        """Coat the parts that ``state`` says are near a contact, and no others."""
+        """Coat the parts that are near a contact in ``state``, and no others."""
         parts = state.near
         for part in self._coated ^ parts:
             for coat in self._coat(part):

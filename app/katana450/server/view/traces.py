@@ -1,4 +1,4 @@
-"""The way of the tool in the scene: what is to be followed, and what was, coloured by its error."""
+"""The path of the tool in the scene: the planned path, and the trace coloured by its error."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from katana450.maths.planning.plan import Plan, Segment
 from katana450.maths.planning.tool_path import ToolPath
 
 DESIRED = (90, 100, 115)
-"""Of the path that is to be followed."""
+"""Colour of the planned path."""
 
 GOOD_COLOUR, BAD_COLOUR = np.array((22.0, 163.0, 74.0)), np.array((220.0, 38.0, 38.0))
-"""Of what was followed: without error, and with WORST or more."""
+"""Colours of the trace without error, and with WORST_ERROR or more."""
 
 WORST_ERROR = 1e-3
-"""[m]"""
+"""Distance [m] from the planned path at which the trace has BAD_COLOUR."""
 
 PATH_SAMPLES = 240
-"""Pieces that a path is drawn with."""
+"""Number of pieces in which a path is drawn."""
 
 SEND_INTERVAL = 0.1
-"""[s] Between two messages: what was followed is appended in batches."""
+"""Time [s] between two messages: the trace is extended in batches."""
 
 MAX_PIECES = 4000
-"""Pieces of a trace; then the oldest half is forgotten."""
+"""Maximum number of pieces of a trace; the oldest half is then dropped."""
 
 Colours = npt.NDArray[np.uint8]
 
 
 class Traces:
-    """Of the plan that is followed, until another one is. Nothing is sent of an arm at rest."""
+    """Path and trace of the last plan with a tool path. Nothing is sent of an arm at rest."""
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
         self._T_base_shoulder = arm.T_base_shoulder
@@ -55,11 +55,11 @@ class Traces:
         self._plan: Plan | None = None
         self._points: list[FloatArray] = []
         self._errors: list[float] = []
-        self._told_at = 0.0
+        self._sent_at = 0.0
         self._shown = 0
 
     def follow(self, state: State) -> None:
-        """Show where the tool of ``state`` is on the plan it follows."""
+        """Extend the trace by the tool point of ``state``, and draw the path of a new plan."""
         following = state.following
         if following is None:
             return
@@ -71,33 +71,33 @@ class Traces:
         point = forward(path.chain, state.q)[:3, 3]
         sigma = following.segment.scaling.pace(following.local).sigma
         desired = np.array([each.c0 for each in path.curve.at(Jet.variable(sigma))[:3]])
-        seen = self._seen(point)
-        if not self._points or float(np.abs(seen - self._points[-1]).max()) > 0.0:
-            self._points.append(seen)
+        in_base = self._in_base(point)
+        if not self._points or float(np.abs(in_base - self._points[-1]).max()) > 0.0:
+            self._points.append(in_base)
             self._errors.append(float(np.linalg.norm(point - desired)))
-        if state.t - self._told_at >= SEND_INTERVAL or not state.moving:
-            self._told_at = state.t
+        if state.t - self._sent_at >= SEND_INTERVAL or not state.moving:
+            self._sent_at = state.t
             self._show()
 
     def _begin(self, plan: Plan) -> None:
-        """Draw what is to be followed; a trace stays until the tool is on a path again."""
+        """Draw the tool paths of ``plan``. A plan without any keeps the last path and trace."""
         self._plan = plan
-        ways = [self._way(each) for each in plan.segments if isinstance(each.path, ToolPath)]
-        if not ways:
+        paths = [self._lines(each) for each in plan.segments if isinstance(each.path, ToolPath)]
+        if not paths:
             return
         self._points, self._errors, self._shown = [], [], 0
         self._traced.visible = False
-        self._desired.points = np.concatenate(ways).astype(np.float32)
+        self._desired.points = np.concatenate(paths).astype(np.float32)
         self._desired.visible = True
 
-    def _way(self, segment: Segment) -> FloatArray:
-        """(PLACES, 2, 3) in the base frame [m]."""
+    def _lines(self, segment: Segment) -> FloatArray:
+        """Return the line pieces (PATH_SAMPLES, 2, 3) [m] of a segment in the base frame."""
         points = point_derivatives(segment.path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
-        seen = points @ self._T_base_shoulder[:3, :3].T + self._T_base_shoulder[:3, 3]
-        return np.stack((seen[:-1], seen[1:]), axis=1)
+        in_base = points @ self._T_base_shoulder[:3, :3].T + self._T_base_shoulder[:3, 3]
+        return np.stack((in_base[:-1], in_base[1:]), axis=1)
 
-    def _seen(self, point: FloatArray) -> FloatArray:
-        """``point`` (3,) in {S} as it is in the base frame [m]."""
+    def _in_base(self, point: FloatArray) -> FloatArray:
+        """Return ``point`` (3,) [m], given in {S}, in the base frame."""
         T = self._T_base_shoulder
         return np.asarray(T[:3, :3] @ point + T[:3, 3])
 
@@ -116,6 +116,6 @@ class Traces:
 
 
 def coloured(errors: FloatArray) -> Colours:
-    """(N, 3) from green without error to red at WORST and beyond, for `errors` (N,) [m]."""
+    """Return colours (N, 3) for ``errors`` (N,) [m]: green at zero, red from WORST_ERROR on."""
     fraction = np.clip(errors / WORST_ERROR, 0.0, 1.0)[:, None]
     return np.asarray(np.rint(GOOD_COLOUR + fraction * (BAD_COLOUR - GOOD_COLOUR)), dtype=np.uint8)

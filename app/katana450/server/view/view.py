@@ -1,4 +1,4 @@
-"""The window on the arm: one viser server, one scene for every browser."""
+"""The view of an arm: one viser server with one scene for all browsers."""
 
 from __future__ import annotations
 
@@ -48,14 +48,16 @@ GHOST_COLOURS: dict[Status, Colour] = {
 GHOST_OPACITY = 0.35
 
 GHOST_FROM = np.deg2rad(0.2)
-"""[rad] The ghost shows while a joint is farther than this from its goal."""
+"""Distance [rad] of a joint from its goal above which the ghost is shown."""
 
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """What is shown besides the arm.
+    """Additions to the view.
 
-    layers: what extensions show. meshes: those that objects are of.
+    Attributes:
+        layers: layers of extensions.
+        meshes: the meshes of scene objects.
     """
 
     layers: tuple[ViewLayer, ...] = ()
@@ -76,10 +78,20 @@ class View(ViewUpdater):
         frame_rate: float,
         view_options: ViewOptions | None = None,
     ) -> None:
-        """``last_ticket``: of the newest command. ``session``: knows the branches, and where
-        objects are. ``frame_rate``: most updates a second [Hz].
+        """Build the scene and the panel.
 
-        Raises KatanaError where a layer cannot be shown.
+        Args:
+            server: viser's server.
+            robot: The robot, which must have an arm.
+            state_publisher: The source of snapshots.
+            gestures: The path of gestures to the arm.
+            last_ticket: Returns the ticket of the newest command.
+            session: The session, which has the branch options and the environment of objects.
+            frame_rate: Maximum number of updates per second [Hz].
+            view_options: Additions to the view, none if not given.
+
+        Raises:
+            KatanaError: A layer cannot be shown.
         """
         super().__init__(server, state_publisher, frame_rate)
         view_options = ViewOptions() if view_options is None else view_options
@@ -116,7 +128,7 @@ class View(ViewUpdater):
         self.show(state_publisher.snapshot)
 
     def add(self, folder: PanelFolder) -> None:
-        """Have ``folder`` show each state too; before ``start``."""
+        """Add a folder that follows each state. Call it before ``start``."""
         self._folders.append(folder)
         folder.follow()
 
@@ -127,7 +139,7 @@ class View(ViewUpdater):
         self._cameras.give(client, preset, self._state_publisher.snapshot.state)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Send every browser what has changed."""
+        """Send the changes in ``snapshot`` to every browser."""
         state = snapshot.state
         with self._server.atomic():
             self._scenery.show(state)
@@ -152,7 +164,7 @@ class View(ViewUpdater):
         self._ghost.show(visible, GHOST_COLOURS[state.status])
         if visible:
             self._ghost.move(self._robot.joint_values(state.goal, state.gripper_goal))
-        # A goal is never written to: another one is another array.
+        # Goals are immutable: a changed goal is another array.
         if state.goal is not self._goal or state.tool != self._tool:
             self._goal, self._tool = state.goal, state.tool
             chain = self._arm.chain_to(state.tool)
@@ -162,7 +174,7 @@ class View(ViewUpdater):
         self._gap.show(self._desired(state), self._T_base_goal[:3, 3])
 
     def _desired(self, state: State) -> FloatArray | None:
-        """The tool point that was wished, (3,) [m] in the base frame, if one was."""
+        """Return the tool point (3,) [m] of the target in the base frame; None without one."""
         match state.target:
             case ToolTarget(position=position):
                 p = position

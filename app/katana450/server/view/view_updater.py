@@ -1,4 +1,4 @@
-"""What every view does: follow the control loop in a thread of its own."""
+"""The base of views: follows the control loop in a thread of its own."""
 
 from __future__ import annotations
 
@@ -12,39 +12,42 @@ import viser
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 
 READOUT_INTERVAL = 0.1
-"""[s] People cannot read numbers that change faster, nor need sliders that do."""
+"""Time [s] between two updates of numbers and sliders; people cannot read faster changes."""
 
 log = logging.getLogger(__name__)
 
 
 class ViewUpdater(ABC):
-    """Shows each new snapshot, at most so many a second."""
+    """Shows new snapshots, up to a maximum number per second.
+
+    Attributes:
+        failed: set when the view has ended with an error.
+    """
 
     def __init__(
         self, server: viser.ViserServer, state_publisher: StatePublisher, frame_rate: float
     ) -> None:
-        """``frame_rate``: most updates a second [Hz]."""
+        """Prepare the thread; ``frame_rate``: maximum number of updates per second [Hz]."""
         self._server = server
         self._state_publisher = state_publisher
         self._interval = 1.0 / frame_rate
         self._stopping = threading.Event()
         self.failed = threading.Event()
-        """Set when it shows nothing any more."""
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
 
     def start(self) -> None:
-        """Follow the control loop from now on."""
+        """Start to follow the control loop."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop following."""
+        """End the thread and wait for it."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
 
     @abstractmethod
     def show(self, snapshot: Snapshot) -> None:
-        """Send every browser what has changed."""
+        """Send the changes in ``snapshot`` to every browser."""
 
     def _run(self) -> None:
         try:
@@ -57,7 +60,7 @@ class ViewUpdater(ABC):
         seen = self._state_publisher.snapshot
         settled = True
         while not self._stopping.is_set():
-            # After the last change the read-out still owes its final numbers.
+            # The read-out has a longer interval and needs one more update after the last change.
             snapshot = self._state_publisher.wait_for_change(
                 seen, 0.5 if settled else READOUT_INTERVAL
             )
@@ -65,5 +68,5 @@ class ViewUpdater(ABC):
             seen = snapshot
             due = time.perf_counter() + self._interval
             self.show(snapshot)
-            # Motion is shown at the frame rate, what a person does at once.
+            # Motion is shown at the frame rate, the effect of a command immediately.
             self._state_publisher.wait_for_command(snapshot, due - time.perf_counter())

@@ -1,4 +1,4 @@
-"""Water in the scene: in the cup, in the air, in the basin, on the table."""
+"""Water in the scene: in the cup, in the air, in the basin and on the table."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from katana450.server.view.scene import Colour
 
 COLOUR: Colour = (74, 148, 192)
 LIGHT: Colour = (18, 75, 134)
-"""The same of light, not of sRGB: so glTF takes it."""
+"""COLOUR as linear colour, not sRGB, which glTF requires."""
 
 IN_VESSEL, IN_AIR, ON_TABLE = 0.58, 0.5, 0.3
-"""How much of what is behind it water hides."""
+"""Opacity (0 to 1) of the water in each place."""
 
 ROUGH = 0.08
-"""Of the faces that mirror."""
+"""Roughness (0 to 1) of the faces that mirror."""
 
 WORTH_SHOWING = MILLILITRE // 20
-"""[fl] A drop."""
+"""Smallest amount [fl] that is shown: one drop."""
 
 WORTH_SENDING = 1e-4
-"""[m] A pixel is eight times as wide, 1 m away in a window of 900."""
+"""Smallest change [m] that is sent. A pixel is 8 times as wide, 1 m away in a window of 900 px."""
 
 CLEAR = 3e-4
-"""[m] That water is drawn off the basin's floor, so that they do not flicker in each other."""
+"""Distance [m] of the drawn water from the basin's floor, so that the two do not flicker."""
 
 INSET = (0.99, 0.99, 1.0)
-"""The same of the cup's wall, which is drawn with corners."""
+"""Scale that keeps the drawn water off the cup's wall, which has corners in the drawing."""
 
 FLAT = 5e-3
-"""[m] A puddle of a smaller radius is a drop, and as much lower."""
+"""Radius [m] below which a puddle is a drop, whose height shrinks with its radius."""
 
 TWIST = 2.4
-"""[rad] From puddle to puddle: the same shape, but nobody need see that."""
+"""Turn [rad] from puddle to puddle, which hides that all have the same shape."""
 
 
 class WaterNodes:
-    """Sends what changed enough to be seen, and nothing of water at rest."""
+    """The nodes of the water. Only visible changes are sent, and nothing of water at rest."""
 
     def __init__(self, server: viser.ViserServer, water_environment: WaterEnvironment) -> None:
         self._server = server
@@ -66,11 +66,11 @@ class WaterNodes:
         self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
         self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
         self.stand(water_environment)
-        # Made when they are first needed: a good run spills nothing.
+        # Made on first use: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
 
     def stand(self, water_environment: WaterEnvironment) -> None:
-        """From now on cup and basin are as ``around`` says."""
+        """Use the cup and the basin of ``water_environment`` from now on."""
         self._water_environment, self._flow = water_environment, WaterFlow(water_environment)
         x, y, z = water_environment.basin.at
         self._basin.position = (x, y, z + water_environment.basin.floor)
@@ -87,7 +87,7 @@ class WaterNodes:
         _reveal(self._root, True)
 
     def hide(self) -> None:
-        """Draw none."""
+        """Hide all water."""
         _reveal(self._root, False)
 
     def _show_cup(self, water: Water) -> None:
@@ -95,7 +95,7 @@ class WaterNodes:
         _reveal(self._cup, water.cup >= WORTH_SHOWING)
         if not self._cup.visible:
             return
-        # In the base frame: then a cup that moves is one message, where its pose would be two more.
+        # Corners in the base frame: a moving cup then needs one message, not two more for its pose.
         local = body(cup.inside, self._flow.surface(water)) * INSET
         corners = local @ T[:3, :3].T + (T[:3, 3] + cup.floor * T[:3, 2])
         if self._body is None or np.abs(corners - self._body).max() > WORTH_SENDING:
@@ -135,7 +135,7 @@ class WaterNodes:
     def _add_glossy(
         self, name: str, corners: FloatArray, faces: Faces, opacity: float
     ) -> viser.GlbHandle:
-        """Water whose shape only grows: so it can mirror the room, as no mesh of viser's does."""
+        """Add water of a fixed shape as GLB, which mirrors the room; viser's meshes cannot."""
         return self._server.scene.add_glb(
             f"/water/{name}",
             _glossy(corners, faces, opacity),
@@ -168,8 +168,8 @@ def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:
 
 
 def _glossy(corners: FloatArray, faces: Faces, opacity: float) -> bytes:
-    """A GLB file of a shape that mirrors and lets through the rest of the light."""
-    # trimesh says nothing of the types of these.
+    """Return a GLB file of a shape that mirrors and is translucent."""
+    # trimesh has no types for these classes.
     pbr: Any = PBRMaterial
     textured: Any = TextureVisuals
     material = pbr(

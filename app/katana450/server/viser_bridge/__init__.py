@@ -1,1 +1,1 @@
-"""The connection to viser: every use of its private parts is in this package."""
+"""The bridge to viser. Only this package uses private parts of viser's server."""

@@ -1,14 +1,15 @@
-"""How viser's own controls look here."""
+"""The look of viser's own controls."""
 
 from __future__ import annotations
 
 import viser
 
 BRAND = (36, 119, 212)
+"""Brand colour of the panel: red, green and blue, each from 0 to 255."""
 
 
 def dress(gui: viser.GuiApi) -> None:
-    """Give the panel of every window our colours."""
+    """Set our colours for the panel of every window."""
     gui.configure_theme(
         control_width="medium",
         show_logo=False,

@@ -1,8 +1,8 @@
-"""Frames on their way out: packed once for all who are sent the same, and only when they can be.
+"""Frames for the browsers: packed once for all browsers, and only when a browser can take one.
 
-viser packs and compresses each window of messages for each browser anew, which for a crowd costs
-more than all else the view does. What is sent here is what it sends; the hook is no public
-interface of viser's, whose version is exact, and tests hold the frames to viser's own.
+viser packs and compresses each window of messages separately for each browser. For many browsers
+this costs more than the rest of the view. The frames here are identical to viser's. The hook is a
+private part of viser, so its version is pinned, and tests compare the frames with viser's own.
 """
 
 from __future__ import annotations
@@ -21,70 +21,74 @@ import zstandard
 from viser.infra import _infra
 
 MAX_KEPT_FRAMES = 4
-"""Frames: browsers that keep up are sent the same within a turn of viser's loop."""
+"""Maximum number of kept frames. Fast browsers get the same frame in one turn of viser's loop."""
 
 FRESH_SECONDS = 0.03
-"""[s] A browser that comes later is sent what the messages say by then."""
+"""Time [s] after which a window is packed again, because its messages may have changed."""
 
 ALIGNED = 8
-"""Bytes: arrays begin at multiples of it."""
+"""Alignment of arrays in a frame [bytes]."""
 
-FRAME_SLOT_HEADER = "X-Katana450-Hatch"
-"""Header in which the gateway names the hatch of a browser's line."""
+FRAME_SLOT_HEADER = "X-Katana450-Frame-Slot"
+"""Header in which the gateway names the frame slot of a browser's connection."""
 
 
 class FrameSlot:
     """The passage between the gateway's and viser's end of one browser's connection.
 
-    Frames come out in the gateway's thread, one when one is wanted.
+    viser's thread puts frames in, and the gateway's thread takes them out, one on each request. A
+    frame is made only on request, because a waiting frame would grow old. It is passed directly,
+    because a socket in between would double the cost for many browsers.
 
-    A frame that is made says what is so by then, and one that waits grows old; so none is made
-    before. It is given from hand to hand, since a socket in between would cost a crowd as much as
-    all the rest of its way.
+    Attributes:
+        name: secret name by which viser's end finds the slot.
+        key: key of the window that the browser shows, empty if there is none.
+        stamps: number of revocations at the receipt of each message on its way to viser, oldest
+            first.
     """
 
     def __init__(self, key: str = "", refused: Callable[[str], None] = lambda _: None) -> None:
-        """Called in the loop of the taker of the frames.
+        """Make a slot. Call it in the event loop that takes the frames.
 
-        ``key``: of the window that the browser shows, empty for none. ``refused``: called in that
-        loop with the reason why a gesture was refused.
+        Args:
+            key: Key of the window that the browser shows, empty if there is none.
+            refused: Called in that loop with the reason for which a gesture was refused.
         """
         self.name = secrets.token_hex(16)
         self.key = key
         self.stamps: deque[int] = deque()
-        """Revocations at the receipt of each message on its way to viser, oldest first."""
         self._refused = refused
         self._frames: deque[bytes] = deque()
         self._taker = asyncio.get_running_loop()
         self._giver: asyncio.AbstractEventLoop | None = None
-        self._came = asyncio.Event()
-        self._wanted = asyncio.Event()
+        self._available = asyncio.Event()
+        self._requested = asyncio.Event()
         _slots[self.name] = self
 
     def refuse(self, why: str) -> None:
-        """Say why a gesture was refused; in any thread."""
+        """Report the reason for which a gesture was refused. May be called in any thread."""
         with suppress(RuntimeError):  # the loop may have ended
             self._taker.call_soon_threadsafe(self._refused, why)
 
     async def take(self) -> bytes:
-        """The next frame; in the taker's loop."""
+        """Return the next frame. Call it in the taker's loop."""
         while not self._frames:
-            self._came.clear()
+            self._available.clear()
             if self._giver is not None:
-                _signal(self._giver, self._wanted)
-            await self._came.wait()
+                _signal(self._giver, self._requested)
+            await self._available.wait()
         return self._frames.popleft()
 
     def open(self) -> None:
-        """Say that frames come, the first of them unasked; in the giver's loop."""
+        """Register the giver's loop, which must call it. The first frame needs no request."""
         self._giver = asyncio.get_running_loop()
 
     async def give(self, frame: bytes) -> None:
-        """Give ``frame``, and return when another one is wanted; in the giver's loop."""
-        self._wanted.clear()
+        """Hand over ``frame``, in the giver's loop, and return when the next one is requested."""
+        self._requested.clear()
         self._frames.append(frame)
-        _signal(self._taker, self._came)
-        await self._wanted.wait()
+        _signal(self._taker, self._available)
+        await self._requested.wait()
 
 
 def _signal(loop: asyncio.AbstractEventLoop, event: asyncio.Event) -> None:
@@ -96,26 +100,33 @@ _slots: WeakValueDictionary[str, FrameSlot] = WeakValueDictionary()
 
 
 def slot_of(headers: Mapping[str, str]) -> FrameSlot | None:
-    """Return the slot that a connection's ``headers`` name; None without one."""
+    """Return the slot that the ``headers`` of a connection name; None if there is none."""
     return _slots.get(headers.get(FRAME_SLOT_HEADER, ""))
 
 
 class _Packed(NamedTuple):
+    """A packed frame.
+
+    Attributes:
+        at: time of packing [s].
+        frame: the bytes.
+        window: the messages. They are kept so that no other message gets the id of one of them.
+    """
+
     at: float
     frame: bytes
     window: Sequence[Any]
-    """Kept, so that no other message has the number of one of these meanwhile."""
 
 
 class Packer:
-    """Packs windows of messages, each once while it is fresh."""
+    """Packs windows of messages, and each window only once while it is fresh."""
 
     def __init__(self) -> None:
         self._packed: dict[tuple[int, ...], _Packed] = {}
         self._compress = zstandard.ZstdCompressor(level=1).compress
 
     def frame(self, window: Sequence[Any]) -> bytes:
-        """The frame of these messages."""
+        """Return the frame of the messages in ``window``."""
         now = time.perf_counter()
         key = tuple(map(id, window))
         known = self._packed.get(key)
@@ -148,7 +159,7 @@ class Packer:
 
 
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:
-    """Send a browser the windows of a buffer, as viser's own producer of this name does."""
+    """Send a browser the windows of a buffer, as viser's own ``_message_producer`` does."""
     packer = buffer.__dict__.setdefault("packer", Packer())
     slot = slot_of(line.request.headers)
     send = line.send
@@ -160,10 +171,10 @@ async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: 
         async for window in windows:
             await send(packer.frame(window))
     finally:
-        # An unfinished one would keep what it has not sent.
+        # An unfinished generator would keep its unsent messages.
         await windows.aclose()
 
 
 def share() -> None:
-    """Have the viser servers of this process pack each frame once."""
+    """Make the viser servers of this process pack each frame only once."""
     _infra._message_producer = produce  # type: ignore[assignment]  # without viser's types

@@ -1,9 +1,9 @@
 """Gestures at viser's handles, panels and ghosts: mapped to actors, and admitted or refused.
 
 viser stores the new value of a control and sends it to the other browsers before it calls any
-callback. So `CommandGate` is asked first: a refused gesture never reaches viser, and the window it
-came from springs back. The callback's command then goes through `CommandGate.submit`, which
-decides.
+callback. `CommandGate` therefore checks each gesture first. A refused gesture never reaches viser,
+and its window shows the old value again. The callback's command then goes through
+`CommandGate.submit`, which decides.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from katana450.server.viser_bridge.frames import FrameSlot, slot_of
 from katana450.server.viser_bridge.guard import Guard
 
 DRAGGING = (wire.TransformControlsUpdateMessage, wire.TransformControlsDragEndMessage)
+"""Messages of a drag after its start."""
 
 
 @dataclass
@@ -29,10 +30,10 @@ class _Browser:
     """One browser's connection at viser's end.
 
     Attributes:
-        connection: viser's own, for messages to this browser alone.
+        connection: viser's own connection, for messages to this browser only.
         slot: the passage to the gateway's end.
-        drags: giver of each drag under way, by the name of the handle.
-        actor: giver of the newest gesture.
+        drags: actor of each current drag, by the name of the handle.
+        actor: actor of the newest gesture.
     """
 
     connection: Any
@@ -42,10 +43,10 @@ class _Browser:
 
 
 class Gestures:
-    """Maps viser's browsers to actors. Lives in viser's event loop.
+    """Maps viser's browsers to actors. Runs in viser's event loop.
 
-    The hook is no public interface of viser's: its version is exact, and tests with raw sockets
-    hold it.
+    The hook is a private part of viser, so its version is pinned, and tests with raw sockets check
+    it.
     """
 
     def __init__(self, server: viser.ViserServer, guard: Guard, hub: Hub) -> None:
@@ -57,15 +58,15 @@ class Gestures:
         self._pass_on = websocket._handle_incoming_message
         websocket._handle_incoming_message = self._handle  # type: ignore[method-assign]
         websocket.on_client_connect(self._meet)
-        # After viser's own, which still ends the drags of a browser that is gone.
+        # After viser's own callback, which still ends the drags of a browser that has left.
         websocket.on_client_disconnect(self._part)
         self._websocket = websocket
 
     def actor(self, client_id: int | None) -> Actor:
-        """Return the giver of the gesture that viser just told of.
+        """Return the actor of the gesture that viser just reported.
 
-        ``client_id``: of viser's event. Call it before the callback awaits anything. Raises
-        LeaseError where no gesture of that browser was let through.
+        ``client_id`` is that of viser's event. Call this method before the callback awaits
+        anything. Raises LeaseError if no gesture of that browser was admitted.
         """
         browser = None if client_id is None else self._browsers.get(client_id)
         if browser is None or browser.actor is None:
@@ -92,7 +93,7 @@ class Gestures:
     async def _handle(self, client_id: Any, message: Any) -> None:
         browser = self._browsers.get(client_id)
         if browser is None:
-            # Not from the gateway.
+            # The connection does not come from the gateway.
             return
         seen = browser.slot.stamps.popleft()
         if self._guard.drives(message):
@@ -109,20 +110,21 @@ class Gestures:
         await self._pass_on(client_id, message)
 
     def _admitted(self, browser: _Browser, message: Any, seen: int) -> Actor | None:
-        """Return the giver of ``message``; None for a part of a drag that is void.
+        """Return the actor of ``message``; None for a part of a void drag.
 
-        Raises LeaseError with the reason for a refusal.
+        ``seen`` is the number of revocations at the receipt of the message. Raises LeaseError with
+        the reason for a refusal.
         """
         if isinstance(message, DRAGGING):
             held = browser.drags.get(message.name)
             if isinstance(message, wire.TransformControlsDragEndMessage):
                 browser.drags.pop(message.name, None)
-            # Its beginning was refused, or it was ended here while the hand went on.
+            # The start of the drag was refused, or a revocation ended the drag before its end.
             return None if held is None or not self._gate.is_current(held) else held
         actor = self._hub.at_scene(browser.slot.key, seen)
         runner = self._hub.runner
         if self._guard.is_of(message, runner.controls):
-            # A run may be another's than who drives by hand.
+            # The owner of a run may differ from the driver.
             self._gate.check_current(actor)
             runner.check_may_touch(actor)
             return actor

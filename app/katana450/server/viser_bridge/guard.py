@@ -1,8 +1,8 @@
-"""Nothing enters from a browser but what a browser's person can really do.
+"""The definition of the viser messages that our page can send.
 
-viser passes whatever a client sends to its handlers: an attribute of a control by any name, a
-value outside a slider's range, a pose that is not a number. Here is what a client message must be
-so that our page could have sent it; the gateway asks before viser sees any.
+viser passes every message of a client to its handlers, even one that sets any attribute of a
+control, a value outside a slider's range, or a pose that is not a number. The gateway therefore
+checks each message with `Guard` before viser gets it.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from viser import _messages as wire
 from katana450.server.viser_bridge.labels import PACING, PERSONAL
 
 WORKSPACE = 1.5
-"""[m] No gizmo goes farther from the base in any direction: more than twice the arm's reach."""
+"""Maximum coordinate [m] of a gizmo in the base frame, more than twice the arm's reach."""
 
 QUATERNION_SLACK = 1e-3
-"""How far the length of a browser's quaternion may be from 1."""
+"""Maximum deviation of the length of a browser's quaternion from 1."""
 
 MAX_TEXT_LENGTH = 200
-"""Characters of a text field."""
+"""Maximum number of characters in a text field."""
 
 
 class Guard:
-    """Tells what our page can have sent from what it cannot. Changes nothing."""
+    """Checks whether our page can have sent a message. It changes nothing."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
 
     def objection(self, message: Any) -> str | None:
-        """Why no page of ours can have sent ``message``, or None when one can."""
+        """Return why our page cannot have sent ``message``, or None if it can."""
         if getattr(message, "owner", ""):
-            return "no window owns a part of the scene"
+            return "it names an owner, but windows own no nodes"
         try:
             match message:
                 case wire.ViewerCameraMessage():
@@ -53,16 +53,16 @@ class Guard:
                     return self._click(message)
         except (TypeError, ValueError, AttributeError, OverflowError) as error:
             return f"it is malformed ({error})"
-        return "the page has no use for it"
+        return "the page does not send messages of this type"
 
     def drives(self, message: Any) -> bool:
-        """Whether ``message`` reaches beyond the window it comes from."""
+        """Return whether ``message`` affects more than the window that sent it."""
         if isinstance(message, wire.GuiUpdateMessage):
             return getattr(self._control(message), "label", None) not in PERSONAL
         return not isinstance(message, wire.ViewerCameraMessage)
 
     def paces(self, message: Any) -> bool:
-        """Whether ``message`` only pauses, resumes or slows down what moves, by hand or program."""
+        """Return whether ``message`` only pauses, resumes or changes the speed of a motion."""
         return self.is_of(message, PACING)
 
     def is_of(self, message: Any, labels: tuple[str, ...]) -> bool:
@@ -72,9 +72,9 @@ class Guard:
         return getattr(self._control(message), "label", None) in labels
 
     def correction(self, message: Any) -> list[Any]:
-        """What the sender must be told so that its window shows the truth again.
+        """Return the messages that make the sender's window show the real state again.
 
-        For a ``message`` that passed ``objection`` and yet did not enter.
+        They are for a ``message`` that passed ``objection`` but was refused.
         """
         match message:
             case wire.GuiUpdateMessage():
@@ -83,7 +83,7 @@ class Guard:
                     return []
                 value = getattr(handle, "value", None)
                 return [wire.GuiUpdateMessage(message.uuid, {"value": value})]
-            # Not in mid-drag: hand and truth would wrestle for the handle.
+            # Not during a drag: corrections and the hand would move the handle in turn.
             case wire.TransformControlsDragEndMessage():
                 node = self._node(message)
                 w, x, y, z = map(float, node.wxyz)
@@ -110,22 +110,22 @@ class Guard:
 
     def _handle(self, message: Any) -> str | None:
         is_one = isinstance(self._node(message), viser.TransformControlsHandle)
-        return None if is_one else "there is nothing of that name to drag"
+        return None if is_one else "there is no gizmo of that name"
 
     def _gizmo(self, message: Any) -> str | None:
         if len(message.wxyz) != 4 or len(message.position) != 3:
-            return "a pose has 4 and 3 numbers"
+            return "its pose must have 4 numbers for rotation and 3 for position"
         if not _finite((*message.wxyz, *message.position)):
             return "its pose is not finite"
         if abs(math.hypot(*message.wxyz) - 1.0) > QUATERNION_SLACK:
-            return "its rotation is none"
+            return "its quaternion does not have length 1"
         if max(abs(x) for x in message.position) > WORKSPACE:
-            return f"its position is more than {WORKSPACE} m away"
+            return f"a coordinate of its position exceeds {WORKSPACE} m"
         return self._handle(message)
 
     def _click(self, message: wire.SceneNodeClickMessage) -> str | None:
         if not getattr(self._node(message), "visible", False):
-            return "there is nothing of that name to click"
+            return "there is no visible node of that name"
         numbers = (*message.ray_origin, *message.ray_direction, *message.screen_pos)
         return None if _finite(numbers) else "a number of its ray is not finite"
 
@@ -138,25 +138,25 @@ class Guard:
         value = message.updates["value"]
         match handle:
             case viser.GuiButtonHandle():
-                return None if isinstance(value, bool) else "a button is pressed or not"
+                return None if isinstance(value, bool) else "the value of a button is not a boolean"
             case viser.GuiCheckboxHandle():
-                return None if isinstance(value, bool) else "a box is ticked or not"
+                return None if isinstance(value, bool) else "the value of a box is not a boolean"
             case viser.GuiDropdownHandle() | viser.GuiButtonGroupHandle():
-                return None if value in handle.options else "that is no choice of the list"
+                return None if value in handle.options else "the value is not in the list"
             case viser.GuiSliderHandle() | viser.GuiNumberHandle():
                 return _range([value], [handle.min], [handle.max])
             case viser.GuiRgbHandle():
                 if len(value) != 3:
-                    return "a colour has three numbers"
+                    return "a colour must have three numbers"
                 return _range(value, [0] * 3, [255] * 3)
             case viser.GuiVector3Handle():
                 if len(value) != 3:
-                    return "a vector has three numbers"
+                    return "a vector must have three numbers"
                 return _range(value, handle.min or [None] * 3, handle.max or [None] * 3)
             case viser.GuiTextHandle():
                 short = isinstance(value, str) and len(value) <= MAX_TEXT_LENGTH
-                return None if short else f"a text has at most {MAX_TEXT_LENGTH} characters"
-        return "that control cannot be changed"
+                return None if short else f"a text may have at most {MAX_TEXT_LENGTH} characters"
+        return "this control cannot be changed"
 
 
 def _finite(numbers: Iterable[Any]) -> bool:
@@ -164,7 +164,7 @@ def _finite(numbers: Iterable[Any]) -> bool:
 
 
 def _range(values: Iterable[Any], lows: Iterable[Any], highs: Iterable[Any]) -> str | None:
-    # Browsers round to the step of a slider, which may end a hair beyond the limit.
+    # Browsers round to the step of a slider, so a value may slightly exceed a limit.
     slack = 1e-6
     for value, low, high in zip(values, lows, highs, strict=True):
         if not _finite([value]):

@@ -1,7 +1,7 @@
-"""Labels of the controls that the message filter has to tell from the others."""
+"""Labels of the controls that the guard treats differently from the others."""
 
 PACING = ("Motion", "Speed")
-"""Controls that pause, resume and slow down what moves."""
+"""Controls that pause, resume and change the speed of a motion."""
 
 PERSONAL = ("View", "Theme")
-"""Controls that concern only the window in which they are clicked."""
+"""Controls that affect only the window in which they are clicked."""

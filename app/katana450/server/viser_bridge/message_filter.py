@@ -1,8 +1,7 @@
-"""Every message of a browser to viser is decoded here, and passes or does not.
+"""The message filter, which checks every message of a browser to viser.
 
-The shape of each message that our page can send is defined in
-``katana450.server.viser_bridge.guard``. Here is the rest: how large, how often. Who may command is
-decided by `CommandGate`.
+This module checks size and rate. ``katana450.server.viser_bridge.guard`` defines the form of the
+messages that our page can send. `CommandGate` decides which participant may command.
 """
 
 from __future__ import annotations
@@ -21,40 +20,39 @@ from katana450.server.web.token_bucket import TokenBucket
 log = logging.getLogger(__name__)
 
 MAX_MESSAGE_BYTES = 16_384
-"""Bytes of a message: a typed text of 200 characters is the longest there is."""
+"""Maximum size of a message. The longest one contains a typed text of 200 characters."""
 
 RATE, BURST = 150.0, 300.0
-"""Messages a second, and at once. viser's page sends each kind at most 20 times a second."""
+"""Maximum messages per second, and at once. viser's page sends each type at most 20 times/s."""
 
 MAX_BAD_MESSAGES, FORGIVEN_PER_SECOND = 100.0, 1.0
-"""Bad messages until their sender is closed, and how many a second are forgotten."""
+"""Number of bad messages after which a connection is closed, and how many expire per second."""
 
 NO_MESSAGE = 25.0
-"""A message that cannot even be read counts as this many."""
+"""Number of bad messages for which an unreadable message counts."""
 
 SEEN = "Seen"
-"""What our script says of frames on the screen, on the same line; not for viser."""
+"""Type of our script's message with the number of frames on the screen, which viser never gets."""
 
 MAX_LOGGED_MESSAGES = 20
-"""Bad messages of one browser that are logged one by one; a flood must not fill the log."""
+"""Maximum number of bad messages of one browser in the log, so that a flood cannot fill it."""
 
 
 class Ruling(Enum):
-    """What becomes of a message."""
+    """The decision on a message. ``CLOSE`` drops it and closes the connection."""
 
     PASS = auto()
     DROP = auto()
     CLOSE = auto()
-    """It is dropped, and its sender is to be closed."""
 
 
 @dataclass(frozen=True)
 class FilterResult:
-    """On one message.
+    """The result for one message.
 
     Attributes:
-        ruling: what becomes of it.
-        seen: how many frames are on the screen, where the message was about that.
+        ruling: the decision.
+        seen: number of frames on the screen if the message reports it.
     """
 
     ruling: Ruling
@@ -62,30 +60,33 @@ class FilterResult:
 
 
 class MessageFilter:
-    """In front of viser, for one connection."""
+    """The filter of one connection.
+
+    Attributes:
+        dropped: number of bad messages by their type.
+    """
 
     def __init__(self, guard: Guard, who: str, t: float) -> None:
-        """``who``: for the log. ``t``: now [s]."""
+        """Begin at ``t`` [s]; ``who`` names the sender in the log."""
         self._guard = guard
         self._who = who
         self._flood = TokenBucket(RATE, BURST, t)
-        self._patience = TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_MESSAGES, t)
+        self._tolerance = TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_MESSAGES, t)
         self.dropped: Counter[str] = Counter()
-        """Bad messages by their type."""
 
     def judge(self, data: bytes | None, t: float) -> FilterResult:
-        """Of a message that came at ``t`` [s]; ``data`` is None for one of text."""
+        """Return the result for a message that came at ``t`` [s]; ``data`` is None for a text."""
         if not self._flood.take(t):
-            return self._drop("flood", "it comes too fast", t)
+            return self._drop("flood", "messages come too fast", t)
         if data is None or len(data) > MAX_MESSAGE_BYTES:
-            return self._drop("none", "it is too long or no bytes", t, NO_MESSAGE)
+            return self._drop("none", "it is too long or not binary", t, NO_MESSAGE)
         seen = _seen(data)
         if seen is not None:
             return FilterResult(Ruling.DROP, seen=seen)
         try:
             message = wire.Message.deserialize(data)
         except Exception as error:
-            # Whatever viser's decoder stumbles over is not for it.
+            # A message that viser's decoder rejects, by any error, is not passed to viser.
             return self._drop("none", f"it cannot be read ({type(error).__name__})", t, NO_MESSAGE)
         objection = self._guard.objection(message)
         if objection is not None:
@@ -94,13 +95,13 @@ class MessageFilter:
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
         self.dropped[kind] += 1
-        told = self.dropped.total()
-        if told <= MAX_LOGGED_MESSAGES:
+        count = self.dropped.total()
+        if count <= MAX_LOGGED_MESSAGES:
             log.warning("Dropped a %s of %s: %s.", kind, self._who, objection)
-        if told == MAX_LOGGED_MESSAGES:
-            log.warning("More of %s is dropped without a word.", self._who)
-        patient = self._patience.take(t, weight)
-        return FilterResult(Ruling.DROP if patient else Ruling.CLOSE)
+        if count == MAX_LOGGED_MESSAGES:
+            log.warning("Further dropped messages of %s are not logged.", self._who)
+        tolerated = self._tolerance.take(t, weight)
+        return FilterResult(Ruling.DROP if tolerated else Ruling.CLOSE)
 
 
 def _seen(data: bytes) -> int | None:

@@ -1,8 +1,8 @@
-"""Poses on their way to the browsers, without viser's setters.
+"""Functions that send poses to the browsers without viser's setters.
 
-Those compare each pose to the one before within a tolerance, which costs ten times the message
-itself and takes a small turn for none. What is sent here is what they send, and the handles know
-it; that this is so for the exact version of viser that is pinned, tests hold.
+viser's setters compare each pose with the last one within a tolerance. This costs ten times as much
+as the message and drops small turns. The functions here send the same messages and update the
+handles. Tests check this for the pinned version of viser.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ Quaternion = tuple[float, float, float, float]
 """w, x, y, z of a unit quaternion."""
 
 Point = tuple[float, float, float]
-"""[m]"""
+"""x, y, z [m]."""
 
 
 def turn(node: Any, wxyz: Quaternion) -> None:
-    """Turn a scene node in its parent."""
+    """Set the rotation of a scene node in its parent."""
     node._impl.wxyz = np.array(wxyz)
     node._impl.api._queue_scene_message(wire.SetOrientationMessage(node.name, wxyz))
 
 
 def place(node: Any, position: Point) -> None:
-    """Put a scene node to where it is to be in its parent."""
+    """Set the position [m] of a scene node in its parent."""
     node._impl.position = np.array(position)
     node._impl.api._queue_scene_message(wire.SetPositionMessage(node.name, position))
 
@@ -38,9 +38,9 @@ def arrange(
     wxyzs: npt.NDArray[np.float32],
     positions: npt.NDArray[np.float32],
 ) -> None:
-    """Give every instance of a mesh its pose, (n, 4) and (n, 3) [m], in one message.
+    """Set the poses of all instances of a mesh, (n, 4) and (n, 3) [m], in one message.
 
-    The arrays are handed over: whoever made them writes to them no more.
+    The handle keeps the arrays, so the caller must not change them afterwards.
     """
     props: Any = node._impl.props
     props.batched_wxyzs, props.batched_positions = wxyzs, positions

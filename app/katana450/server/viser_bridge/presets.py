@@ -1,4 +1,4 @@
-"""Named cameras of the scene, and the one that a browser begins with."""
+"""Named cameras of the scene. A browser begins with ``Preset.FREE``."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from enum import Enum
 import numpy as np
 
 FOV = np.deg2rad(40.0)
-"""[rad] Vertical; that of a lens which does not bend the arm."""
+"""Vertical field of view [rad], small enough that perspective does not distort the arm."""
 
 
 @dataclass(frozen=True)
 class CameraPose:
-    """A camera at ``position``, turned to ``target``; both [m] in the base frame."""
+    """A camera at ``position`` that looks at ``target``, both [m] in the base frame."""
 
     position: tuple[float, float, float]
     target: tuple[float, float, float]
 
 
 class Preset(Enum):
-    """The views a person can ask for; only the last one follows the arm."""
+    """The views that a person can choose. Only TOOL follows the arm."""
 
     FREE = "3D"
     FRONT = "Front"
@@ -33,7 +33,10 @@ CAMERA_POSES = {
     Preset.FREE: CameraPose((0.77, -1.33, 0.97), (0.0, 0.0, 0.35)),
     Preset.FRONT: CameraPose((1.64, 0.0, 0.46), (0.0, 0.0, 0.36)),
     Preset.SIDE: CameraPose((0.0, -1.64, 0.46), (0.0, 0.0, 0.36)),
-    # Not from straight above: a camera that looks along up has no up.
+    # Not exactly from above: a camera that looks along its up direction is undefined.
     Preset.TOP: CameraPose((0.0, -0.01, 2.16), (0.0, 0.0, 0.2)),
 }
-"""As near as all of the arm is in the picture, however it is posed; cup and basin in the first."""
+"""Cameras as near as possible with the arm in the picture in every posture.
+
+FREE also shows cup and basin.
+"""

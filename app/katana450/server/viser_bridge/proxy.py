@@ -1,4 +1,4 @@
-"""One browser's way to viser and back."""
+"""The proxy between browsers and viser."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from katana450.server.web.control_socket import PAGE
 log = logging.getLogger(__name__)
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
+"""The subprotocol of viser's page; only a page of the pinned version is served."""
 
-PICTURES = 1000.0
-"""A second, that go to all browsers together: what a core can send them. A crowd shares them; who
-drives is not asked to."""
+MAX_FRAMES_PER_SECOND = 1000.0
+"""Frames per second that one core can send to all browsers together. The driver is not limited."""
 
-FRAME = 1.0 / 60.0
-"""[s] Pictures come no faster anyway."""
+FRAME_INTERVAL = 1.0 / 60.0
+"""Minimum time [s] between two frames of the view."""
 
-LOOK_AGAIN = 0.1
-"""[s] How soon a browser that is behind is looked at again, should it say nothing."""
+RECHECK_INTERVAL = 0.1
+"""Time [s] after which the backlog of a browser is checked again if it reports nothing."""
 
 BROWSERS, BROWSERS_EACH = 64, 16
-"""Browsers that are shown the scene at one time, and those of one identity."""
+"""Maximum number of browsers with the scene at one time, in total and per identity."""
 
-REFUSALS_EVERY = 0.5
-"""[s] A person who drags what is not theirs is told so, but not twenty times a second."""
+REFUSAL_INTERVAL = 0.5
+"""Minimum time [s] between two shown refusals: a drag sends 20 messages a second."""
 
 
 class Proxy:
-    """Joins browsers to viser, each by a connection of its own."""
+    """Connects each browser to viser by a connection of its own."""
 
     def __init__(
         self, hub: Hub, authenticator: Authenticator, guard: Guard, port: int, key: str
     ) -> None:
-        """``port`` of viser on this machine, and the ``key`` to it."""
+        """Prepare connections to viser at ``port`` of this machine, with its ``key``."""
         self._hub = hub
         self._authenticator = authenticator
         self._guard = guard
@@ -72,7 +72,7 @@ class Proxy:
 
     async def _serve(self, browser: WebSocket, identity: Identity) -> None:
         page = browser.query_params.get("page", "")
-        # Without our page around it viser can be looked at, and no more.
+        # Without our page around it, viser's page can only show the scene.
         key = key_of(identity, page) if PAGE.fullmatch(page) else ""
         line = _Line(self._hub, self._guard, browser, key)
         try:
@@ -90,16 +90,16 @@ class Proxy:
                 if not await self._authenticator.while_welcome(
                     lambda: self._authenticator.identity(browser.cookies), line.run(upstream)
                 ):
-                    await browser.close(SIGN_IN_CLOSE_CODE, "Your link is no good any more.")
+                    await browser.close(SIGN_IN_CLOSE_CODE, "Your link is invalid or has expired.")
         except OSError as error:
             log.warning("viser does not answer: %s", str(error) or type(error).__name__)
-            # Who has left meanwhile needs no farewell.
+            # A browser that has left needs no close frame.
             with suppress(WebSocketDisconnect, RuntimeError):
                 await browser.close(1013)
 
 
 class _Line:
-    """Between one browser and viser."""
+    """The connection between one browser and viser."""
 
     def __init__(self, hub: Hub, guard: Guard, browser: WebSocket, key: str) -> None:
         self._hub = hub
@@ -109,15 +109,15 @@ class _Line:
         self._key = key
         self._flow = FlowControl()
         self._room = asyncio.Event()
-        self._told_at = float("-inf")
+        self._refused_at = float("-inf")
         self._due = float("-inf")
         self._unwelcome = False
 
     async def run(self, upstream: ClientConnection) -> None:
-        """Until either side closes; ``upstream``: viser's."""
+        """Pass messages until either side closes; ``upstream`` is the connection to viser."""
         self._hub.show(self._key, self._flow)
-        ways = (self._down(), self._up(upstream), upstream.wait_closed())
-        tasks = [asyncio.create_task(way) for way in ways]
+        directions = (self._down(), self._up(upstream), upstream.wait_closed())
+        tasks = [asyncio.create_task(each) for each in directions]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
@@ -127,16 +127,16 @@ class _Line:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            # A farewell would wait behind pictures that nobody fetches any more.
+            # A close frame would wait behind frames that are not read any more.
             upstream.transport.abort()
             self._hub.hide(self._flow)
-        # Only now, or a picture could come after it.
+        # After the tasks have ended, so that no frame follows the close frame.
         if self._unwelcome:
             with suppress(WebSocketDisconnect, WebSocketDisconnected):
                 await self._browser.close(1008)
 
     async def _down(self) -> None:
-        """Pictures, as fast as the browser sees them."""
+        """Send frames as fast as the browser shows them."""
         while True:
             await self._send(await self.slot.take())
             await asyncio.sleep(self._pause(self._hub.clock()))
@@ -146,51 +146,51 @@ class _Line:
         while not self._flow.has_room(self._hub.clock()):
             self._room.clear()
             with suppress(TimeoutError):
-                async with asyncio.timeout(LOOK_AGAIN):
+                async with asyncio.timeout(RECHECK_INTERVAL):
                     await self._room.wait()
 
     def _pause(self, t: float) -> float:
-        """[s] Before the next picture, so that a crowd leaves time for whoever drives."""
+        """Return the time [s] to wait before the next frame, so that many browsers share a core."""
         holder = self._hub.lease.holder
-        fraction = self._hub.watching / PICTURES
-        if fraction <= FRAME or (holder is not None and holder.key == self._key):
+        interval = self._hub.watching / MAX_FRAMES_PER_SECOND
+        if interval <= FRAME_INTERVAL or (holder is not None and holder.key == self._key):
             return 0.0
-        self._due = max(self._due + fraction, t)
+        self._due = max(self._due + interval, t)
         return self._due - t
 
     async def _up(self, upstream: ClientConnection) -> None:
-        """What the message filter lets pass."""
+        """Pass the messages of the browser to viser that the message filter admits."""
         window = self._hub.window(self._key)
         who = window.person.name if window is not None else "a window without our page"
         message_filter = MessageFilter(self._guard, who, self._hub.clock())
         while True:
-            # One message a turn of the loop, as in a conversation.
+            # At most one message per turn of the event loop, so that other tasks can run.
             await asyncio.sleep(0)
             message = await self._browser.receive()
             if message["type"] == "websocket.disconnect":
                 return
             data = message.get("bytes")
-            verdict = message_filter.judge(data, self._hub.clock())
-            if verdict.ruling is Ruling.PASS and data is not None:
+            result = message_filter.judge(data, self._hub.clock())
+            if result.ruling is Ruling.PASS and data is not None:
                 self.slot.stamps.append(self._hub.gate.revocations)
                 await upstream.send(data)
-            elif verdict.ruling is Ruling.CLOSE or not self._note(verdict):
-                log.warning("Closed a browser that sent too much that no page sends.")
+            elif result.ruling is Ruling.CLOSE or not self._note(result):
+                log.warning("Disconnected a browser that sent too many invalid messages.")
                 self._unwelcome = True
                 return
 
-    def _note(self, verdict: FilterResult) -> bool:
-        """Take in which frames are on the screen; False for a browser that lies about it."""
-        if verdict.seen is None:
+    def _note(self, result: FilterResult) -> bool:
+        """Note the frames on the screen; return False if the reported number is impossible."""
+        if result.seen is None:
             return True
         self._room.set()
-        return self._flow.seen(verdict.seen, self._hub.clock())
+        return self._flow.seen(result.seen, self._hub.clock())
 
     def _refuse(self, why: str) -> None:
         """Show in the browser's window why its gesture was refused."""
         window, t = self._hub.window(self._key), self._hub.clock()
-        if window is not None and t - self._told_at >= REFUSALS_EVERY:
-            self._told_at = t
+        if window is not None and t - self._refused_at >= REFUSAL_INTERVAL:
+            self._refused_at = t
             window.tell({"is": "refused", "why": why})
 
     async def _send(self, frame: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The page that viser makes of a recording, with our title and with steady light."""
+"""The page that viser makes for a recording, changed to have our title and constant light."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import html
 from katana450.errors import ConfigurationError
 
 TITLE = "<title>Viser</title>"
-"""Title of viser's page."""
+"""The title element of viser's page."""
 
 CLEAR = "<style>canvas { opacity: 1 !important }</style>"
-"""Draws at full opacity.
+"""Style that draws at full opacity.
 
-viser draws faintly until the light of the room is loaded. Where drawing takes as long as that it
-loses count and leaves the picture faint for good; a recording loads the light again each time.
+viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
+miscounts and the picture stays faint. A recording loads the light again each time.
 """
 
 KEEP_LIGHT = """<script>{
@@ -27,19 +27,21 @@ KEEP_LIGHT = """<script>{
     return append.call(this, node);
   };
 }</script>"""
-"""Keeps the light of the room when somebody seeks backwards and when the run begins anew.
+"""Script that keeps the light of the room when the recording is played from the start again.
 
-viser's player puts back its own environment map before it plays the messages from the start. Ours
-is then decoded again, and the scene is nearly black until that is done. The program of viser's
-page is unpacked in the browser, so it is changed there, before it enters the page.
+viser's player sets its own environment map before it plays the messages from the start, also to
+seek backwards. Our map is then decoded again, and the scene is nearly black until that is done.
+viser's program is unpacked in the browser, so the script changes it there, before it runs.
 """
 
 
 def titled(page: str, title: str) -> str:
-    """Return ``page``, as viser's serializer makes it, under ``title``.
+    """Return the ``page`` of viser's serializer with ``title`` and constant light.
 
-    Raises ConfigurationError if viser's page is built otherwise.
+    Raises ConfigurationError if viser's page has another structure.
     """
     if page.count(TITLE) != 1:
-        raise ConfigurationError(f"viser's page has no {TITLE}: install the pinned version.")
+        raise ConfigurationError(
+            f"viser's page must contain {TITLE} once: install the pinned version of viser."
+        )
     return page.replace(TITLE, f"<title>{html.escape(title)}</title>{CLEAR}{KEEP_LIGHT}")

@@ -1,4 +1,4 @@
-"""Colours of the room round the arm, by day and by night."""
+"""Colours of the room round the arm, in a light and a dark theme."""
 
 from __future__ import annotations
 
@@ -12,7 +12,16 @@ from katana450.arm.control.solid import Colour
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours of the room. dark: whether the panel is dark too."""
+    """The look of the room.
+
+    Attributes:
+        floor: colour of the floor.
+        cell: colour of the fine grid lines.
+        section: colour of the coarse grid lines.
+        sky: colour of the sky at the top.
+        shadow: opacity of shadows on the floor (0 to 1).
+        dark: whether the panel is dark.
+    """
 
     floor: Colour
     cell: Colour
@@ -29,6 +38,6 @@ THEMES = {"Light": LIGHT, "Dark": DARK}
 
 
 def gradient(top: Colour, bottom: Colour) -> npt.NDArray[np.uint8]:
-    """The sky as a picture (128, 2, 3): from ``top`` down to ``bottom``."""
+    """Return the sky as an image (128, 2, 3) with a gradient from ``top`` to ``bottom``."""
     rows: npt.NDArray[np.uint8] = np.linspace(top, bottom, 128).round().astype(np.uint8)
     return np.repeat(rows[:, None, :], 2, axis=1)

@@ -1,4 +1,4 @@
-"""viser's own page, with our scripts in front of its own, and the hashes that let both run."""
+"""viser's own page with our scripts before its own, and the hashes that allow its scripts."""
 
 from __future__ import annotations
 
@@ -29,32 +29,36 @@ INDEX = Path(viser.__file__).parent / "client" / "build" / "index.html"
 LOADER = re.compile(
     r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL
 )
-"""The one script of the page: it unpacks style and program out of its own attribute."""
+"""The only script of viser's page, which unpacks style and program from its own attribute."""
 
 DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijklmnopqrstuvwxyz{|}~"
+"""Digits of the base 88 in which viser's page contains its packed program."""
 
 OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "frame")
-"""Names of our files in the order in which they run; the last one is given the themes."""
+"""Names of our files in the order in which they run. The last one gets the themes."""
 
 
 @dataclass(frozen=True)
 class ViserPage:
-    """The page as it is served; ``script_hashes`` are those of its inline scripts."""
+    """The page as it is served, and the hashes of its inline scripts."""
 
     html: bytes
     script_hashes: tuple[str, ...]
 
 
 def load() -> ViserPage:
-    """Read it from the installed viser. Raises ConfigurationError for one that is built otherwise.
+    """Read the page from the installed viser.
 
-    The program is a script element that the loader makes, so a browser that runs only scripts of
-    known hashes asks for the hash of both.
+    Its loader creates a script element with the program. A browser that runs only scripts with
+    known hashes therefore needs the hashes of both. Raises ConfigurationError if the page has
+    another structure.
     """
     html = INDEX.read_text(encoding="utf-8")
     found = LOADER.search(html)
     if found is None or html.count("<script") != 1:
-        raise ConfigurationError(f"{INDEX} is not built as that of the pinned viser: install it.")
+        raise ConfigurationError(
+            f"{INDEX} is not the page of the pinned viser: install the pinned version."
+        )
     packed, style, program, loader = found.groups()
     unpacked = zstandard.ZstdDecompressor().decompress(
         _bytes(packed), max_output_size=int(style) + int(program)
@@ -67,12 +71,12 @@ def load() -> ViserPage:
 def policy(script_hashes: Sequence[str]) -> str:
     """Return the content security policy of viser's page.
 
-    It allows the page's two scripts, known by their hashes, and what they make.
+    It allows the two scripts of the page by their hashes, and everything that they create.
     """
     return content_policy(
         default=("'none'",),
         script=("'self'", "'wasm-unsafe-eval'", "blob:", *script_hashes),
-        # The loader makes the style sheet.
+        # The loader creates the style sheet.
         style=("'unsafe-inline'",),
         img=("'self'", "data:", "blob:"),
         font=("data:",),
@@ -86,20 +90,20 @@ def policy(script_hashes: Sequence[str]) -> str:
 def objection(query: QueryParams, origin: str) -> str | None:
     """Return why viser's page is not served with ``query``, or None if it is.
 
-    viser's page plays the recording and runs the messages of the server that its address names.
-    Only the server at ``origin``, such as ``ws://localhost:8080``, may be named.
+    The address of viser's page can name a recording to play or a server to connect to. Recordings
+    are refused, and only the server at ``origin``, such as ``ws://localhost:8080``, may be named.
     """
     if "playbackPath" in query:
-        return "Recordings are not played here."
+        return "This server does not play recordings. Remove playbackPath from the address."
     for url in query.getlist("websocket"):
         parts = urlsplit(url)
         if f"{parts.scheme}://{parts.netloc}" != origin:
-            return "The page may speak to this server alone."
+            return "The page may connect only to this server. Remove websocket from the address."
     return None
 
 
 def _our_scripts() -> str:
-    """The script elements, with each theme's colours as viser's messages hold them."""
+    """Return the script elements, with the colours of each theme as in viser's messages."""
     rooms = {
         name: {
             "cell_color": theme.cell,
@@ -117,7 +121,7 @@ def _our_scripts() -> str:
 
 
 def _png(pixels: npt.NDArray[np.uint8]) -> str:
-    """Return a PNG file of ``pixels`` (height, width, 3) in base 64."""
+    """Return ``pixels`` (height, width, 3) as a PNG file in base 64."""
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "png")
     return base64.b64encode(file.getvalue()).decode()
@@ -128,7 +132,7 @@ def _hash(script: bytes) -> str:
 
 
 def _bytes(text: str) -> bytes:
-    """Four bytes for each five digits to base 88, and one less than there are left over."""
+    """Decode base 88: each 5 digits give 4 bytes, and n remaining digits give n - 1 bytes."""
     value = np.zeros(128, dtype=np.uint64)
     value[[ord(digit) for digit in DIGITS]] = np.arange(len(DIGITS))
     digits: npt.NDArray[np.uint64] = value[np.frombuffer(text.encode("ascii"), np.uint8)]

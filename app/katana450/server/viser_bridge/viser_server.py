@@ -1,4 +1,4 @@
-"""The viser server, on a port of its own that only the gateway may use."""
+"""The viser server, on a port of its own to which only the gateway may connect."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from katana450.server.viser_bridge.brand import dress
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 KEY_HEADER = "X-Katana450-Key"
-"""Header in which the gateway shows the key."""
+"""Header in which the gateway sends the key."""
 
 
 def open_server(key: str) -> viser.ViserServer:
-    """A viser server on a free port of this machine alone, its scene still empty.
+    """Open a viser server on a free local port, with an empty scene.
 
-    viser asks nobody who they are, and any program and any web page on this machine can reach a
-    port of it; so whoever connects without ``key`` is sent away before anything is said.
+    viser does not authenticate its clients, and every program and web page on this machine can
+    reach its port. A connection without ``key`` is therefore closed before anything is sent.
     """
     frames.share()
-    # What viser prints of itself here would stand between a person and our own line.
+    # viser's own messages on the terminal would hide ours.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, label="Katana450", verbose=False)
     _Lock(server, key)
@@ -33,43 +33,43 @@ def open_server(key: str) -> viser.ViserServer:
 
 
 def close_server(server: viser.ViserServer) -> None:
-    """Close it, without viser's own words of goodbye."""
+    """Close ``server`` without viser's own messages on the terminal."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 class _Lock:
-    """Lets in those who have the key.
+    """Admits only connections with the key.
 
-    The hook is no public interface of viser's: its version is exact, and tests knock at the port.
+    The hook is a private part of viser, so its version is pinned, and tests connect to the port.
     """
 
     def __init__(self, server: viser.ViserServer, key: str) -> None:
         self._key = key
-        self._friends: set[int] = set()
+        self._admitted: set[int] = set()
         self._websocket = server._websock_server
         handle = self._websocket._handle_incoming_message
 
         async def guarded(client_id: Any, message: Any) -> None:
-            if client_id in self._friends:
+            if client_id in self._admitted:
                 await handle(client_id, message)
 
         self._websocket._handle_incoming_message = guarded  # type: ignore[method-assign]
-        # Before viser's own, so that a stranger is closed before it is sent anything.
+        # Before viser's own callback, so that nothing is sent to a connection without the key.
         self._websocket._client_connect_cb.insert(0, self._meet)
         self._websocket.on_client_disconnect(
-            lambda connection: self._friends.discard(connection.client_id)
+            lambda connection: self._admitted.discard(connection.client_id)
         )
 
     async def _meet(self, connection: Any) -> None:
         line = self._websocket._live_connections[connection.client_id]
         shown = line.request.headers.get(KEY_HEADER, "") if line.request else ""
         if secrets.compare_digest(shown.encode(), self._key.encode()):
-            self._friends.add(connection.client_id)
+            self._admitted.add(connection.client_id)
             return
-        # What it has sent already would still be read.
+        # Messages that have already arrived would still be handled.
         connection._handle_incoming_message = _ignore
-        await line.close(1008, "Not here: the page is at another port.")
+        await line.close(1008, "This port is internal. The page is at another port.")
 
 
 async def _ignore(_client_id: Any, _message: Any) -> None:
@@ -77,7 +77,7 @@ async def _ignore(_client_id: Any, _message: Any) -> None:
 
 
 def _dress(server: viser.ViserServer) -> None:
-    """What a page takes over when it connects, and so must stand before the first one does."""
+    """Set the look that a page takes over when it connects. Call it before the first connection."""
     dress(server.gui)
     server.gui.set_panel_label("Katana450")
     server.gui.main_panel.dock_right()

@@ -1,0 +1,104 @@
+"""Functions that operate and read the instruments of the page."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.browser.page import ViserPage
+from tests.browser.session import Truth
+
+
+@contextmanager
+def slowly(page: ViserPage, truth: Truth) -> Iterator[None]:
+    """Slow the arm down for a browser that draws without a graphics card."""
+    speed = dial(page, "speed")
+    speed.focus()
+    for key, wanted in (("PageDown", 0.05), ("PageUp", 1.0)):
+        while truth.status()["speed"] != pytest.approx(wanted):
+            page.page.keyboard.press(key)
+            page.page.wait_for_timeout(60)
+        if wanted < 1.0:
+            yield
+            speed.focus()
+
+
+def show(page: ViserPage, wanted: bool) -> None:
+    button = page.page.locator("#instruments-button")
+    if (button.get_attribute("aria-expanded") == "true") != wanted:
+        button.click()
+    if wanted:
+        page.page.wait_for_function(
+            "() => document.querySelector('.knob .goal')?.textContent.endsWith('°')"
+        )
+
+
+def card(page: ViserPage, name: str) -> Any:
+    found = page.page.locator(f"#instruments .card[data-id={name}]")
+    found.scroll_into_view_if_needed()
+    return found
+
+
+def dial(page: ViserPage, name: str) -> Any:
+    return card(page, name).get_by_role("slider")
+
+
+def goal(page: ViserPage, name: str) -> float:
+    """Return the goal that a knob shows, in its own unit."""
+    return float(dial(page, name).get_attribute("aria-valuenow") or "nan")
+
+
+def middle(found: Any) -> tuple[float, float, float]:
+    """Return x and y of the middle of an element in the window, and half its width [px]."""
+    box = found.bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
+
+
+def turn(page: ViserPage, name: str, degrees: float) -> None:
+    """Drag round a knob clockwise, from its top."""
+    x, y, radius = middle(dial(page, name))
+    mouse = page.page.mouse
+    for step in range(11):
+        angle = math.radians(degrees * step / 10)
+        mouse.move(x + 0.7 * radius * math.sin(angle), y - 0.7 * radius * math.cos(angle))
+        if step == 0:
+            mouse.down()
+    mouse.up()
+
+
+def table(page: ViserPage, name: str) -> dict[str, Any]:
+    """Return the columns of a plot's CSV file by heading."""
+    with page.page.expect_download() as download:
+        card(page, name).get_by_role("button", name="as CSV").click()
+    file = download.value
+    assert file.suggested_filename == f"katana450-{name}.csv"
+    heading, *rows = csv.reader(io.StringIO(Path(file.path()).read_text(encoding="utf-8")))
+    return dict(zip(heading, np.array(rows, float).T, strict=True))
+
+
+def places(page: ViserPage) -> list[tuple[str, str]]:
+    """Return the shown cards in their order, with their sizes."""
+    found: list[list[str]] = page.page.evaluate(
+        """() => [...document.querySelectorAll("#instruments .card:not([hidden])")]
+          .map((card) => [card.dataset.id, card.dataset.size])"""
+    )
+    return [(name, size) for name, size in found]
+
+
+def arrange(page: ViserPage) -> None:
+    page.page.locator("#instruments .toolbar").get_by_role("button", name="Arrange").click()
+
+
+def reload(page: ViserPage) -> None:
+    """Reload the page. The instruments open again as before."""
+    page.page.reload()
+    page.page.wait_for_selector("#instruments .card")

@@ -1,0 +1,96 @@
+"""A driving session at the page: the server's state, and what a driver does in the bar."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import Page
+
+from katana450.settings import Settings
+from tests.browser.page import ViserPage
+from tests.browser.server import AppServer
+from tests.gateway.client import ask, enter
+
+MOVE = "/target/move"
+READY = np.array(Settings().ready)
+THIN = 15_000.0
+"""Rate of a slow connection [bytes/s], on which viser alone shows pictures half a minute old."""
+
+
+class Truth:
+    """The state of the server, queried without a browser."""
+
+    def __init__(self, server: AppServer) -> None:
+        self._url = server.url
+        self._cookie = enter(server.url)
+
+    def status(self) -> dict[str, Any]:
+        code, _, body = ask(f"{self._url}/api/v1/state", Cookie=self._cookie)
+        assert code == 200
+        state: dict[str, Any] = json.loads(body)
+        mood = "moving" if state["moving"] and state["status"] == "ok" else state["status"]
+        return state | {"mood": mood if state["stopped"] is None else "stopped"}
+
+    def wait(self, seconds: float = 5.0, **wanted: Any) -> float:
+        """Wait until the status has these values; return the time that it took [s]."""
+        started = time.monotonic()
+        while any(self.status()[key] != value for key, value in wanted.items()):
+            assert time.monotonic() - started < seconds, (self.status(), wanted)
+            time.sleep(0.005)
+        return time.monotonic() - started
+
+
+def mood(page: Page) -> str | None:
+    return page.get_attribute("body", "data-mood")
+
+
+def clear_stop(page: ViserPage, truth: Truth) -> None:
+    page.press_in_bar("Clear stop")
+    truth.wait(stopped=None)
+    page.wait_until(lambda: mood(page.page) != "stopped", "the bar to follow")
+
+
+def prepare(page: ViserPage, truth: Truth) -> None:
+    take(page)
+    if truth.status()["stopped"] is not None:
+        # The previous window closed while the arm was moving.
+        clear_stop(page, truth)
+    go_home(page, truth)
+
+
+def joints(page: ViserPage) -> Any:
+    shown = page.slider_values()
+    return np.radians([shown[f"Axis {axis}"] for axis in range(1, 6)])
+
+
+def take(page: ViserPage) -> None:
+    """Take the arm. The previous window may still hold it, or may have just lost it."""
+
+    def taken() -> bool:
+        page.page.evaluate(
+            """() => [...document.querySelectorAll("#acts button")]
+              .find((each) => /^Take/.test(each.textContent))?.click()"""
+        )
+        return bar(page, "holder") == "You drive"
+
+    page.wait_until(taken, "the arm")
+
+
+def bar(page: ViserPage, part: str) -> str:
+    """Return the text of a part of the bar."""
+    return page.page.inner_text(f"#{part}")
+
+
+def go_home(page: ViserPage, truth: Truth) -> None:
+    page.click_button("Home")
+    page.wait_until(lambda: np.allclose(joints(page), READY, atol=1e-6), "the sliders at home")
+    truth.wait(20.0, mood="ok")
+    page.page.wait_for_timeout(100)
+
+
+def camera(page: ViserPage) -> Any:
+    body = page.sent("ViewerCameraMessage")[-1].body
+    return np.array([body["position"], body["look_at"]])
