@@ -157,7 +157,7 @@ def test_a_pose_it_cannot_have_is_refused(
         ('<mimic joint="grip" mul', '<mimic joint="grip too" mul', "'grip too' .*mimics itself"),
         ('upper="0.5" velocity="1" effort="1"/>', 'upper="0.5"/>CIRCLE', "no driven joint stands"),
         ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 0"/>', "'turn'.*no axis"),
-        ("</robot>", '<link name="alone"/></robot>', "one link that hangs on no other, not 2"),
+        ("</robot>", '<link name="alone"/></robot>', "one link without a parent, not 2"),
     ],
 )
 def test_what_cannot_be_exported_is_refused(

@@ -67,7 +67,7 @@ def test_the_youbot_is_that_of_its_manual() -> None:
     assert canonical.signs[1] == -canonical.signs[2] == canonical.signs[3]
     np.testing.assert_allclose(arm.T_base_shoulder[:3, 3], [0.0, 0.0, 0.147], atol=1e-15)
     assert list(arm.tools) == ["tip"]
-    assert arm.notes == ("Joint 'left' is taken for that of a gripper; 'tip' is the tool.",)
+    assert arm.notes == ("Joint 'left' is assumed to be a gripper joint; 'tip' is the tool.",)
     assert arm.fingers == {"left": (1.0, 0.0), "right": (1.0, 0.0)}
     assert (arm.gripper.lower, arm.gripper.upper) == (0.0, 0.0115)
 
@@ -228,7 +228,7 @@ def test_an_arm_of_another_kind_is_refused_with_the_reason(
 def test_a_tool_that_cannot_be_is_refused() -> None:
     with pytest.raises(RobotDescriptionError, match="no link 'nose'; its links are base, turret"):
         load(PINCHER, "nose")
-    with pytest.raises(RobotDescriptionError, match=r"hangs on 4 turning joints .* --tool"):
+    with pytest.raises(RobotDescriptionError, match=r"is carried by 4 turning joints .* --tool"):
         load(PINCHER, "wrist")
 
 
@@ -283,7 +283,7 @@ def test_a_joint_behind_a_tool_that_nobody_named_is_told(tmp_path: Path) -> None
     path = tmp_path / "six.urdf"
     path.write_text(PINCHER.read_text().replace("</robot>", more.format("jaw")))
     (note,) = load(path).require_arm().notes
-    assert note == "Joint 'jaw' is taken for that of a gripper; 'fingertips' is the tool."
+    assert note == "Joint 'jaw' is assumed to be a gripper joint; 'fingertips' is the tool."
     assert load(path, "fingertips").require_arm().notes == ()
     # What no name calls a finger is an axis, until a person says where the tool is.
     path.write_text(PINCHER.read_text().replace("</robot>", more.format("sixth")))
