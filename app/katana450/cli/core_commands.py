@@ -1,4 +1,4 @@
-"""The commands of the core: those that are there without any extension."""
+"""The commands of the core, which work without any extension."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from katana450.cli.lines_options import add_fk_options, add_ik_options
 from katana450.cli.serve_options import add_serve_options
 from katana450.extension import CliCommand
 
-# Each function imports what it needs when it is called: fk and ik answer without waiting for the
-# libraries of the view.
+# Each function imports its modules when it is called, so that fk and ik do not load the libraries
+# of the view.
 
 
 def _serve(options: Namespace) -> int:
@@ -48,17 +48,16 @@ CORE_COMMANDS = (
     CliCommand(
         "fk",
         "JSON lines from stdin to stdout, joints to poses: "
-        '{"q": [5 angles, rad], "tool": "tcp"} a line',
+        '{"q": [5 angles, rad], "tool": "tcp"} per line',
         add_fk_options,
         _fk,
     ),
     CliCommand(
         "ik",
-        'JSON lines from stdin to stdout, poses to joints: {"T": [[4x4, m]], "tool": "tcp"} a line',
+        "JSON lines from stdin to stdout, poses to joints: "
+        '{"T": [[4x4, m]], "tool": "tcp"} per line',
         add_ik_options,
         _ik,
     ),
-    CliCommand(
-        "access", "give people links by which they may come in", add_access_options, _access
-    ),
+    CliCommand("access", "give people links with which they sign in", add_access_options, _access),
 )
