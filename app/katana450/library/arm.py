@@ -183,8 +183,8 @@ class Arm:
             T: pose of the tool [m].
             priority: which part of the pose is kept when five axes cannot satisfy all of it.
                 "pose": position, then the whole orientation. "pitch": pitch, then position, then
-                roll. "position": position, then pitch, then roll. In the last two the arm determines
-                the yaw.
+                roll. "position": position, then pitch, then roll. In the last two the arm
+                determines the yaw.
             branch: "front-up", "front-down", "back-up" or "back-down" to stay on it; None for the
                 one that comes nearest.
             q_hint: (n,) angles [rad]; of equally good postures the nearest to it is returned.
