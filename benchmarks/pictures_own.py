@@ -53,13 +53,13 @@ def _colours(scene: PictureScene) -> list[tuple[int, int, int]]:
 
 
 def main() -> None:
-    """Draw the picture as often as asked, each time from the triangles on."""
+    """Draw the picture as often as requested, each time from the triangles."""
     scene = PictureScene.load(Path(sys.argv[1]))
-    said = measured(
+    measurements = measured(
         lambda: drawn(scene).pixels, int(sys.argv[3]), IMPORT_SECONDS, ["embreex", "pillow"]
     )
     Path(sys.argv[2]).write_bytes(drawn(scene).png)
-    print(said)
+    print(measurements)
 
 
 if __name__ == "__main__":
