@@ -83,7 +83,7 @@ def test_ik_states_what_is_lost_of_a_pose_no_5_axis_arm_can_take() -> None:
 def test_ik_with_metrics_gives_the_cost_of_each_solution() -> None:
     q = [0.3, -0.9, 0.8, 0.4, 1.0]
     (pose,) = ask("fk", [{"q": q}])
-    plain, badged = ask("ik", [pose])[0], ask("ik", [pose | {"q": q}], "--badges")[0]
+    plain, badged = ask("ik", [pose])[0], ask("ik", [pose | {"q": q}], "--metrics")[0]
     costs = ("distance_rad", "time_s", "smallest_singular_value", "contact")
     for solution, with_badge in zip(plain["solutions"], badged["solutions"], strict=True):
         assert set(with_badge) == {*solution, *costs}
@@ -95,7 +95,7 @@ def test_ik_with_metrics_gives_the_cost_of_each_solution() -> None:
     assert min(s["distance_rad"] for s in badged["solutions"]) == pytest.approx(0.0, abs=1e-9)
     met = {s["branch"]: s["contact"] for s in badged["solutions"]}
     assert met["front-up"] is None
-    (from_zero,) = ask("ik", [pose], "--badges")
+    (from_zero,) = ask("ik", [pose], "--metrics")
     assert from_zero["solutions"][0]["distance_rad"] == pytest.approx(
         np.abs(from_zero["solutions"][0]["q"]).max()
     )

@@ -29,7 +29,7 @@ def _fk(options: Namespace) -> int:
 def _ik(options: Namespace) -> int:
     from katana450.cli.lines import Kinematics, answer_lines
 
-    in_base_frame, all_metrics = options.frame == "base", options.all_metrics
+    in_base_frame, all_metrics = options.frame == "base", options.metrics
     return answer_lines(
         Kinematics(
             options.urdf, options.tool, in_base_frame=in_base_frame, all_metrics=all_metrics
