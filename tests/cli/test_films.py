@@ -1,4 +1,4 @@
-"""Films and pages of runs as a person makes them, and Ctrl-C in the middle of one."""
+"""Films and pages of runs as a person makes them, and Ctrl-C during a film."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def test_a_film_of_a_motion(tmp_path: Path) -> None:
     ).stderr
     assert "160x100" in told
     assert "10 fps" in told
-    # From 0 to 0.5 s, both ends shown.
+    # From 0 to 0.5 s, with both ends.
     assert re.search(r"Duration: 00:00:00.60", told)
 
 
-def test_ctrl_c_leaves_no_half_of_a_film(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_no_partial_film(tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text(TABLE.replace("0.5,1", "60,1"))
     path = tmp_path / "film" / "m.mp4"
     path.parent.mkdir()
@@ -56,7 +56,7 @@ def test_ctrl_c_leaves_no_half_of_a_film(tmp_path: Path) -> None:
         text=True,
         start_new_session=True,
     ) as process:
-        # Not before a picture is in it.
+        # Wait for the first picture in it.
         deadline = time.monotonic() + 90.0
         while not list(path.parent.iterdir()):
             assert time.monotonic() < deadline
@@ -69,7 +69,7 @@ def test_ctrl_c_leaves_no_half_of_a_film(tmp_path: Path) -> None:
     assert list(path.parent.iterdir()) == []
 
 
-def test_the_pages_of_both_demos_are_small_and_ask_nobody(tmp_path: Path) -> None:
+def test_the_pages_of_both_demos_are_small_and_load_nothing(tmp_path: Path) -> None:
     for run in ("circle", "pour"):
         path = tmp_path / f"{run}.html"
         assert main(["export", "html", "--out", str(path), "--run", run]) == 0

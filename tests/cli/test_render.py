@@ -1,4 +1,4 @@
-"""``katana450 render``: a picture as a person asks for it, and what is said where none can be."""
+"""``katana450 render`` makes the requested picture, and reports the reason where it cannot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from katana450.cli.main import main
 SMALL = ("--size", "160x100")
 
 
-def test_a_picture_as_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_picture_has_the_requested_size(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "one.png"
     words = ["--pose=0.4,-1.187,1.484,0.14,0.5,0.2", "--camera", "tool", *SMALL]
     assert main(["render", "--out", str(path), *words]) == 0
@@ -37,7 +39,7 @@ def test_a_picture_as_it_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixt
         (("a.png", "--urdf", "nowhere.urdf"), "no robot description"),
     ],
 )
-def test_what_cannot_be_done_is_said(
+def test_impossible_pictures_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
 ) -> None:
     out, *more = words

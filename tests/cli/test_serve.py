@@ -95,7 +95,7 @@ def test_viewer_stops_on_request(number: signal.Signals) -> None:
     output = process.communicate(timeout=20)[0]
     assert process.returncode == 0, output
     assert time.monotonic() - started < 5.0
-    # Whoever ends it is told nothing more, by no library either.
+    # Neither the program nor a library prints anything after the interrupt.
     assert output == ""
 
 
@@ -108,7 +108,7 @@ def test_late_start_failure_reports_only_its_reason(tmp_path: Path) -> None:
     assert "viser" not in done.stdout
 
 
-def test_the_command_tells_its_version_and_its_ways() -> None:
+def test_the_command_prints_its_version_and_its_commands() -> None:
     for option in ("--version", "--help"):
         done = subprocess.run(
             [sys.executable, "-m", "katana450", option],

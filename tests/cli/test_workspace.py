@@ -43,7 +43,7 @@ def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
-def test_a_table_takes_away_what_is_below(tmp_path: Path) -> None:
+def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
     assert main(["workspace", *COARSE, "--table", "300", "--out", str(out)]) == 0
     assert load_map(out).points[:, 2].min() >= 0.3
@@ -85,7 +85,7 @@ def test_impossible_options_are_refused_before_the_work(
     assert time.monotonic() - start < 5.0
 
 
-def test_a_value_that_is_no_number_is_not_understood(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_value_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exit_:
         main(["workspace", "--voxel", "big"])
     assert exit_.value.code == 2
@@ -93,7 +93,7 @@ def test_a_value_that_is_no_number_is_not_understood(capsys: pytest.CaptureFixtu
 
 
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
-    """A map fine enough to take minutes, on a terminal of its own, so that the bar is drawn."""
+    """Interrupt a map that takes minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()
     out = tmp_path / "map.npz"
     command = [sys.executable, "-m", "katana450", "workspace", "--voxel", "2", "--out", str(out)]

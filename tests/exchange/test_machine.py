@@ -69,8 +69,8 @@ LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('<robot name="r"><link name="a"/></robot>', "r has no joint that could be driven"),
-        (LOCKED, "'j' of r cannot be driven.*from 0.1 to 0.1"),
+        ('<robot name="r"><link name="a"/></robot>', "r has no joint that can be driven"),
+        (LOCKED, "'j' of r cannot be driven.*range is 0.1 to 0.1"),
         ("<robot", "no robot description|not a robot description"),
     ],
 )

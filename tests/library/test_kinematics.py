@@ -1,4 +1,4 @@
-"""Kinematics of the library: the core's own numbers, in the frame asked for."""
+"""Kinematics of the library: the same numbers as in the core, in the requested frame."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_nearest_pose_of_a_feasible_one_is_itself(arm: katana450.Arm) -> None:
     assert best.reason == ""
 
 
-def test_nearest_pose_says_what_is_missed_and_why(arm: katana450.Arm) -> None:
+def test_nearest_pose_reports_errors_and_reason(arm: katana450.Arm) -> None:
     T = arm.fk(arm.ready)
     far = T.copy()
     far[0, 3] += 1.0

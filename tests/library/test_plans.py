@@ -1,4 +1,4 @@
-"""Plans of the library: where they go, how fast, and what is refused."""
+"""Plans of the library: their goals, speeds and refusals."""
 
 from __future__ import annotations
 

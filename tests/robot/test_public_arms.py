@@ -1,4 +1,4 @@
-"""Arms as their makers describe them: taken with their grippers, or refused for the true reason."""
+"""Arms as their makers describe them: read with their grippers, or refused for the true reason."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
     assert arm.chain.names == ("waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate")
 
 
-def test_the_loops_of_a_stewart_platform_are_refused_in_words(tmp_path: Path) -> None:
+def test_the_loops_of_a_stewart_platform_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path, "stewart", stewart())
     said = r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
     with pytest.raises(RobotDescriptionError, match=r"(?i)" + said):
@@ -225,7 +225,7 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
         solutions = inverse(chain, project(chain, forward(chain, q), within_limits=False).T)
         exact = [s for s in solutions if s.exact]
         assert max(s.position_error for s in exact) < 1e-14
-        # Its own posture comes back: with the rounding of the file it was off by 35 mrad.
+        # Its own posture is found again; with the rounding of the file the error was 35 mrad.
         assert min(np.abs(np.sin(0.5 * (s.q - q))).max() for s in exact) < 1e-9
     robot = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     moved = []
@@ -233,7 +233,7 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
         robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)) | {"gripper": 0.0})
         T = arm.T_base_shoulder @ forward(chain, q)
         moved.append(T[:3, 3] - robot.get_transform("gripper_frame_link")[:3, 3])
-    # Less than the last digit of the file, and as much as the note says.
+    # Less than the last digit of the file, and the amount in the note.
     assert np.linalg.norm(moved, axis=1).max() < 1.5e-6
     assert "about 0.001 mm" in note
 
