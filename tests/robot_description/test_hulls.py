@@ -112,7 +112,7 @@ def surface(shape: Manifold) -> coal.BVHModelOBBRSS:
 
 
 def standoff(excess: Manifold, model: coal.BVHModelOBBRSS) -> tuple[float, list[float]]:
-    """Return the maximum distance [mm] of ``excess`` from the surface of ``model``, and its place."""
+    """Return the maximum distance [mm] of ``excess`` from the surface of ``model``, and where."""
     mesh = excess.refine_to_length(5.0).to_mesh64()
     point, still, request = coal.Sphere(1e-9), coal.Transform3s(), coal.DistanceRequest()
     found = (0.0, [0.0, 0.0, 0.0])
