@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-begun = time.perf_counter()
+started = time.perf_counter()
 import numpy as np  # noqa: E402
 
 from benchmarks.pictures_scene import PictureScene, measured  # noqa: E402
@@ -21,7 +21,7 @@ from katana450.extensions.media.picture import Picture, Translucent, picture  # 
 from katana450.extensions.media.scene import Item  # noqa: E402
 from katana450.server.viser_bridge.themes import Theme  # noqa: E402
 
-IMPORT_SECONDS = time.perf_counter() - begun
+IMPORT_SECONDS = time.perf_counter() - started
 
 
 def drawn(scene: PictureScene) -> Picture:

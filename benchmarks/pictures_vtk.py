@@ -13,14 +13,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-begun = time.perf_counter()
+started = time.perf_counter()
 import numpy as np  # noqa: E402
 import vtk  # noqa: E402
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy  # noqa: E402
 
 from benchmarks.pictures_scene import PictureScene, measured  # noqa: E402
 
-IMPORT_SECONDS = time.perf_counter() - begun
+IMPORT_SECONDS = time.perf_counter() - started
 
 FLOOR_EXTENT = 3.0
 """[m] Half the side of the floor and length of its lines."""

@@ -180,9 +180,9 @@ def judged(case: Case, motion: FloatArray) -> Outcome:
     """Return the quality of ``motion`` (ticks, 3) for the stream ``case``."""
     t = TICK * np.arange(len(motion))
     q = motion[:, 0]
-    wanted = np.array([case.signal(x) for x in np.arange(0.0, case.duration, TICK / 4)])
+    target = np.array([case.signal(x) for x in np.arange(0.0, case.duration, TICK / 4)])
     beyond = max(
-        float(q.max() - max(wanted.max(), 0.0)), float(min(wanted.min(), 0.0) - q.min()), 0.0
+        float(q.max() - max(target.max(), 0.0)), float(min(target.min(), 0.0) - q.min()), 0.0
     )
     late = t > case.settled
     best, left = 0.0, math.inf
@@ -190,7 +190,7 @@ def judged(case: Case, motion: FloatArray) -> Outcome:
         off = q[late] - np.array([case.signal(x - lag) for x in t[late]])
         if np.abs(off).max() < left:
             best, left = lag, float(np.abs(off).max())
-    settled = wanted[np.arange(0.0, case.duration, TICK / 4) > case.settled]
+    settled = target[np.arange(0.0, case.duration, TICK / 4) > case.settled]
     middle, half = 0.5 * (settled.max() + settled.min()), 0.5 * float(np.ptp(settled))
     return Outcome(beyond / half, float(np.abs(q[late] - middle).max()) / half, best, left)
 

@@ -128,14 +128,14 @@ def drive(commands: Callable[[int, Session, State], Command | None]) -> None:
     nodes = BareNodes(bare, robot.require_arm().chain.n)
     ours: list[float] = []
     floor: list[float] = []
-    began = time.perf_counter()
+    started = time.perf_counter()
     for tick in range(TICKS):
         command = commands(tick, session, loop.state_publisher.snapshot.state)
         if command is not None:
             mailbox.put(command)
         clock.t += 1.0 / settings.rate
         # At the pace of the app, so that values shown ten times a second come every fourth frame.
-        time.sleep(max(0.0, began + clock.t - time.perf_counter()))
+        time.sleep(max(0.0, started + clock.t - time.perf_counter()))
         loop.tick()
         if tick % EVERY or not loop.state_publisher.snapshot.state.moving:
             continue

@@ -43,7 +43,7 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("c", "--trajectory", "m.csv"), "A file of c holds no motion"),
         (("urdf", "--pose", "0,0"), "A file of urdf stands in no pose"),
@@ -53,10 +53,10 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
     ],
 )
 def test_impossible_exports_are_reported(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
 ) -> None:
     assert main(["export", *words, "--out", str(tmp_path)]) == 1
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -35,13 +35,13 @@ def test_a_film_of_a_motion(tmp_path: Path) -> None:
     path = tmp_path / "m.mp4"
     words = ("--trajectory", str(tmp_path / "m.csv"), "--size", "160x100", "--fps", "10")
     subprocess.run(command("render", "--out", str(path), *words), cwd=ROOT, check=True, timeout=120)
-    told = subprocess.run(
+    output = subprocess.run(
         [get_ffmpeg_exe(), "-i", str(path)], capture_output=True, text=True, check=False
     ).stderr
-    assert "160x100" in told
-    assert "10 fps" in told
+    assert "160x100" in output
+    assert "10 fps" in output
     # From 0 to 0.5 s, with both ends.
-    assert re.search(r"Duration: 00:00:00.60", told)
+    assert re.search(r"Duration: 00:00:00.60", output)
 
 
 def test_ctrl_c_leaves_no_partial_film(tmp_path: Path) -> None:
@@ -63,9 +63,9 @@ def test_ctrl_c_leaves_no_partial_film(tmp_path: Path) -> None:
             assert process.poll() is None
             time.sleep(0.1)
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=60)
+        _, output = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "Traceback" not in told
+    assert "Traceback" not in output
     assert list(path.parent.iterdir()) == []
 
 

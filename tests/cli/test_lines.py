@@ -203,12 +203,12 @@ def test_a_wrong_line_gets_an_error_and_the_rest_is_answered(command: str) -> No
     answers = ask(command, [*lines, GOOD[command]])
     assert all("error" not in answer for answer in answers[::2])
     assert answers[0] == answers[-1]
-    for number, (said, answer) in enumerate(
-        zip((said for _, said in BAD[command]), answers[1::2], strict=True), start=1
+    for number, (message, answer) in enumerate(
+        zip((message for _, message in BAD[command]), answers[1::2], strict=True), start=1
     ):
         assert set(answer) == {"error"}
         assert f"line {2 * number}: " in answer["error"]
-        assert said in answer["error"]
+        assert message in answer["error"]
 
 
 def test_the_exit_status_is_1_when_every_line_failed() -> None:

@@ -24,7 +24,7 @@ def test_the_picture_has_the_requested_size(
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("a.gif",), "must end in .png for a picture or in .mp4"),
         (("a.mp4",), "A film wants a motion"),
@@ -40,11 +40,11 @@ def test_the_picture_has_the_requested_size(
     ],
 )
 def test_impossible_pictures_are_reported(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], said: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
 ) -> None:
     out, *more = words
     assert main(["render", "--out", str(tmp_path / out), *more]) == 1
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -25,12 +25,12 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
     assert (
         main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out), "--ply", str(ply)]) == 0
     )
-    said = capsys.readouterr()
+    printed = capsys.readouterr()
     stored = load_map(out)
-    assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in said.out
-    assert f"{stored.fraction.max():.1%}" in said.out
-    assert f"Written: {ply}" in said.out
-    assert said.err == ""
+    assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in printed.out
+    assert f"{stored.fraction.max():.1%}" in printed.out
+    assert f"Written: {ply}" in printed.out
+    assert printed.err == ""
     assert sorted(tmp_path.iterdir()) == [out, ply]
     assert (stored.robot, stored.tool) == ("katana450", "grasp")
     assert stored.voxel == pytest.approx(0.17)
@@ -53,7 +53,7 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--tool", "hammer"], "no link 'hammer'"),
         (["--table", "2000"], "comes up to"),
@@ -74,14 +74,14 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
     ],
 )
 def test_impossible_options_are_refused_before_the_work(
-    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     start = time.monotonic()
     assert main(["workspace", *options]) == 1
-    heard = capsys.readouterr()
-    assert heard.err.startswith("katana450: ")
-    assert said in heard.err
-    assert heard.out == ""
+    printed = capsys.readouterr()
+    assert printed.err.startswith("katana450: ")
+    assert message in printed.err
+    assert printed.out == ""
     assert time.monotonic() - start < 5.0
 
 

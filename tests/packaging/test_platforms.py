@@ -188,18 +188,18 @@ def test_modes_of_windows_never_show_other_readers(
 
 
 def test_files_are_created_as_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
+    opened_flags: list[int] = []
     create = os.open
 
     def opened(path: Path, flags: int, mode: int) -> int:
-        asked.append(flags)
+        opened_flags.append(flags)
         return create(path, flags & ~(1 << 20), mode)
 
     monkeypatch.setattr(os, "O_BINARY", 1 << 20, raising=False)
     monkeypatch.setattr(os, "open", opened)
     path = tmp_path / "file"
     os.close(platform_support.create_file(path, 0o600))
-    assert asked[0] & (1 << 20)
+    assert opened_flags[0] & (1 << 20)
     if sys.platform != "win32":
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
     with pytest.raises(FileExistsError):

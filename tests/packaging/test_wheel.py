@@ -80,5 +80,5 @@ def test_server_runs_beside_files_of_the_user(
 
 @pytest.mark.long
 def test_demo_runs_beside_files_of_the_user(python: Path, folder: Path) -> None:
-    said = run(folder, python.parent / "katana450", "demo", "circle", "--headless")
-    assert "circle" in said.lower()
+    output = run(folder, python.parent / "katana450", "demo", "circle", "--headless")
+    assert "circle" in output.lower()

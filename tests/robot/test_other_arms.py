@@ -188,7 +188,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ('<axis xyz="1 0 0"/>', '<axis xyz="0 1 0"/>', "axis 5 must be square to axis 4"),
         ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.1 0 0"/>', "axis 3 must be parallel"),
@@ -219,9 +219,9 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
     ],
 )
 def test_an_arm_of_another_kind_is_refused_with_the_reason(
-    tmp_path: Path, old: str, new: str, said: str
+    tmp_path: Path, old: str, new: str, message: str
 ) -> None:
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(edited(tmp_path, old, new)).require_arm()
 
 
@@ -259,7 +259,7 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("no markup", "its XML is broken, syntax error: line 1"),
         ("<robot name='r'>\n <link name='a'>\n", "its XML is broken, no element found: line 3"),
@@ -269,11 +269,11 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
     ],
 )
 def test_invalid_robot_description_is_reported_plainly(
-    text: str, said: str, tmp_path: Path
+    text: str, message: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(text)
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(path)
 
 

@@ -43,7 +43,7 @@ def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:
 
 
 @pytest.mark.parametrize(
-    ("prop", "change", "said"),
+    ("prop", "change", "message"),
     [
         ("cup", {"height": -1.0}, "'height' is -1.0"),
         ("cup", {"outer_radius": 0.01}, "no thickness"),
@@ -55,7 +55,7 @@ def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:
     ],
 )
 def test_invalid_props_are_refused(
-    tmp_path: Path, prop: str, change: dict[str, object], said: str
+    tmp_path: Path, prop: str, change: dict[str, object], message: str
 ) -> None:
     described = json.loads(PROPS_PATH.read_text(encoding="utf-8"))
     described[prop].update(change)
@@ -63,7 +63,7 @@ def test_invalid_props_are_refused(
         (tmp_path / f"{name}.glb").touch()
     path = tmp_path / "props.json"
     path.write_text(json.dumps(described), encoding="utf-8")
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load_props(path)
 
 

@@ -128,7 +128,7 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("joints", "said"),
+    ("joints", "message"),
     [
         (PX100, r"arm.urdf has 4 axes \(waist, shoulder, elbow, wrist_angle\)"),
         (UR5, r"arm.urdf has 6 axes \(shoulder_pan, .*, wrist_3\); the closed-form"),
@@ -156,9 +156,11 @@ def test_a_joint_that_cannot_move_rests_inside_its_limits(tmp_path: Path) -> Non
     ids=["PincherX-100", "UR5", "Z1", "Z1 with a jaw", "ViperX-300 6DOF", "a sixth axis",
          "a flange on six", "two arms", "a trigger", "six with a rail", "five with a rail"],
 )  # fmt: skip
-def test_the_number_of_axes_is_the_first_reason(tmp_path: Path, joints: list[J], said: str) -> None:
+def test_the_number_of_axes_is_the_first_reason(
+    tmp_path: Path, joints: list[J], message: str
+) -> None:
     path = written(tmp_path, "arm", joints)
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(path).require_arm()
     found = find_robot(Settings(), path, None)
     assert found.robot.arm is None
@@ -198,8 +200,10 @@ def test_a_wheeled_base_does_not_hide_its_arm(tmp_path: Path) -> None:
 
 def test_the_loops_of_a_stewart_platform_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path, "stewart", stewart())
-    said = r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
-    with pytest.raises(RobotDescriptionError, match=r"(?i)" + said):
+    message = (
+        r"stewart.urdf, line \d+: link 'plate' is the child of 6 joints \(ball_1, .*closed loops"
+    )
+    with pytest.raises(RobotDescriptionError, match=r"(?i)" + message):
         find_robot(Settings(), path, None)
     four_bar = [
         J("a", "revolute", "ground", "crank"),

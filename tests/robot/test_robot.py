@@ -100,7 +100,7 @@ def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         (
             'xyz="0.190',
@@ -110,10 +110,10 @@ def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
     ],
 )
 def test_an_unusable_file_is_refused_with_a_reason(
-    tmp_path: Path, old: str, new: str, said: str
+    tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     path = edited(tmp_path, old, new)
-    with pytest.raises(RobotDescriptionError, match=said):
+    with pytest.raises(RobotDescriptionError, match=message):
         load(path)
 
 

@@ -24,7 +24,7 @@ from tests.robot.public_arms import PX150, urdf
 
 BOX = '<link name="{0}"><{1}><geometry><box size="{2}"/></geometry></{1}></link>'
 THICK = 0.01
-"""[m] Of a finger, along its way."""
+"""[m] Thickness of a finger along its direction of motion."""
 
 
 @pytest.fixture
