@@ -37,13 +37,13 @@ class Gland:
 
     @property
     def outward(self) -> Vector:
-        """Unit vector out of its mouth."""
+        """Unit vector out of the gland's mouth."""
         side, up = math.sin(math.radians(self.lean)), math.cos(math.radians(self.lean))
         return (side, up, 0.0) if self.along == "x" else (0.0, up, side)
 
     @property
     def swivel(self) -> Vector:
-        """Centre of its ball."""
+        """Centre of the gland's ball."""
         return (self.at[0], self.at[1] + BALL_HEIGHT, self.at[2])
 
     @property

@@ -50,7 +50,7 @@ def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:
         ("basin", {"mass": float("nan")}, "'mass' is nan"),
         ("basin", {"floor_radius": 0.0}, "'floor_radius' is 0.0"),
         ("basin", {"floor": "thick"}, "could not convert"),
-        ("table", {"x": [1.0, 0.0]}, "no span"),
+        ("table", {"x": [1.0, 0.0]}, "not an interval"),
         ("table", {"mesh": "chair.glb"}, "no mesh"),
     ],
 )

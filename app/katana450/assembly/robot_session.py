@@ -130,7 +130,7 @@ class RunningArm:
 
     @property
     def running(self) -> bool:
-        """True while its control loop runs."""
+        """True while the control loop runs."""
         return self._loop.running
 
     @property

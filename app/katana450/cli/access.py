@@ -11,7 +11,7 @@ from katana450.server.web.authenticator import public_origin
 
 
 def access(options: Namespace) -> int:
-    """Run the command and return the exit status."""
+    """Run ``katana450 access`` and return the exit status."""
     now = time.time()
     if options.act == "give":
         file = AccessFile.create(options.file)

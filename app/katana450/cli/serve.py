@@ -29,7 +29,8 @@ WAKE_INTERVAL = 0.2
 """[s] Interval at which signals and the end of a front end are checked."""
 
 RESTART_DELAYS = (0.0, 1.0, 5.0, 15.0)
-"""[s] Delays before a front end is started again, after the first, second, ... early end."""
+"""[s] Delay before a front end is started again: after a stable run, then after the first, second
+and each further early end in a row."""
 
 STABLE_SECONDS = 30.0
 """[s] A front end that ended after a longer time did not end early."""

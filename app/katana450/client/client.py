@@ -27,7 +27,7 @@ class Client:
 
     @property
     def welcome(self) -> answers.Welcome:
-        """Greeting of the server, with the identity of this client."""
+        """Greeting of the server, which contains the identity of this client."""
         return self._client.welcome
 
     def ask(self, request: requests.Request) -> answers.Answer:

@@ -1,7 +1,7 @@
 """The conduit that carries the arm's cables from link to link, as curves between its fittings.
 
 Each stretch hangs between two links with one joint between them, so its shape depends on that
-joint's angle alone. It is computed once for a row of angles and interpolated between them.
+joint's angle alone. It is computed once for a row of angles and interpolated linearly between them.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class ConduitStretch:
 
     @property
     def angles(self) -> FloatArray:
-        """(ANGLES,) angles [rad] of its joint for which it is computed."""
+        """(ANGLES,) angles [rad] of the joint for which the stretch is computed."""
         return np.linspace(self.hinge.lower, self.hinge.upper, ANGLES)
 
     def between(self, angle: float) -> tuple[int, float]:
@@ -119,7 +119,7 @@ class ConduitStretch:
 
     @cached_property
     def _curves(self) -> FloatArray:
-        """(ANGLES, n, 3) points evenly along the conduit, for each of its angles."""
+        """(ANGLES, n, 3) points evenly along the conduit [m], for each of ``angles``."""
         hinge, angles = self.hinge, self.angles
         turns = [se3.from_rotation_translation(so3.exp(hinge.axis * a), ZERO) for a in angles]
         T = hinge.T_start_joint @ np.array(turns) @ hinge.T_joint_end

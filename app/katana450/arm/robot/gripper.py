@@ -9,14 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.arm import NO_GRIPPER, GripperModel
+from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.urdf import UrdfJoint
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray
 
 SLIDING = "prismatic"
-
-SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
-"""[rad/s, m/s] Speed of a finger if its file states none."""
 
 PERPENDICULAR = 0.5
 """Cosine between two axes up to which they point neither in the same nor in opposite directions."""

@@ -14,6 +14,9 @@ from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
+SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
+"""[rad/s, m/s] Speed of a joint if its file states none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Joint:
@@ -71,9 +74,9 @@ class Link:
     center: FloatArray
 
     def at_rest(self, resting: Mapping[str, float]) -> FloatArray:
-        """Return its pose (4, 4) in its parent with its joint at its ``resting`` value [rad or m].
+        """Return the link's pose (4, 4) in its parent with its joint at the value in ``resting``.
 
-        A joint without a value there is at zero.
+        Values are in rad or m. A joint without a value there is at zero.
         """
         if self.joint is None or not (value := resting.get(self.joint.name, 0.0)):
             return self.T_parent_link
@@ -81,7 +84,7 @@ class Link:
 
     @cached_property
     def shapes(self) -> tuple[VisualMesh, ...]:
-        """The surfaces of its visuals, read on first use.
+        """Surfaces of the link's visuals, read on first use.
 
         Raises RobotDescriptionError for a mesh file that cannot be read.
         """
@@ -89,5 +92,5 @@ class Link:
 
     @cached_property
     def colour(self) -> tuple[float, float, float]:
-        """Colour (sRGB, 0..1) of the largest part of its surface; PLAIN without shapes."""
+        """Colour (sRGB, 0..1) of the largest part of the link's surface; PLAIN without shapes."""
         return main_colour(self.shapes)

@@ -50,22 +50,22 @@ class Mesh:
 
     @property
     def key(self) -> str:
-        """The key by which it is requested."""
+        """Key under which the mesh is stored and requested."""
         return self.solid.key
 
     @property
     def sha256(self) -> str:
-        """SHA-256 checksum of its file, as a hexadecimal text."""
+        """SHA-256 checksum of the mesh file, as a hexadecimal text."""
         return hashlib.sha256(self.file).hexdigest()
 
     @property
     def bytes(self) -> int:
-        """[bytes] Memory that it takes."""
+        """Memory that the mesh takes [bytes]."""
         return len(self.file) + self.vertices.nbytes + self.faces.nbytes
 
     @cached_property
     def drawn(self) -> creases.Drawn:
-        """Its triangles, for drawing."""
+        """Triangles of the mesh, for drawing."""
         return creases.drawn(self.vertices, self.faces, self.colours)
 
 

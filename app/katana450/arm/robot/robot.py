@@ -10,16 +10,13 @@ from functools import cached_property
 import numpy as np
 
 from katana450.arm.control.joints import JointSet
-from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 LIMIT_TOLERANCE = 1e-9
 """[rad, m] Excess over a limit that is accepted."""
-
-SLOW_TURN, SLOW_SLIDE = 1.0, 0.1
-"""[rad/s, m/s] Speed of a joint if its file states none."""
 
 SEARCHED_RANGE = math.pi / 2.0
 """[rad, m] Limit of a joint's range in the search for the bounds of a robot."""

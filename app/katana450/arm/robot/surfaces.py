@@ -58,7 +58,7 @@ class VisualMesh:
 
     @cached_property
     def corners(self) -> FloatArray:
-        """(8, 3) corners of its bounding box [m]."""
+        """(8, 3) corners of the bounding box [m]."""
         ends = (self.vertices.min(axis=0), self.vertices.max(axis=0))
         return np.array(list(itertools.product(*np.transpose(ends).tolist())))
 

@@ -48,14 +48,14 @@ class Visual:
 
     @property
     def glb(self) -> Path | None:
-        """The file, if it can be shown unchanged, with its own materials."""
+        """The GLB file, if it can be shown unchanged with its own materials; else None."""
         if not isinstance(self.source, Path) or self.source.suffix != ".glb":
             return None
         return self.source if (self.scale == 1.0).all() else None
 
     @cached_property
     def mesh(self) -> Any:
-        """A trimesh of it in the body's own frame [m].
+        """A trimesh of the shape in the body's frame [m].
 
         Raises RobotDescriptionError if the file cannot be read.
         """
